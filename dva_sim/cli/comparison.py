@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from dva_sim.cli.console import console
+from dva_sim.cli.console import console, print_lines
 from dva_sim.cli.results_json import compared
 from dva_sim.cli.verbosity import print_json
 from dva_sim.experiments.analysis.compare import Comparison, GateVerdict, judge
@@ -80,8 +80,8 @@ def tell(
         if side.failures:
             failed = f"{len(side.failures)} runs of {name} failed and take no part"
             console.print(failed, style="yellow", soft_wrap=True)
-    for line in (*_questions(comparison), *_cells(comparison), _luck(comparison)):
-        console.print(escape(line), soft_wrap=True)
+    told = (*_questions(comparison), *_cells(comparison), _luck(comparison))
+    print_lines(map(escape, told), console)
     wanted: Sequence[str | None] = measures or [None]
     for measure in wanted:
         table, column = comparison.find(measure)
@@ -97,8 +97,7 @@ def tell_verdicts(verdicts: Iterable[GateVerdict], console: Console) -> None:
         worst = [verdict for verdict in each if verdict.holds]
         word = "[red]failed[/red]" if worst else "passed"
         console.print(f"{word}: {escape(each[0].gate.text)}", soft_wrap=True)
-        for verdict in worst or each:
-            console.print(f"  {escape(_verdict(verdict))}", soft_wrap=True)
+        print_lines((f"  {escape(_verdict(verdict))}" for verdict in worst or each), console)
 
 
 def _verdict(verdict: GateVerdict) -> str:

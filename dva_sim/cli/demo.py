@@ -14,7 +14,7 @@ from typing import Final
 
 from dva_sim.cli import study_runs
 from dva_sim.cli.console import say
-from dva_sim.cli.episodes import episode
+from dva_sim.cli.stories import episode
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.results.results import Results

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, one_of, whole
+from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, count, file, one_of
 from dva_sim.cli.verbosity import loudness, print_json
 from dva_sim.kernel.suggestions import either
 from dva_sim.testing.promises import TRIALS
@@ -136,8 +136,7 @@ def validate(
         Option("-o", "--out", metavar="FOLDER", help="Write tables, figures and a page there."),
     ] = None,
     cases: Annotated[
-        str | None,
-        Option(metavar="FILE", help="A file of cases, by name or path; not for operators."),
+        str | None, file("A file of cases, by name or path; not for operators.")
     ] = None,
     strategy: Annotated[
         str | None,
@@ -145,14 +144,13 @@ def validate(
     ] = None,
     quick: Annotated[bool, Option("--quick", help="Fewer runs, wider errors.")] = False,
     jobs: Jobs = None,
-    seed: Annotated[int, Option("--seed", metavar="N", parser=whole(), help="Random seed.")] = 1,
+    seed: Annotated[int, count("Random seed.", "--seed")] = 1,
     ablate: Annotated[
         bool, Option("--ablate", help="Leave mechanisms out one by one; network only.")
     ] = False,
     live: Annotated[bool, Option("--live", help="Measure real sockets now; network only.")] = False,
     measure: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="Measure the whole design, or go on with it; network only."),
+        Path | None, file("Measure the whole design, or go on with it; network only.")
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,

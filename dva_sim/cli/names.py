@@ -1,19 +1,25 @@
 """All that can be named: files that users edit, and classes that they may add to the program.
 
-`dva-sim list` and `dva-sim plugins` print it, for people or as JSON.
+`dva-sim list` and `dva-sim plugins` print it, for people or as JSON. To list names nothing is
+loaded: what registries ship is read from their source. A registry is a
+`Plugins(kind, base, shipped, group=..., hidden=...)`, and what it ships is a dictionary of names
+and classes, or made from a tuple of classes that say their names themselves.
 """
 
 from __future__ import annotations
 
-import inspect
+import ast
 import re
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+import dva_sim
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import parse_scalar
 from dva_sim.kernel.errors import ConfigError
@@ -21,11 +27,85 @@ from dva_sim.kernel.plugins import Plugins
 from dva_sim.kernel.suggestions import hint
 from dva_sim.testing.promises import TRIALS, plural
 
-_CHECKED = {trial.load_plugins().kind: trial.kind for trial in TRIALS.values()}
-KINDS: Final[dict[str, Plugins[Any]]] = {
-    plural(plugins.kind): plugins for plugins in (trial.load_plugins() for trial in TRIALS.values())
-}
-"""Kinds of plug-ins by what several are called."""
+
+class ShippedNames(NamedTuple):
+    """A kind of plug-ins.
+
+    Attributes:
+        several: What several of its kind are called.
+        group: Entry points of installed packages.
+        shipped: Names that a configuration can use, with the docstring of each class.
+    """
+
+    several: str
+    group: str
+    shipped: dict[str, str]
+
+
+def registry(place: str) -> ShippedNames:
+    """The registry at `module:NAME`."""
+    module, _, name = place.partition(":")
+    module, call = _found(module, ast.Name(name))
+    given = {keyword.arg: keyword.value for keyword in call.keywords}
+    given |= dict(zip(("kind", "base", "shipped"), call.args, strict=False))
+    hidden = ast.literal_eval(given["hidden"].args[0]) if "hidden" in given else ()
+    shipped = {
+        name: ast.get_docstring(kind) or ""
+        for name, kind in _classes(*_found(module, given["shipped"]))
+        if name not in hidden
+    }
+    return ShippedNames(plural(given["kind"].value), given["group"].value, shipped)
+
+
+def _classes(module: str, shipped: Any) -> Iterator[tuple[str, ast.ClassDef]]:
+    """The names of a dictionary, and what defines the class of each."""
+    if isinstance(shipped, ast.Dict):
+        for name, kind in zip(shipped.keys, shipped.values, strict=True):
+            yield ast.literal_eval(name or ast.Constant("")), _found(module, kind)[1]
+        return
+    for kind in _found(module, shipped.generators[0].iter)[1].elts:
+        origin, found = _found(module, kind)
+        yield _found(origin, ast.Name(shipped.key.attr), found.body)[1].value, found
+
+
+def _found(module: str, what: Any, body: list[ast.stmt] | None = None) -> tuple[str, Any]:
+    """What is meant by an expression in a module, or in a part of it, and the module it is from."""
+    if isinstance(what, ast.Attribute):
+        package, imported = _found(module, what.value)
+        return _found(f"{package}.{imported}", ast.Name(what.attr))
+    if not isinstance(what, ast.Name):
+        return module, what
+    for node in _source(module) if body is None else body:
+        match node:
+            case ast.ClassDef(name=what.id):
+                return module, node
+            case (
+                ast.Assign(targets=[ast.Name(id=what.id)])
+                | ast.AnnAssign(target=ast.Name(id=what.id))
+            ):
+                return _found(module, node.value)
+            case ast.ImportFrom(module=str(origin)) if what.id in {a.name for a in node.names}:
+                return _found(origin, what) if _file(origin, what.id) is None else (origin, what.id)
+    raise LookupError(f"{module} has no {what.id}")
+
+
+def _file(module: str, name: str = "") -> Path | None:
+    """The source of a module, or of one in a package; None if it is none."""
+    path = Path(dva_sim.__file__).parent.joinpath(*module.split(".")[1:], name)
+    return next((p for p in (path / "__init__.py", path.with_suffix(".py")) if p.is_file()), None)
+
+
+@cache
+def _source(module: str) -> list[ast.stmt]:
+    file = _file(module)
+    assert file is not None, module
+    return ast.parse(file.read_bytes()).body
+
+
+def kinds_of_plugins() -> dict[str, tuple[str, Plugins[Any]]]:
+    """Kinds of plug-ins by what several are called, each with the word for trying one."""
+    loaded = [(word, trial.load_plugins()) for word, trial in TRIALS.items()]
+    return {plural(plugins.kind): (word, plugins) for word, plugins in loaded}
 
 
 def plugins_as_json() -> dict[str, Any]:
@@ -43,25 +123,25 @@ def plugins_as_json() -> dict[str, Any]:
             ],
             "files": [str(path) for path in plugins.files()],
         }
-        for several, plugins in KINDS.items()
+        for several, (_, plugins) in kinds_of_plugins().items()
     }
 
 
 def plugin_lines() -> Iterator[str]:
     """The same for people."""
-    for number, (several, plugins) in enumerate(KINDS.items()):
+    for number, (several, (word, plugins)) in enumerate(kinds_of_plugins().items()):
         yield f"{chr(10) if number else ''}{several}"
-        for title, told in _facts(plugins):
+        for title, told in _facts(word, plugins):
             yield f"  {title:<13} {told}"
 
 
-def _facts(plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
+def _facts(word: str, plugins: Plugins[Any]) -> Iterator[tuple[str, str]]:
     yield "key", _key(plugins)
     yield "a file", f"{plugins.key}: {_named(plugins)}, looked for beside the configuration, here, "
     yield "", f"and in {plugins.folder}"
     yield "entry points", f"{plugins.group}, for installed packages"
     yield "class", f"derived from {plugins.public}, with {plugins.needs}"
-    yield "try it", f"dva-sim check {_CHECKED[plugins.kind]} mine.py:Mine"
+    yield "try it", f"dva-sim check {word} mine.py:Mine"
     yield "shipped", ", ".join(sorted(plugins.shipped.keys() - plugins.hidden))
     told = [f"{entry.name} ({_package(entry)})" for entry in plugins.installed()]
     yield "installed", ", ".join(told) or "none"
@@ -119,7 +199,13 @@ class NamedThing:
 
 def kinds() -> list[str]:
     """What can be listed, in the order in which it is."""
-    return [*FILES, *KINDS]
+    return [*FILES, *_registries()]
+
+
+def _registries() -> dict[str, ShippedNames]:
+    """Kinds of plug-ins by what several are called."""
+    found = (registry(f"dva_sim.{trial.room}:PLUGINS") for trial in TRIALS.values())
+    return {each.several: each for each in found}
 
 
 def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
@@ -132,7 +218,7 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
         ConfigError: there is no such kind.
     """
     makers: dict[str, Any] = {name: _files(name, folder) for name, folder in FILES.items()}
-    makers |= {several: _classes(plugins) for several, plugins in KINDS.items()}
+    makers |= {several: _plugins_of(there) for several, there in _registries().items()}
     if kind is not None and kind not in makers:
         raise ConfigError(f"there is no list of {kind!r}; {hint(kind, makers, 'there are')}")
     return {name: list(made) for name, made in makers.items() if kind in (None, name)}
@@ -175,15 +261,11 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
-def _classes(plugins: Plugins[Any]) -> Iterator[NamedThing]:
-    offered = {entry.name: f"of {entry.value}" for entry in plugins.installed()}
-    for name in plugins.known():
-        yield NamedThing(name, _documented(plugins.shipped, name) or offered.get(name, ""))
-
-
-def _documented(shipped: Mapping[str, Any], name: str) -> str:
-    text = inspect.getdoc(shipped[name]) if name in shipped else None
-    return _first(" ".join((text or "").partition("\n\n")[0].split()))
+def _plugins_of(there: ShippedNames) -> Iterator[NamedThing]:
+    told = {entry.name: f"of {entry.value}" for entry in entry_points(group=there.group)}
+    for name, text in there.shipped.items():
+        told[name] = _first(" ".join(text.partition("\n\n")[0].split())) or told.get(name, "")
+    return (NamedThing(name, description) for name, description in sorted(told.items()))
 
 
 def _first(text: str) -> str:

@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
@@ -76,6 +76,26 @@ def _within(least: int, most: int) -> str:
     return f"of at least {least}" if most == MOST_SEED else f"from {least} to {most}"
 
 
+def count(help: str, *names: str, metavar: str = "N", least: int = 0, most: int = MOST_SEED) -> Any:
+    """An option that takes a whole number."""
+    return Option(*names, metavar=metavar, parser=whole(least, most), help=help)
+
+
+def choice(*words: str, help: str) -> Any:
+    """An option that takes one of some words."""
+    return Option(metavar="|".join(words), autocompletion=one_of(*words), help=help)
+
+
+def file(help: str) -> Any:
+    """An option that takes a file."""
+    return Option(metavar="FILE", help=help)
+
+
+def folder(help: str) -> Any:
+    """An option that takes a folder."""
+    return Option(metavar="FOLDER", help=help)
+
+
 MOST_JOBS = 1024
 
 StudyName = Annotated[
@@ -92,37 +112,27 @@ Sets = Annotated[
 ]
 Jobs = Annotated[
     int | None,
-    Option(
-        "-j",
-        "--jobs",
-        metavar="N",
-        parser=whole(1, MOST_JOBS),
-        help="How many processes; default: one for each core.",
+    count(
+        "How many processes; default: one for each core.", "-j", "--jobs", least=1, most=MOST_JOBS
     ),
 ]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
-RunSeed = Annotated[
-    int, Option("--seed", metavar="N", parser=whole(), help="The run's random seed.")
-]
+RunSeed = Annotated[int, count("The run's random seed.", "--seed")]
 Results = Annotated[
     Path | None,
     Option("-o", "--out", metavar="FOLDER", help="Results folder; default: results/STUDY."),
 ]
 
-Video = Annotated[Path | None, Option(metavar="FILE", help="Write a film: .gif or .mp4.")]
-Still = Annotated[Path | None, Option(metavar="FILE", help="Draw one moment: .png, .pdf or .svg.")]
-Strip = Annotated[
-    Path | None, Option(metavar="FILE", help="Draw several moments in one figure, likewise.")
-]
+Video = Annotated[Path | None, file("Write a film: .gif or .mp4.")]
+Still = Annotated[Path | None, file("Draw one moment: .png, .pdf or .svg.")]
+Strip = Annotated[Path | None, file("Draw several moments in one figure, likewise.")]
 At = Annotated[
     str | None,
     Option(metavar="SECONDS", help="Moment of --still, or moments of --strip: 10,20,30."),
 ]
-Panels = Annotated[
-    int, Option(metavar="N", parser=whole(1, 24), help="How many moments a strip has.")
-]
+Panels = Annotated[int, count("How many moments a strip has.", least=1, most=24)]
 Camera = Annotated[
     str | None,
     Option(metavar="ROBOT", help="--still shows what this robot's camera sees."),

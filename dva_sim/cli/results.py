@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Json, Quiet, ResultsFolder, Verbose, whole
+from dva_sim.cli.options import Json, Quiet, ResultsFolder, Verbose, count
 from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 
 
@@ -44,10 +44,7 @@ def report(
 def show(
     folder: ResultsFolder,
     table: Annotated[str | None, Option(metavar="NAME", help="Show the rows of a table.")] = None,
-    rows: Annotated[
-        int,
-        Option(metavar="N", parser=whole(1), help="How many of them."),
-    ] = 20,
+    rows: Annotated[int, count("How many of them.", least=1)] = 20,
     columns: Annotated[
         bool, Option("--columns", help="Say what the columns mean, of one table or all.")
     ] = False,

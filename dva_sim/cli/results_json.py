@@ -108,13 +108,8 @@ def _finding(found: Finding | None) -> Data | None:
     if found is None:
         return None
     numbers = zip(found.levels, found.mean, found.low, found.high, strict=True)
-    return {
-        "measure": found.measure,
-        "unit": found.unit,
-        "factor": found.factor,
-        "first": found.first,
-        "second": found.second,
-        "over": found.over,
+    keys = ("measure", "unit", "factor", "first", "second", "over")
+    return {key: getattr(found, key) for key in keys} | {
         "within": dict(found.within),
         "in_excess_of_reference": found.in_excess,
         "differences": [
@@ -142,10 +137,8 @@ def _cells(reading: Reading) -> Iterator[Data]:
 
 
 def _columns(results: Results, name: str) -> list[Data]:
-    return [
-        {"name": column.name, "unit": column.unit, "meaning": column.meaning}
-        for column in results.columns(name)
-    ]
+    keys = ("name", "unit", "meaning")
+    return [{key: getattr(column, key) for key in keys} for column in results.columns(name)]
 
 
 def _program(results: Results) -> Data:

@@ -21,9 +21,11 @@ from dva_sim.cli.options import (
     Strip,
     Verbose,
     Video,
+    choice,
+    count,
+    file,
+    folder,
     number,
-    one_of,
-    whole,
 )
 from dva_sim.cli.verbosity import loudness
 
@@ -46,8 +48,7 @@ def episode(
         Option(metavar="PATTERN,PATTERN", help="Run the same seed under two patterns."),
     ] = None,
     record: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="Keep the run as a file: .mcap, for replay and viewers."),
+        Path | None, file("Keep the run as a file: .mcap, for replay and viewers.")
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -60,14 +61,14 @@ def episode(
         dva-sim episode evacuation --strip fire.png  # several moments in one figure
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
-    from dva_sim.cli import episodes
+    from dva_sim.cli import stories
     from dva_sim.experiments.report.episode import EpisodeRequest
     from dva_sim.recordings.pictures import Wanted
     from dva_sim.testing.file_kinds import mistakes_of
 
     pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
     with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
-        episodes.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
+        stories.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
 
 
 def replay(
@@ -79,9 +80,7 @@ def replay(
     panels: Panels = 6,
     camera: Camera = None,
     inset: Inset = False,
-    ros2: Annotated[
-        Path | None, Option(metavar="FOLDER", help="Write a ROS 2 bag; the folder is new.")
-    ] = None,
+    ros2: Annotated[Path | None, folder("Write a ROS 2 bag; the folder is new.")] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -91,40 +90,20 @@ def replay(
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
-    from dva_sim.cli import episodes
+    from dva_sim.cli import stories
     from dva_sim.recordings.pictures import Wanted
 
     with loudness(quiet, verbose):
-        episodes.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+        stories.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
 
 
 def live(
     scenario: ScenarioName,
     only: Annotated[
-        str | None,
-        Option(
-            metavar="dva|world|operator",
-            autocompletion=one_of("dva", "world", "operator"),
-            help="Run one part alone.",
-        ),
+        str | None, choice("dva", "world", "operator", help="Run one part alone.")
     ] = None,
-    which: Annotated[
-        int,
-        Option(
-            "--number",
-            metavar="N",
-            parser=whole(1),
-            help="Which operator, with --only operator.",
-        ),
-    ] = 1,
-    operators: Annotated[
-        str,
-        Option(
-            metavar="simulated|scripted",
-            autocompletion=one_of("simulated", "scripted"),
-            help="Who drives.",
-        ),
-    ] = "simulated",
+    which: Annotated[int, count("Which operator, with --only operator.", "--number", least=1)] = 1,
+    operators: Annotated[str, choice("simulated", "scripted", help="Who drives.")] = "simulated",
     dva: Annotated[
         str | None,
         Option(metavar="HOST:PORT", help="Where the DVA listens; 127.0.0.1:5600 with --only."),
@@ -134,22 +113,13 @@ def live(
     ] = "127.0.0.1",
     port: Annotated[
         int,
-        Option(
-            metavar="PORT",
-            parser=whole(0, _MOST_PORT),
-            help="First port, two for each device; default: free ones.",
+        count(
+            "First port, two for each device; default: free ones.", metavar="PORT", most=_MOST_PORT
         ),
     ] = 0,
-    keys: Annotated[
-        Path | None, Option(metavar="FOLDER", help="Folder of keys: CURVE is on.")
-    ] = None,
-    record: Annotated[
-        Path | None, Option(metavar="FOLDER", help="Folder for the robots' traces.")
-    ] = None,
-    state: Annotated[
-        Path | None,
-        Option(metavar="FILE", help="File that lets a killed DVA go on where it was."),
-    ] = None,
+    keys: Annotated[Path | None, folder("Folder of keys: CURVE is on.")] = None,
+    record: Annotated[Path | None, folder("Folder for the robots' traces.")] = None,
+    state: Annotated[Path | None, file("File that lets a killed DVA go on where it was.")] = None,
     seconds: Annotated[
         float | None,
         Option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from dva_sim.cli.options import SITES, whole
+from dva_sim.cli.options import SITES, count
 
 if TYPE_CHECKING:
     from dva_sim.worlds.site import Site
@@ -34,10 +34,7 @@ def show(
     ] = None,
     set_: SiteSets = None,
     coverage: Annotated[bool, Option("--coverage", help="Show where Wi-Fi is not good.")] = False,
-    width: Annotated[
-        int,
-        Option(metavar="PIXELS", parser=whole(200, 8000), help="Of the picture."),
-    ] = 1650,
+    width: Annotated[int, count("Of the picture.", metavar="PIXELS", least=200, most=8000)] = 1650,
 ) -> None:
     """Draw a site and say in a line what it is.
 

@@ -1,23 +1,34 @@
-"""What came of one run, told in a terminal: of each model its story, a table and a few lines."""
+"""`dva-sim episode` and `replay`: a run played or read, drawn, kept, and told in a terminal.
+
+Of each model there is a story, a table, and a few lines of what came of it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from dva_sim.cli.console import console, print_lines, warn
 from dva_sim.cli.verbosity import is_verbose, lines_of, tell_measures
-from dva_sim.experiments.report.episode import Played
+from dva_sim.experiments.report.episode import (
+    EpisodeRequest,
+    Played,
+    doubts,
+    open_recording,
+    write_replay,
+)
 from dva_sim.experiments.report.figures.trial import name_and_unit
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import resolved
+from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.moments import story
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
@@ -60,9 +71,17 @@ def tell(run: Played, console: Console) -> None:
 def tell_any(run: Played, console: Console) -> None:
     """A run of whatever model: the measures of its row."""
     console.rule(f"{Path(run.scenario.model).name}, seed {run.seed}")
-    for line in lines_of(run.tables["runs"][0], _columns(run)):
-        console.print(line, soft_wrap=True)
+    print_lines(lines_of(run.tables["runs"][0], _columns(run)), console)
     console.print(f"simulated in {run.took_s:.2f} s", soft_wrap=True)
+
+
+def _table(heads: Sequence[str], right: Sequence[str], no_wrap: bool = False) -> Table:
+    """An empty table without lines; heads may have units in brackets."""
+    table = Table(box=None, pad_edge=False)
+    for head in heads:
+        side: JustifyMethod = "right" if head in right else "left"
+        table.add_column(Text(head), justify=side, no_wrap=no_wrap)
+    return table
 
 
 def _columns(run: Played) -> Sequence[Measure]:
@@ -70,16 +89,12 @@ def _columns(run: Played) -> Sequence[Measure]:
 
 
 # --- a full run ----------------------------------------------------------------------
-
-
 def tell_story(playback: Playback, console: Console) -> None:
     """What happened, in order."""
     scenario = playback.scenario
     delay, phone = scenario.link.delay_s * 1000, scenario.phone.profile
     console.rule(f"{scenario.pattern}, {delay:g} ms each way, phone {phone}, seed {playback.seed}")
-    table = Table(box=None, pad_edge=False)
-    for heading in ("time", "who", "what"):
-        table.add_column(heading, justify="right" if heading == "time" else "left", style="")
+    table = _table(["time", "who", "what"], right=["time"])
     for moment in playback.recorder.timeline:
         style = STYLES.get(moment.kind, "")
         table.add_row(f"{moment.time:7.1f} s", moment.who, escape(moment.what), style=style)
@@ -89,8 +104,7 @@ def tell_story(playback: Playback, console: Console) -> None:
 def tell_side_by_side(runs: Sequence[Playback], console: Console) -> None:
     """How runs under several patterns ended, beside each other."""
     console.rule("side by side")
-    for line in story(runs):
-        console.print(line, soft_wrap=True)
+    print_lines(story(runs), console)
 
 
 def tell_outcome(tables: Tables, how: str, console: Console) -> None:
@@ -116,8 +130,7 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
         lines.append(
             f"{failures} times an operator, filter, mapping or drive of yours gave no answer"
         )
-    for line in ("", *lines):
-        console.print(line, soft_wrap=True)
+    print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)
 
 
@@ -162,8 +175,6 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
 
 
 # --- a shift -------------------------------------------------------------------------
-
-
 def tell_shift(run: Played, console: Console) -> None:
     """A shift: its first events, and what it took to deal with all."""
     scenario, recording = run.scenario, run.kept
@@ -172,8 +183,7 @@ def tell_shift(run: Played, console: Console) -> None:
     console.rule(f"{scenario.dispatch.policy}, seed {run.seed}")
     if recording.columns:
         console.print(_first_events(recording))
-    for line in _shift_lines(recording):
-        console.print(line, soft_wrap=True)
+    print_lines(_shift_lines(recording), console)
     broken = sum(recording.violations.values())
     console.print(
         f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages} messages, "
@@ -185,10 +195,7 @@ def tell_shift(run: Played, console: Console) -> None:
 
 
 def _first_events(recording: TimedRecording) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in EVENT_HEADS:
-        right = heading in ("detected", "after")
-        table.add_column(heading, justify="right" if right else "left", no_wrap=True)
+    table = _table(EVENT_HEADS, right=["detected", "after"], no_wrap=True)
     columns = recording.columns
     for row in np.argsort(columns["detected"], kind="stable")[:EVENTS]:
         response = float(columns["arrived"][row] - columns["detected"][row])
@@ -237,24 +244,20 @@ def _seconds(value: float) -> str:
 
 
 # --- a session on a congested link ---------------------------------------------------
-
-
 def tell_session(run: Played, console: Console) -> None:
     """A session on a congested link: each flow, and what the drive came to."""
     scenario, row = run.scenario, run.tables["runs"][0]
     assert isinstance(scenario, TransportScenario)
     console.rule(f"{scenario.transport.kind}, {scenario.operator.strategy}, seed {run.seed}")
     console.print(_flows(run.tables["flows"]))
-    for line in _session_lines(row):
-        console.print(line, soft_wrap=True)
+    print_lines(_session_lines(row), console)
     console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
     tell_measures(row, _columns(run))
 
 
 def _flows(flows: Sequence[Row]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("way", "flow", "rate\n[kbit/s]"):
-        table.add_column(heading, justify="right" if "rate" in heading else "left")
+    rate = "rate\n[kbit/s]"
+    table = _table(["way", "flow", rate], right=[rate])
     for flow in flows:
         table.add_row(flow["way"], flow["flow"], f"{flow['rate_bps'] / 1000.0:.0f}")
     return table
@@ -292,8 +295,6 @@ def _ms(seconds: float) -> str:
 
 
 # --- a task --------------------------------------------------------------------------
-
-
 def tell_task(run: Played, console: Console) -> None:
     """A block of trials: the first ones, and all in a few words."""
     scenario, trials, row = run.scenario, run.tables["trials"], run.tables["runs"][0]
@@ -316,10 +317,8 @@ def _count(trials: int) -> str:
 
 def _first_trials(trials: Sequence[Row]) -> Table:
     there = {name: head for name, head in COLUMNS.items() if name in trials[0]}
-    table = Table(box=None, pad_edge=False)
-    conditions = [_head(key) for key in list(trials[0])[2:4]]
-    for heading in ("trial", *conditions, *there.values()):
-        table.add_column(Text(heading), justify="right", no_wrap=True)
+    heads = ["trial", *map(_head, list(trials[0])[2:4]), *there.values()]
+    table = _table(heads, right=heads, no_wrap=True)
     for trial in trials[:TRIALS]:
         first, second = list(trial.values())[2:4]
         values = (_number(trial[name]) for name in there)
@@ -348,3 +347,45 @@ def _task_lines(row: Row) -> list[str]:
         parts.append(f"{row['throughput_bps']:.2f} bit/s")
     parts.append(f"{row['waits']:.1f} waits in each")
     return parts
+
+
+def episode(request: EpisodeRequest, where: Console = console) -> None:
+    """Play what is asked for, tell it, and write its files.
+
+    Raises:
+        ConfigError: it cannot be played, drawn or kept.
+    """
+    asked = request.scenarios()
+    warn(doubts(asked), where)
+    runs = []
+    for scenario in asked:
+        runs.append(request.play(scenario))
+        tell(runs[-1], where)
+    if len(runs) > 1:
+        tell_side_by_side([run.kept for run in runs if isinstance(run.kept, Recording)], where)
+    _say_written(request.write(runs), request.pictures, where)
+
+
+def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = console) -> None:
+    """Tell the story of a recording, and draw or export what is asked for.
+
+    Raises:
+        ConfigError: not a recording, or what is asked for is not in it.
+    """
+    opened = open_recording(file, pictures)
+    run = opened.playback
+    tell_story(run, where)
+    if opened.tables is not None:
+        tell_outcome(opened.tables, f"simulated by dva-sim {opened.about['version']}", where)
+    if not opened.is_whole:
+        there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
+        where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
+    _say_written(write_replay(opened, pictures, ros2), pictures, where)
+
+
+def _say_written(files: Iterable[str], pictures: Wanted, where: Console) -> None:
+    """Write files, and say where they are."""
+    if pictures.any:
+        with where.status("Drawing ..."):
+            files = list(files)
+    print_lines(files, where)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from typer import Option
 
-from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose, number, whole
+from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose, count, number
 from dva_sim.cli.verbosity import loudness
 
 
@@ -37,10 +37,7 @@ def run(
     study: StudyName,
     out: Results = None,
     set_: Sets = None,
-    seed: Annotated[
-        int | None,
-        Option("--seed", metavar="N", parser=whole(), help="Random seed of the whole study."),
-    ] = None,
+    seed: Annotated[int | None, count("Random seed of the whole study.", "--seed")] = None,
     jobs: Jobs = None,
     scheduler: Annotated[
         str | None,
@@ -48,21 +45,13 @@ def run(
     ] = None,
     limit: Annotated[
         float,
-        Option(
-            metavar="SECONDS",
-            parser=number(),
-            help="A run that takes longer has failed.",
-        ),
+        Option(metavar="SECONDS", parser=number(), help="A run that takes longer has failed."),
     ] = 600,
     quick: Annotated[bool, Option("--quick", help="The study's small version.")] = False,
     full: Annotated[bool, Option("--full", help="The study's larger version.")] = False,
     pilot: Annotated[
         int | None,
-        Option(
-            metavar="PERSONS",
-            parser=whole(1),
-            help="Only so many persons, with a random seed of their own.",
-        ),
+        count("Only so many persons, with a random seed of their own.", metavar="PERSONS", least=1),
     ] = None,
     dry_run: Annotated[bool, Option("--dry-run", help="Only say what would run.")] = False,
     quiet: Quiet = False,

@@ -68,11 +68,8 @@ WRITTEN = ("*.html", "*.pdf", "*.json", "figures/*", "tables/*")
 
 def tell_measures(row: Mapping[str, Any], columns: Iterable[Measure]) -> None:
     """Every measure of a run, with its unit and what it means."""
-    if not is_verbose():
-        return
-    detail("")
-    for line in lines_of(row, columns):
-        detail(line)
+    if is_verbose():
+        print("", *lines_of(row, columns), sep="\n")
 
 
 def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str]:

@@ -77,11 +77,29 @@ def stated_conditions(models: Iterable[str]) -> dict[str, str]:
     return {path: key.condition for said in there for path, key in said.items() if key.condition}
 
 
+_TOLD: dict[str, Measure] = {}
+
+
+def take_up(columns: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
+    """From now on call the measures of users as a results folder does; the newest one counts.
+
+    Args:
+        columns: What its manifest keeps of columns that are none of ours, by table and name.
+    """
+    for table in columns.values():
+        _TOLD.update(
+            {
+                name: Measure(name, said.get("meaning", ""), said.get("title", ""))
+                for name, said in table.items()
+            }
+        )
+
+
 def measure_called(name: str, model: str = "") -> Measure:
     """What is known of a measure, in a certain model if it has it; else the name alone."""
     columns = MODELS[model].columns["runs"] if model in MODELS else ()
     own = next((column for column in columns if column.name == name), None)
-    return own or _measures().get(name) or Measure(name, "")
+    return own or _measures().get(name) or _TOLD.get(name) or Measure(name, "")
 
 
 def factor_name(factor: str) -> str:

@@ -77,6 +77,8 @@ class Model(Generic[S]):
         teller: What tells one run in the terminal, as `module:function` of a `Played` run and a
             console.
         still: What draws one run, likewise; empty if there is nothing to see.
+        page: What reports of its studies say otherwise than of drives, as `module:class` derived
+            from `ModelPage`; only ours have one, since a results folder loads no user's code.
     """
 
     name = ""
@@ -85,6 +87,7 @@ class Model(Generic[S]):
     is_recorded = False
     teller = "dva_sim.cli.stories:tell_any"
     still = ""
+    page = ""
 
     def simulate(self, scenario: S, seed: int) -> Any:
         """Run a scenario; what is left of the run, to be measured."""
@@ -213,6 +216,7 @@ class _Timed(Model[TimedScenario]):
         "responders": of_shift.RESPONDER_COLUMNS,
     }
     teller = "dva_sim.cli.stories:tell_shift"
+    page = "dva_sim.experiments.report.shift_page:ShiftPage"
     build = staticmethod(shift.build)
     rehearse = staticmethod(shift.rehearse_timed)
     simulate = staticmethod(shift.simulate_timed)
@@ -253,6 +257,7 @@ class _Transports(_Operated[TransportScenario]):
         "flows": of_transport.FLOW_COLUMNS,
     }
     teller = "dva_sim.cli.stories:tell_session"
+    page = "dva_sim.experiments.report.transport_page:TransportPage"
     build = staticmethod(transport.build)
     simulate = staticmethod(transport.simulate_session)
 

@@ -16,8 +16,14 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.report.figures.palette import is_of_palette
 from dva_sim.experiments.report.figures.registry import PLUGINS
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import ASIDE, LEAST_WORDS, WIDTH, Drawn, styled
+from dva_sim.experiments.report.figures.style import (
+    ASIDE,
+    LEAST_WORDS,
+    WIDTH,
+    Drawn,
+    ReportFigure,
+    styled,
+)
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -76,6 +79,23 @@ def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch
     assert capsys.readouterr().out == "x" * 37 + "...\n" + "y" * 40 + "\n"
 
 
+def test_what_is_listed_of_plugins_is_what_is_there_though_nothing_is_loaded():
+    for several, (_, plugins) in names.kinds_of_plugins().items():
+        listed = {entry.name: entry.description for entry in names.everything(several)[several]}
+        assert list(listed) == plugins.known()
+        for name, kind in plugins.shipped.items():
+            if name not in plugins.hidden:
+                assert listed[name].split()[0] == inspect.getdoc(kind).split()[0]
+
+
+def test_a_list_loads_no_model_and_no_figure():
+    code = "import sys; from dva_sim.cli import call; call(['list']); print(*sys.modules)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = told.stdout.splitlines()[-1].split()
+    assert "dva_sim.cli.names" in loaded
+    assert not {"numpy", "dva_sim.simulation", "dva_sim.experiments", "dva_sim.core"} & {*loaded}
+
+
 def test_every_kind_that_is_listed_can_be_completed():
     assert names.kinds() == list(names.everything())
 
@@ -85,7 +105,7 @@ def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
     names_of_pages = ("agents/README", "protocol/README", "worlds/HAZARDS", "experiments/README")
     pages = [ROOT / f"{name}.md" for name in names_of_pages]
     page = "".join(path.read_text(encoding="utf-8") for path in pages)
-    for several, plugins in names.KINDS.items():
+    for several, (_, plugins) in names.kinds_of_plugins().items():
         assert f"\n{several}\n" in f"\n{out}"
         for told in (plugins.group, plugins.key, plugins.public, plugins.folder):
             assert told in out

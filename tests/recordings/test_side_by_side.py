@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from dva_sim.cli.episodes import episode
+from dva_sim.cli.stories import episode
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.pictures import Wanted

@@ -10,6 +10,7 @@ import numpy as np
 
 from dva_sim.experiments.analysis.robustness import Support
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, plain_level, present
+from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import number, percent
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, with_unit
@@ -217,11 +218,8 @@ def _beyond(support: Support | None) -> _Column | None:
 def _what_is_covered(support: Support | None) -> str:
     if support is None:
         return ""
-    covered = f"Delays of the loop that published data cover: {support.words}."
-    if not support.outside.any():
-        return covered
-    mark = f"{_MARK.strip()} Extrapolated: beyond these delays, taken without the person's own."
-    return f"{mark} {covered}"
+    facts = {"mark": _MARK.strip(), "covered": support.words}
+    return note("extrapolated", **facts, is_outside=bool(support.outside.any()))
 
 
 def _text(summary: _Summarise, cell: Floats, text: Callable[[float], str]) -> str:

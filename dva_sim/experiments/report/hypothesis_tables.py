@@ -1,6 +1,6 @@
-"""Hypotheses and named comparisons as tables: what was claimed beside what came out.
+"""What was claimed beside what came out: hypotheses, comparisons, a registration, as tables.
 
-A registration as a table: what was fixed beforehand, beside what was run and what came out.
+And what stayed open: how many persons it takes, and which few runs weigh much.
 """
 
 from __future__ import annotations
@@ -10,6 +10,10 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.hypothesis_tests import (
     Compared,
     Judgement,
@@ -17,14 +21,17 @@ from dva_sim.experiments.analysis.hypothesis_tests import (
     Verdict,
     judged,
 )
-from dva_sim.experiments.analysis.run_grid import Setting, Table
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table
+from dva_sim.experiments.analysis.sample_size import MOST_PERSONS, POWERS, Count, SizePlan
+from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, quantity
 from dva_sim.simulation.labels import factor_name, level_name, measure_of, setting
-from dva_sim.statistics import LEVEL, Interval
+from dva_sim.statistics import LEVEL, Interval, quantile_interval
 
 # A mark beside the word: neither needs a colour.
 _VERDICTS: dict[Verdict, str] = {
@@ -51,11 +58,7 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
         ]
         for t in tested
     ]
-    note = (
-        "A claim held if p by Holm is below 5 %, and did not hold if p of the opposite is; else it "
-        "is open, which is no evidence either way. Each interval is of its row alone."
-    )
-    return CellTable("", heads, len(heads), rows, note=note)
+    return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
 
 
 def comparison_table(found: Judgement) -> CellTable:
@@ -79,24 +82,11 @@ def comparison_table(found: Judgement) -> CellTable:
     ]
     families = Counter(c.contrast.family for c in compared)
     families.update(t.contrast.family for t in found.tested)
-    counted = "; ".join(f"{name}: {count}" for name, count in families.items())
-    note = (
-        "Each interval is of its row alone; p is of the two-sided permutation test, by Holm for "
-        f"all tests of its family together (tests in each family: {counted}). Standard deviations "
-        "are those of persons under the two levels, on average. Levels of factors that a "
-        "comparison does not name are averaged."
-        f"{_too_few(compared)}"
-    )
-    return CellTable("", heads, len(heads), rows, note=note)
-
-
-def _too_few(compared: Sequence[Compared]) -> str:
-    """Whether even one test cannot come out, whatever the runs."""
     persons = max((c.difference.n_persons for c in compared if c.difference), default=0)
-    least = 2.0 ** (1 - persons)
-    if not persons or least <= 1 - LEVEL:
-        return ""
-    return f" With {persons} persons p cannot be below {least:.2g}: this test needs six."
+    least = 2.0 ** (1 - persons) if persons else 0.0  # whatever the runs
+    facts = {"families": list(families.items()), "persons": persons}
+    told = note("comparisons", **facts, least_p=least if least > 1 - LEVEL else None)
+    return CellTable("", heads, len(heads), rows, note=told)
 
 
 def _sides(compared: Compared) -> str:
@@ -223,3 +213,90 @@ def _earlier(hashes: Sequence[str]) -> tuple[str, str]:
     if not hashes:
         return "none told", ""
     return f"{len(hashes)}: {', '.join(h[:_DIGITS] for h in hashes)}", ""
+
+
+def few_that_weigh(finding: Finding, view: StudyView) -> str:
+    """Where runs that count with the whole horizon pull at the mean, and what the median is."""
+    if finding.horizon is None or not view.part.has("confirmed"):
+        return ""
+    told = [_weight(finding, view, stop) for stop in range(len(view.stops))]
+    if not any(told):
+        return ""
+    return (
+        f"Where some runs count with {quantity(finding.horizon, 's')}, the mean hangs on them and "
+        f"the median of the differences tells more: {'; '.join(filter(None, told))}."
+    )
+
+
+def _weight(finding: Finding, view: StudyView, stop: int) -> str:
+    """`at 20 s 2 of 48 runs, median 4.0 s (3.1 to 4.9 s)`; empty where none or all count so."""
+    grid, panel = view.part.grid("confirmed"), view.panels[0]
+    sides = [view.curve(grid, panel, side)[stop] for side in (finding.first, finding.second)]
+    runs = sum(int(np.isfinite(side).sum()) for side in sides)
+    missed = sum(int((side < 1).sum()) for side in sides)
+    if not 0 < missed < runs / 4:
+        return ""
+    found = quantile_interval(*_differences(finding, view, stop))
+    ends = f" ({number(found.low)} to {quantity(found.high, finding.unit)})"
+    where = f"at {level_name(finding.over, view.stops[stop])} " if view.over else ""
+    return (
+        f"{where}{missed} of {runs} runs, median {quantity(found.mean, finding.unit)}"
+        f"{ends if np.isfinite(found.low) else ''}"
+    )
+
+
+def _differences(finding: Finding, view: StudyView, stop: int) -> tuple[Floats, NDArray[Any]]:
+    """First minus second, run by run, and whose they are."""
+    values, panel = view.values, view.panels[0]
+    first, second = (
+        view.curve(values, panel, side)[stop] for side in (finding.first, finding.second)
+    )
+    person = np.repeat(view.part.persons, len(view.part.trials))
+    return (first - second).ravel(), person
+
+
+def plan_table(found: Sequence[SizePlan], cluster: str) -> CellTable:
+    """A line for each plan."""
+    heads = ["to show", "if the true difference is"]
+    heads += [f"{cluster}s for {100 * p:.0f} % power" for p in POWERS]
+    rows = [
+        [f"{p.name}: {p.what}", p.assumed, *(map(_told, p.counts) if p.counts else _NEVER)]
+        for p in found
+    ]
+    return CellTable("", heads, len(heads), rows, note=_assumes(found, cluster))
+
+
+def plan_lines(found: Sequence[SizePlan], cluster: str) -> list[str]:
+    """A line for each plan, and what they assume."""
+    lines = [
+        f"To show {p.name} ({p.what}), if the true difference is {p.assumed}: {_line(p, cluster)}."
+        for p in found
+    ]
+    return [*lines, _assumes(found, cluster)] if found else []
+
+
+_NEVER = ["no number: it is not true then"] * len(POWERS)
+
+
+def _line(plan: SizePlan, cluster: str) -> str:
+    if not plan.counts:
+        return "no number of them, for it is not true then"
+    needed = [
+        f"{_told(count)} {cluster}s for {100 * wanted:.0f} % power"
+        for count, wanted in zip(plan.counts, POWERS, strict=True)
+    ]
+    return ", ".join(needed)
+
+
+def _told(count: Count) -> str:
+    return f"{_persons(count.persons)} ({_persons(count.low)} to {_persons(count.high)})"
+
+
+def _persons(count: float) -> str:
+    return f"{count:.0f}" if math.isfinite(count) else f"more than {MOST_PERSONS:,}"
+
+
+def _assumes(found: Sequence[SizePlan], cluster: str) -> str:
+    counts = sorted({plan.known_from for plan in found})
+    known = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+    return note("sample_size", cluster=cluster, known=known)

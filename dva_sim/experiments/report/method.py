@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
-
 import numpy as np
 
+from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.study.parts import POINT
-from dva_sim.kernel.wording import capital, number
+from dva_sim.kernel.wording import number
 from dva_sim.simulation.labels import measure_called
 from dva_sim.statistics import VarianceReduction, variance_reduction
 
@@ -19,8 +17,10 @@ _FEW = 6  # persons: with fewer nothing can be drawn anew
 def remarks(reading: Reading) -> list[str]:
     """How large it was, how it was judged, and by which program."""
     own = reading.page.method(reading.pair_correlation) if reading.view else None
-    said = list(_usual(reading)) if own is None else own
-    return [_size(reading), *said, *_tests(reading.study), _made_by(reading)]
+    said = _usual(reading) if own is None else own
+    study = {"hypotheses": None, "comparisons": None} | reading.study
+    tests = paragraphs("tests", study=study)
+    return [_size(reading), *said, *tests, _made_by(reading)]
 
 
 def _size(reading: Reading) -> str:
@@ -63,22 +63,6 @@ def _is_task(reading: Reading) -> bool:
     return any(s.get("model") == "task" for s in reading.scenarios.values())
 
 
-def _tests(study: Mapping[str, Any]) -> Iterator[str]:
-    """How claims were judged, where there are any."""
-    if study.get("hypotheses"):
-        yield (
-            "Hypotheses are judged by a one-sided test against their margin, at 5 % (bootstrap-t "
-            "over persons), those of sameness by two. The test of the opposite refutes them."
-        )
-    if study.get("comparisons"):
-        yield (
-            "Comparisons are tested two-sided by permutation: a person's two sides are swapped, "
-            "all trials together (all ways with up to 14 persons, else 10,000)."
-        )
-    if study.get("hypotheses") or study.get("comparisons"):
-        yield ("All tests of a family share a chance of 5 % that any is a false alarm (Holm).")
-
-
 def _made_by(reading: Reading) -> str:
     """The program, and whether it can be had again."""
     versions = reading.manifest.get("versions") or {}
@@ -92,52 +76,18 @@ def _made_by(reading: Reading) -> str:
     return f"{program}, commit {commit[:12]}{state}."
 
 
-def _usual(reading: Reading) -> Iterator[str]:
+def _usual(reading: Reading) -> list[str]:
     study, is_task = reading.study, _is_task(reading)
-    block = "block" if is_task else "trial"
-    luck = "" if is_task else "start, event, "
-    yield (
-        f"A {block} has the same random numbers in every configuration: {luck}noise of hand and "
-        f"sensor, weather of the link. Differences are taken within person and {block} (common "
-        f"random numbers){_alike(reading)}."
-    )
-    few = (
-        " With as few persons as here it is Student's alone, and Bonferroni's t for bands."
-        if reading.persons < _FEW
-        else ""
-    )
-    yield (
-        f"{capital(block)}s are averaged within a person, and intervals are over persons: as far "
-        "as Student's or the bootstrap-t reaches, bands by max-t over a bootstrap of persons."
-        f"{few} More persons narrow them, but do not make the model truer."
-    )
-    if POINT in study.get("factors", {}):
-        yield (
-            "Every person met each point of the ranges; levels are compared at each point, and "
-            "the differences averaged."
-        )
-    if any(part.get("reference") for part in study.get("parts", {}).values()):
-        yield (
-            "Where there is a reference run, its value is subtracted from every run of the same "
-            "person and trial."
-        )
     awaited = measure_called(reading.view.measure).awaits if reading.view else ""
-    if "confirmed" in reading.runs and awaited == "confirmation":
-        yield "A run that was not confirmed is kept: it counts with all the time it was given."
-    yield "Nobody learns: a person's last trial is like the first."
-    yield _not_modelled(is_task)
-
-
-def _not_modelled(is_task: bool) -> str:
-    if is_task:
-        return (
-            "Not modelled: fatigue, video compression, and the radio itself (the link is delay, "
-            "jitter and loss). Operators are control models."
-        )
-    return (
-        "Not modelled: fatigue, cooperation between operators, video compression, uneven floors, "
-        "and the radio itself (the link is a queue with rate, delay, jitter and loss, a recorded "
-        "trace, or the Wi-Fi zones of a site). Operators are control models."
+    return paragraphs(
+        "method",
+        block="block" if is_task else "trial",
+        is_task=is_task,
+        alike=_alike(reading),
+        is_small=reading.persons < _FEW,
+        has_points=POINT in study.get("factors", {}),
+        has_reference=any(part.get("reference") for part in study.get("parts", {}).values()),
+        awaits_confirmation="confirmed" in reading.runs and awaited == "confirmation",
     )
 
 

@@ -1,12 +1,12 @@
 """What a report says otherwise of one model of a run: words, tables, and which figures it has.
 
 `ModelPage` is the usual page, of persons who drive; a model whose runs are something else has a
-page of its own, derived from it. Nothing here knows any of those.
+page of its own, derived from it, which the model names (`Model.page`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer
@@ -14,6 +14,8 @@ from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, Summary
+from dva_sim.kernel.plugins import resolved
+from dva_sim.simulation.models import MODELS
 
 
 class ModelPage:
@@ -82,8 +84,15 @@ class ModelPage:
         return None
 
 
+def page_of(scenarios: Iterable[Mapping[str, Any]]) -> type[ModelPage]:
+    """The page of a study: that of the first of its models that has one of its own."""
+    models = (MODELS.get(str(scenario.get("model"))) for scenario in scenarios)
+    own: Iterable[type[ModelPage]] = (resolved(m.page) for m in models if m is not None and m.page)
+    return next(iter(own), ModelPage)
+
+
 def correlated(correlation: float | None) -> str:
     """How alike the two sides of a contrast are, as a remark; nothing where it is not known."""
     if correlation is None:
         return ""
-    return f" The two sides of the contrast correlate with {correlation:.2f} at the last level."
+    return f"The two sides of the contrast correlate with {correlation:.2f} at the last level."

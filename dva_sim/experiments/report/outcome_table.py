@@ -11,6 +11,7 @@ from dva_sim.experiments.analysis.competing_risks import CLEARED, CONFIRMED, NOT
 from dva_sim.experiments.analysis.run_grid import Setting
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name, setting
@@ -64,10 +65,10 @@ def table(endings: Endings, view: StudyView, cluster: str) -> CellTable:
     factors = [factor_name(name) for name in names]
     last = f"nothing by {quantity(endings.horizon, 's')}"
     heads = [*factors, "events", *(last if w == NOTHING else w for w in endings.ways)]
-    note = _note(view, cluster, view.panels[0] if panels == view.panels[:1] else {})
-    if len(places) > _MOST_PLACES:
-        note += f" Shown are {_MOST_PLACES} of {len(places)} such conditions."
-    return CellTable(view.part.name, heads, len(factors), rows, note=note)
+    where = setting(view.panels[0]) if panels == view.panels[:1] else ""
+    facts = {"where": where, "has_drives": view.part.has("confirmed")}
+    told = note("endings", cluster=cluster, **facts, shown=_MOST_PLACES, places=len(places))
+    return CellTable(view.part.name, heads, len(factors), rows, note=told)
 
 
 _MOST_PLACES = 12
@@ -138,18 +139,3 @@ def _share(found: Interval) -> str:
         return percent(found.mean)
     low = percent(found.low).removesuffix("\N{NO-BREAK SPACE}%")
     return f"{percent(found.mean)} ({low} to {percent(found.high)})"
-
-
-def _note(view: StudyView, cluster: str, panel: Setting) -> str:
-    where = f" with {setting(panel)}" if panel else ""
-    drives = (
-        " An event is open until the DVA closes it, so a drive that was given up late may leave it "
-        "open; how last drives ended stands in the table of configurations."
-        if view.part.has("confirmed")
-        else ""
-    )
-    return (
-        f"Shares of the events{where} that had ended in each way, by what came first, so that a "
-        "row adds up to 100 % (cumulative incidence, Aalen-Johansen); each with its own 95 % "
-        f"interval over {cluster}s. Left out is where all were confirmed.{drives}"
-    )

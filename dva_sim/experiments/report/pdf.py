@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -35,8 +35,6 @@ from dva_sim.experiments.report.glossary import RING, Marker, terms_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from dva_sim.experiments.report.figures.style import Drawn
 
 
 A4 = (595.28, 841.89)  # [pt]
@@ -302,30 +300,21 @@ def write_pdf(path: Path, question: str, blocks: Sequence[Block]) -> None:
 
 
 def _set(paper: Paper, block: Block) -> None:
-    if isinstance(block, Heading):
-        _heading(paper, block)
-    elif isinstance(block, Words):
-        _text(paper, block.text, _KINDS[block.kind])
-    elif isinstance(block, First):
-        _first(paper, block)
-    elif isinstance(block, Items):
-        _items(paper, block.items)
-    elif isinstance(block, Printed):
-        _table(paper, block.table, block.is_words)
-    elif isinstance(block, FigureBlock):
-        _figure(paper, block.figure)
-    elif isinstance(block, Terms):
-        _terms(paper, block)
-    elif isinstance(block, Folded):
-        _heading(paper, Heading(block.title, 3))
-        for inner in block.blocks:
-            _set(paper, inner)
-    else:
-        _verbatim(paper, block)
+    _SETTERS[type(block)](paper, block)
 
 
-def _items(paper: Paper, items: Sequence[str]) -> None:
-    for item in items:
+def _words(paper: Paper, block: Words) -> None:
+    _text(paper, block.text, _KINDS[block.kind])
+
+
+def _folded(paper: Paper, block: Folded) -> None:
+    _heading(paper, Heading(block.title, 3))
+    for inner in block.blocks:
+        _set(paper, inner)
+
+
+def _items(paper: Paper, block: Items) -> None:
+    for item in block.items:
         paper.need(_PLAIN.leading)
         paper.line("•", _PLAIN)
         _text(paper, item, _PLAIN, _INDENT)
@@ -362,14 +351,15 @@ def _first(paper: Paper, block: First) -> None:
     paper.rule()
     paper.skip(10)
     if block.figure is not None:
-        _figure(paper, block.figure, _ANSWERING)
+        _figure(paper, FigureBlock(block.figure), _ANSWERING)
     if block.depends:
         _heading(paper, Heading("What this depends on", 3))
-        _items(paper, [f"{about}: {words}" for about, words in block.depends])
+        _items(paper, Items(tuple(f"{about}: {words}" for about, words in block.depends)))
 
 
-def _figure(paper: Paper, drawn: Drawn, most: float = math.inf) -> None:
+def _figure(paper: Paper, block: FigureBlock, most: float = math.inf) -> None:
     """Title, figure and caption on one page; smaller where it is too high for that."""
+    drawn = block.figure
     if drawn.figure is None:
         return
     title = list(broken(drawn.title, _BELOW, paper.width))
@@ -409,9 +399,9 @@ def _verbatim(paper: Paper, block: Verbatim) -> None:
 
 
 # --- tables ----------------------------------------------------------------------------------
-def _table(paper: Paper, table: CellTable, is_words: bool) -> None:
+def _table(paper: Paper, block: Printed) -> None:
     """In groups of columns that fit on the page, each with the names of its rows."""
-    cell, head = _CELL, _HEAD
+    table, is_words, cell, head = block.table, block.is_words, _CELL, _HEAD
     widths = _widths(table, cell, head)
     if not is_words and sum(widths) > paper.width:
         cell, head = _TIGHT, _TIGHT_HEAD
@@ -509,3 +499,16 @@ def _squeezed(
 
 def _longest(text: str, face: Face) -> float:
     return max((width_of(word, face) for word in words_of(text)), default=0.0)
+
+
+_SETTERS: dict[type, Callable[[Paper, Any], None]] = {
+    Heading: _heading,
+    Words: _words,
+    First: _first,
+    Items: _items,
+    Printed: _table,
+    FigureBlock: _figure,
+    Verbatim: _verbatim,
+    Terms: _terms,
+    Folded: _folded,
+}

@@ -34,19 +34,19 @@ from dva_sim.experiments.report.blocks import (
 )
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.figures.registry import draw_all
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn
+from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
 from dva_sim.experiments.report.glossary import Marker, terms_in
 from dva_sim.experiments.report.hypothesis_tables import (
     comparison_table,
     hypothesis_table,
+    plan_table,
     registration_table,
 )
 from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.outcome_table import in_a_line
 from dva_sim.experiments.report.outcome_table import sentences as sentences_of_endings
 from dva_sim.experiments.report.outcome_table import table as endings_table
-from dva_sim.experiments.report.sample_size_table import plan_table
+from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.tuning_table import tuned_table
 from dva_sim.experiments.results.manifest import status_of
@@ -178,8 +178,7 @@ def _found(reading: Reading) -> Iterator[Block]:
         yield Heading("The answer in numbers")
     if table is not None:
         yield Printed(table)
-    for note in reading.answer.notes:
-        yield Words(note)
+    yield from map(Words, reading.answer.notes)
     if reading.robustness is not None:
         yield Heading("Under other models of the persons")
         for sentence in sentences(reading.robustness):
@@ -270,11 +269,7 @@ def _method(reading: Reading) -> Iterator[Block]:
         remark = timeout_remark(scenarios, study)
         yield Folded("All settings", (settings, *([Words(remark)] if remark else [])))
     if spread := spread_table(reading.view) if reading.view else None:
-        told = (
-            "Standard deviations of single runs, by the method of moments. What lies between "
-            "persons is not narrowed by more trials, only by more persons."
-        )
-        yield Folded("Between and within persons", (Words(told), Printed(spread)))
+        yield Folded("Between and within persons", (Words(note("persons")), Printed(spread)))
 
 
 def _words(blocks: Sequence[Block]) -> Iterator[Block]:

@@ -14,6 +14,7 @@ from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, is_
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable, Summary, cell_table
 from dva_sim.experiments.report.model_page import ModelPage, correlated
+from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.kernel.wording import listing, number, percent
 
 SUMMARIES: tuple[Summary, ...] = (
@@ -94,7 +95,9 @@ class ShiftPage(ModelPage):
 
     def method(self, correlation: float | None) -> list[str] | None:
         """How shifts were simulated, followed and compared."""
-        return _method(self.shifts, correlation)
+        shifts = self.shifts
+        facts = {"follow": f"{shifts.follow:g} s", "correlated": correlated(correlation)}
+        return paragraphs("method_shift", **facts, bound=BOUND)
 
 
 def _cells(shifts: Shifts) -> CellTable:
@@ -295,32 +298,3 @@ def _rule(scenario: Mapping[str, Any], key: str, nothing: str) -> str:
     if value is None:
         return nothing
     return f"{value:g} {key.rpartition('_')[2]}"
-
-
-_INTERVALS = (
-    "Intervals reach as far as Student's or the bootstrap-t over shifts; bands come from max-t "
-    "over a bootstrap of shifts. More shifts narrow them, but do not make the model truer."
-)
-
-
-def _method(shifts: Shifts, correlation: float | None) -> list[str]:
-    follow = f"{shifts.follow:g} s"
-    return [
-        "Intervals are over independent shifts. A shift meets the same alarms, places, walking "
-        "speeds and service times under every policy, and differences are taken within it (common "
-        f"random numbers).{correlated(correlation)}",
-        "Counted are all alarms, true and false, first reported between the warm-up and one "
-        f"follow-up before the end; each is followed for T = {follow}. Confirmed, cleared, "
-        "escalated and expired compete (Aalen-Johansen).",
-        f"Times are restricted means: the mean of min(time, T), where never counts {follow}, so "
-        "that no policy gains by leaving hard ones out. Response is until somebody is on scene; an "
-        "escalated event counts as never reached.",
-        f"The bound is the response to each event by {BOUND}. Somebody who is out already and near "
-        "may be sooner: how often stands in the table.",
-        _INTERVALS,
-        "Use, exposure and evenness are of the whole measured time; what the desk counted "
-        "(redirected, relocated, overruled) of the whole run.",
-        "Not modelled: bodies, cameras, the network and driving (responders are travel and service "
-        "times), learning and fatigue, exposure to events other than one's own, and what others do "
-        "with an event once it is escalated. No human took part.",
-    ]

@@ -44,15 +44,14 @@ from dva_sim.experiments.analysis.study_view import (
     with_rows,
 )
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
-from dva_sim.experiments.report.model_page import ModelPage
-from dva_sim.experiments.report.pages import page_of
-from dva_sim.experiments.report.sample_size_table import few_that_weigh
+from dva_sim.experiments.report.hypothesis_tables import few_that_weigh
+from dva_sim.experiments.report.model_page import ModelPage, page_of
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.parts import POINT, REPEATS, STRATEGY, TUNING
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
-from dva_sim.simulation.labels import brief, level_name, setting
+from dva_sim.simulation.labels import brief, level_name, setting, take_up
 from dva_sim.statistics import band
 
 _WAITING = "move_and_wait_share"
@@ -218,6 +217,7 @@ class Reading:
     def __init__(self, results: Results) -> None:
         self.results = results
         self.manifest, self.study = results.manifest, results.study
+        take_up(self.manifest.get("columns") or {})
         self._tables: dict[str, Table] = {}
 
     def __repr__(self) -> str:

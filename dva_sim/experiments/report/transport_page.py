@@ -9,6 +9,7 @@ import numpy as np
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import Summary
 from dva_sim.experiments.report.model_page import ModelPage, correlated
+from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.kernel.wording import number, percent
 
 SUMMARIES: tuple[Summary, ...] = (
@@ -48,25 +49,4 @@ class TransportPage(ModelPage):
 
     def method(self, correlation: float | None) -> list[str] | None:
         """How the network and the drives over it were simulated."""
-        return [
-            "The network is simulated first, packet by packet, and then somebody drives over the "
-            "fates of commands and pictures as they were: what is sent does not depend on what is "
-            "driven. A drive begins at a moment drawn for it and goes on from the beginning of "
-            "the measured time when it outlasts it.",
-            "The person is the cluster: intervals are taken over persons. A person's run meets "
-            "the same beginnings of all flows, the same noise of hand and judgement and the same "
-            "place in the measured time under every transport; differences are taken within "
-            f"it.{correlated(correlation)}",
-            "Intervals of one level reach as far as Student's or the bootstrap-t over persons "
-            "does; bands cover all levels of a line at once (max-t over a bootstrap of persons). "
-            "Both are Monte Carlo intervals, given the model.",
-            "Trinomial, RTNP, IRTP and BTP are in the manner of their papers: only abstracts "
-            "could be read, laws and numbers are not theirs. What is found here speaks for the "
-            "laws as they stand in the program, which says of each what is missing.",
-            "A command is applied if it arrives before any newer one; a picture is shown once all "
-            "of it is there. Messages that count may arrive up to five seconds after the last of "
-            "them.",
-            "Not modelled: what processing at the hosts costs, encoding of pictures to fit the "
-            "rate (all have the same size), active queue management, and the radio itself. "
-            "Operators are control models; no human took part.",
-        ]
+        return paragraphs("method_transport", correlated=correlated(correlation))

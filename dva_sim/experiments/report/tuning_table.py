@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.wording import listing, number
@@ -29,14 +30,9 @@ def tuned_table(manifest: Mapping[str, Any]) -> CellTable | None:
     ]
     heads = [*(factor_name(name) for name in rule.by), factor_name(rule.key)]
     heads += [f"{measure_name(rule.measure)}, mean (95 % interval)", ""]
-    at = f", at {setting(rule.at)}" if rule.at else ""
-    note = (
-        f"Rule: the least mean, of equal ones the nearest to 1; {rule.persons} persons who take "
-        f"no part in the study, {rule.replications} trials of each{at}."
-    )
-    if str(manifest["versions"].get("fingerprint")) not in tuned.made_with:
-        note += " It was tuned with another version of the program than the study was run with."
-    return CellTable(rule.part, heads, len(rule.by), rows, note=note)
+    is_other = str(manifest["versions"].get("fingerprint")) not in tuned.made_with
+    told = note("tuning", rule=rule, at=setting(rule.at), is_other_version=is_other)
+    return CellTable(rule.part, heads, len(rule.by), rows, note=told)
 
 
 def tuning_warning(manifest: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from dva_sim.experiments.analysis.competing_risks import WAYS
 from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.report.figures import outcomes, palette
 from dva_sim.experiments.report.figures import shift as dispatch
-from dva_sim.experiments.report.figures.palette import FATES, LOOKS, STAGES, colours, looks, marks
+from dva_sim.experiments.report.figures.palette import FATES, LOOKS, STAGES, colours, looks
 
 ROOM = Path(dva_sim.experiments.report.figures.__file__).parent.parent
 # Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1.
@@ -138,7 +138,7 @@ def test_policies_and_every_pattern_have_looks_that_no_other_of_them_has():
     policies += ("preemptive", "hazard_team", "operator_aware", "coverage", "preference", "oracle")
     factor = Factor("dispatch.policy", (*policies, "mine.py:Mine"))
     assert len(set(colours(factor).values())) == 13
-    assert len(set(marks(factor).values())) == 13
+    assert len({look.mark for look in looks(factor).values()}) == 13
 
 
 def test_figures_bring_no_colour_of_their_own():

@@ -60,7 +60,7 @@ def test_results_are_read_without_the_file_and_say_what_it_said(tmp_path):
     assert manifest["columns"]["runs"]["standing_s"]["title"] == "time standing"
     assert [name for name in manifest["inputs"] if name.endswith("mine.py:Mine")]
     (tmp_path / "mine.py").write_text("raise SystemExit('read from a results folder')\n")
-    assert "standing" in write_report(tmp_path / "out").read_text()
+    assert "time standing" in write_report(tmp_path / "out").read_text()
 
 
 def test_a_study_without_own_measures_is_the_same_study_as_ever(tmp_path):

@@ -5,8 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from dva_sim.cli import episodes
 from dva_sim.cli import live_screen as live
+from dva_sim.cli import stories
 from dva_sim.cli.checks import check
 from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.report.episode import EpisodeRequest
@@ -138,7 +138,7 @@ def test_a_study_tells_each_kind_once_with_the_number_of_configurations() -> Non
 def test_an_episode_begins_with_the_warning() -> None:
     out = Console(file=io.StringIO(), width=200)
     pairs = ["link.delay_s=1.2", "request.timeout_s=9", "horizon_s=20"]
-    episodes.episode(EpisodeRequest("drive-to-event", 1, pairs), out)
+    stories.episode(EpisodeRequest("drive-to-event", 1, pairs), out)
     first = out.file.getvalue().splitlines()[0]
     assert first.startswith("warning: request.timeout_s 9 is below 9.65 s")
 

@@ -8,10 +8,10 @@ order; what a figure of one's own needs is offered here.
 from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
 from dva_sim.experiments.report.figures.style import (
     Drawn,
     Numbers,
+    ReportFigure,
     axis_label,
     dodge,
     label_panels,

@@ -13,6 +13,7 @@ import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, nan_mean
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import (
     INK,
     PAPER,
@@ -22,15 +23,7 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     key_height,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    level_axis,
-    panels,
-    tick_names,
-    wrapped,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief
@@ -74,7 +67,7 @@ class Stacks:
         rows = deep * len(view.shown)
         height = _AROUND + _BAR * lines + key_height(list(parts)) / rows
         self.figure: Figure
-        self.figure, grid = panels(rows, columns, height, sharex=True, sharey=True)
+        self.figure, grid = style.panels(rows, columns, height, sharex=True, sharey=True)
         key(self.figure, list(parts.values()), list(parts))
         self._view, self._columns = view, columns
         blocks = [grid[n * deep : (n + 1) * deep] for n in range(len(view.shown))]
@@ -97,9 +90,8 @@ class Stacks:
         self.axes[0].set_xlim(left=0)
         for index, (ax, panel, level) in enumerate(self.panels()):
             words = capital(brief(view.setting(panel, level)))
-            ax.set_title(wrapped(words, _TITLE // columns), fontsize=8.5)
-            ax.grid(True, axis="x")
-            ax.grid(False, axis="y")
+            ax.set_title(style.wrapped(words, _TITLE // columns), fontsize=8.5)
+            style.lying(ax)
             place = index % count
             _along_y(ax, view.over, is_first=place % columns == 0)
             is_lowest = index >= len(self.axes) - count and place + columns >= count
@@ -137,15 +129,15 @@ def _along_y(ax: Axes, over: Factor | None, is_first: bool) -> None:
         ax.set_yticks([])
         ax.set_ylim(0.5, -0.5)
         return
-    level_axis(ax, over, _NAME)
+    style.level_axis(ax, over, _NAME)
     ax.invert_yaxis()
     height = _BAR * len(over.levels) * _most_lines(over)
-    words = wrapped(ax.get_ylabel(), max(_LEAST, int(_PER_INCH * height)))
+    words = style.wrapped(ax.get_ylabel(), max(_LEAST, int(_PER_INCH * height)))
     ax.set_ylabel(words if is_first else "")
 
 
 def _most_lines(over: Factor) -> int:
-    return max(wrapped(name, _NAME).count("\n") + 1 for name in tick_names(over)[0])
+    return max(style.wrapped(name, _NAME).count("\n") + 1 for name in style.tick_names(over)[0])
 
 
 _NAMES = {
@@ -163,7 +155,7 @@ _NAMES = {
 _MEASURED = "loop_delay_measured_s"
 
 
-class DelayBudget(ReportFigure):
+class DelayBudget(style.ReportFigure):
     """The delay from a picture to its effect, as the sum it is and as it was measured."""
 
     name = "delay_budget"
@@ -171,13 +163,13 @@ class DelayBudget(ReportFigure):
     pages = ("driving",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         stages = [column for column in _NAMES if view.part.has(column)]
         if not stages:
             return None
         view = _driven(view, stages[0])
-        stacks, numbers = Stacks(view, "Delay [s]", _parts(stages)), Numbers()
+        stacks, numbers = Stacks(view, "Delay [s]", _parts(stages)), style.Numbers()
         for ax, panel, level in stacks.panels():
             means = {stage: _means(view, stage, panel, level) for stage in stages}
             measured = _means(view, _MEASURED, panel, level)
@@ -186,12 +178,7 @@ class DelayBudget(ReportFigure):
             told = view.along_x() | means | {_MEASURED: measured}
             numbers.add(view.setting(panel, level), told)
         stacks.close()
-        caption = (
-            "From what the camera saw to the effect of the command it led to, stage by stage; "
-            "means over the time that commands were in force. Hatched stages: a value waits to be "
-            "replaced by the next. Diamond: the same delay measured as a whole."
-        )
-        return self.finish(stacks.figure, caption, numbers)
+        return self.finish(stacks.figure, caption("delay_budget"), numbers)
 
 
 def _driven(view: StudyView, stage: str) -> StudyView:

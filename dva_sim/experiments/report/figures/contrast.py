@@ -5,7 +5,7 @@ The contrast under other models of the persons: every repeat with its interval.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +14,9 @@ from dva_sim.experiments.analysis.answer import Finding, condition
 from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, RepeatedStop
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    fit_to,
-    panels,
-    stops_axis,
-    with_unit,
-    wrapped,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -43,19 +34,19 @@ _ROOM = 0.05  # of the width, for the figures beside the outer marks
 _LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is not drawn
 
 
-class AnswerFigure(ReportFigure):
+class AnswerFigure(style.ReportFigure):
     """The difference that answers the question."""
 
     name = "answer"
     title = "The declared contrast"
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         if view.contrast is None or reading.told is None:
             return None
         return self.contrast(reading.told, view.difference(view.panels[0], *view.contrast))
 
-    def contrast(self, finding: Finding, differences: Floats) -> Drawn | None:
+    def contrast(self, finding: Finding, differences: Floats) -> style.Drawn | None:
         """The difference alone; None where no interval can be given.
 
         Args:
@@ -69,28 +60,28 @@ class AnswerFigure(ReportFigure):
         with rc_context({"font.size": _FONT}):
             return self._drawn(finding, differences)
 
-    def _drawn(self, finding: Finding, differences: Floats) -> Drawn:
+    def _drawn(self, finding: Finding, differences: Floats) -> style.Drawn:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=_SIZE, dpi=150, layout="constrained")
         ax = figure.add_subplot()
         over = Factor(finding.over, finding.levels) if finding.over else None
         _marks(ax, finding, over)
-        stops_axis(ax, over)
+        style.stops_axis(ax, over)
         left, right = ax.get_xlim()
         room = _ROOM * (right - left)
         ax.set_xlim(left - room, right + room)
-        cut = fit_to(ax, present(np.append(differences, 0.0)))
+        cut = style.fit_to(ax, present(np.append(differences, 0.0)))
         grey = _too_small(ax, finding)
         _values(ax, finding)
         first, second = _names(finding)
         unit = f" [{finding.unit}]" if finding.unit else ""
-        ax.set_ylabel(wrapped(f"{capital(first)} minus {second}{unit}", 34))
+        ax.set_ylabel(style.wrapped(f"{capital(first)} minus {second}{unit}", 34))
         title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
         within = condition(finding, inside=True).removesuffix(", ")
         title = f"{title}, {within}" if within else title
-        caption, numbers = _caption(finding, grey), _table(finding)
-        return self.finish(figure, caption, numbers, title=title, reads=(cut,))
+        words = caption("answer", finding=finding, first=first, grey=grey)
+        return self.finish(figure, words, _table(finding), title=title, reads=(cut,))
 
 
 def _names(f: Finding) -> tuple[str, str]:
@@ -144,24 +135,11 @@ def _values(ax: Axes, f: Finding) -> None:
             )
 
 
-def _caption(f: Finding, grey: bool) -> str:
-    over = "the 95 % band, which holds for all levels at once" if len(f.levels) > 1 else "95 %"
-    cluster = f.cluster if f.persons == 1 else f"{f.cluster}s"
-    first, _ = _names(f)
-    more = "takes longer" if f.unit == "s" else "is larger"
-    words = (
-        f"Above zero {first} {more}. Mark: mean of {f.persons} {cluster}, filled where it differs "
-        f"from zero. Bar: {over}."
-    )
-    return f"{words}{' Grey: too small to matter.' * grey}"
-
-
-def _table(f: Finding) -> Numbers:
-    numbers = Numbers()
+def _table(f: Finding) -> style.Numbers:
+    numbers = style.Numbers()
     along = {f.over: f.levels} if f.over else {}
-    ends = {"mean": f.mean, "band_low": f.low, "band_high": f.high}
-    columns: dict[str, Any] = {with_unit(n, f.measure): values for n, values in ends.items()}
-    numbers.add({}, along | columns)
+    band = {"mean": f.mean, "band_low": f.low, "band_high": f.high}
+    numbers.add({}, along | style.in_units(f.measure, **band))
     return numbers
 
 
@@ -169,14 +147,14 @@ _ROW = 0.14  # height of a repeat [in]
 _GAP = 1.5  # rows between two strategies
 
 
-class RepeatsFigure(ReportFigure):
+class RepeatsFigure(style.ReportFigure):
     """Effect and interval of every repeat, by strategy, sorted; the study's own as a band."""
 
     name = "robustness"
     title = "The contrast under other models of the persons"
     pages = ("driving",)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         robustness = reading.robustness
         if robustness is None:
@@ -185,7 +163,7 @@ class RepeatsFigure(ReportFigure):
         if not stops or view.contrast is None or view.line is None:
             return None
         rows = max(len(stop.repeats) for stop in stops) + _GAP * (len(robustness.strategies) + 1)
-        figure, (axes,) = panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
+        figure, (axes,) = style.panels(1, len(stops), max(2.4, _ROW * rows + 0.9), sharey=True)
         first, second = (level_name(view.line.name, level) for level in view.contrast)
         for ax, stop in zip(axes, stops, strict=True):
             _own(ax, stop)
@@ -193,28 +171,21 @@ class RepeatsFigure(ReportFigure):
             ax.set_title(
                 f"{factor_name(robustness.over)} {level_name(robustness.over, stop.level)}"
             )
-            ax.set_xlabel(axis_label(view.measure, f"{first} minus {second}"))
-            ax.grid(axis="x")
-            ax.grid(axis="y", visible=False)
-        caption = (
-            "Each row: the difference under one model of the persons, with its own 95 % interval. "
-            "Diamonds have the usual parameters, dots another set. Line and blue band: the study's "
-            "own result; black: its own model again, which does not count. Grey: declared too "
-            "small to matter. Repeats have fewer persons, so their intervals are wider."
-        )
-        if any(repeat.is_beyond for stop in stops for repeat in stop.repeats):
-            caption += " Hollow: extrapolated."
+            ax.set_xlabel(style.axis_label(view.measure, f"{first} minus {second}"))
+            style.lying(ax)
+        is_beyond = any(repeat.is_beyond for stop in stops for repeat in stop.repeats)
+        words = caption("robustness", is_beyond=is_beyond)
         title = f"The contrast in {measure_name(view.measure)} under other models of the persons"
-        return self.finish(figure, caption, _numbers(view, robustness), title=title)
+        return self.finish(figure, words, _numbers(view, robustness), title=title)
 
 
-def _numbers(view: StudyView, robustness: RepeatedAnswer) -> Numbers:
+def _numbers(view: StudyView, robustness: RepeatedAnswer) -> style.Numbers:
     """Every repeat, as drawn."""
-    numbers = Numbers()
+    numbers = style.Numbers()
     for stop in robustness.stops:
         for repeat in stop.repeats:
             edges = {"mean": repeat.mean, "low": repeat.low, "high": repeat.high}
-            told = {with_unit(name, view.measure): value for name, value in edges.items()}
+            told = style.in_units(view.measure, **edges)
             who = {"strategy": repeat.strategy, "parameters": repeat.parameters}
             flags = {"is_own": repeat.is_own, "is_extrapolated": repeat.is_beyond}
             numbers.row({robustness.over: stop.level}, **who, **told, **flags)

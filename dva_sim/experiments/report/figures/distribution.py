@@ -9,21 +9,9 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.run_grid import Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    dodge,
-    hatch_stops,
-    hatch_words,
-    log_axis,
-    panel_title,
-    panels,
-    stops_axis,
-    wrapped,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import measure_name
 
@@ -37,7 +25,7 @@ _CROWD = 60  # runs of a cell from which on dots must be small
 _GOLDEN = 0.6180339887498949
 
 
-class Distributions(ReportFigure):
+class Distributions(style.ReportFigure):
     """Every run as a dot, with median and middle half."""
 
     name = "distributions"
@@ -45,16 +33,16 @@ class Distributions(ReportFigure):
     pages = ("driving",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         shown = view.shown
-        figure, axes = panels(
+        figure, axes = style.panels(
             len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True
         )
         look = looks(view.line)
-        raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
+        raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), style.Numbers()
         for (ax,), panel in zip(axes, shown, strict=True):
-            for level, offset in dodge(view.lines):
+            for level, offset in style.dodge(view.lines):
                 values = view.curve(raw, panel, level).reshape(len(view.stops), -1)
                 ok = view.curve(confirmed, panel, level).reshape(values.shape) != 0
                 width = min(0.3, 0.62 / len(view.lines))
@@ -64,20 +52,19 @@ class Distributions(ReportFigure):
                     where = view.setting(panel, level) | view.at_stop(stop)
                     numbers.add(where, _columns(view, told, ok[stop]))
             _reference_line(ax, view)
-            panel_title(ax, panel)
-            stops_axis(ax, view.over)
-            hatch_stops(ax, view.stops_outside(panel))
+            style.panel_title(ax, panel)
+            style.stops_axis(ax, view.over)
+            style.hatch_stops(ax, view.stops_outside(panel))
             if ax is not axes[-1][0]:
                 ax.set_xlabel("")
-            ax.set_ylabel(axis_label(view.measure, wrapped(measure_name(view.measure), 24)))
+            ax.set_ylabel(
+                style.axis_label(view.measure, style.wrapped(measure_name(view.measure), 24))
+            )
         _spread(axes[0][0], present(raw))
         legend(figure, view.line)
-        caption = (
-            "Each mark is one run; bar, the median; box, the middle half. Columns stand in the "
-            f"order of the key.{_hollow_words(confirmed)}"
-        )
+        words = caption("distributions", has_missed=bool((confirmed == 0).any()))
         title = f"{capital(measure_name(view.measure))} of all {len(view.part):,} runs"
-        return self.finish(figure, caption, numbers, title=title, reads=(hatch_words(view),))
+        return self.finish(figure, words, numbers, title=title, reads=(style.hatch_words(view),))
 
 
 def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str, Any]:
@@ -90,12 +77,6 @@ def _columns(view: StudyView, values: Floats, ok: NDArray[np.bool_]) -> dict[str
         view.measure: values[there],
     }
     return told | ({"confirmed": ok[there]} if view.part.has("confirmed") else {})
-
-
-def _hollow_words(confirmed: Floats) -> str:
-    if not (confirmed == 0).any():
-        return ""
-    return " Hollow ones were not confirmed and count with all the time they were given."
 
 
 def _dots(
@@ -135,7 +116,7 @@ def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
 def _spread(ax: Axes, values: Floats) -> None:
     """A logarithmic axis where the slowest run takes many times as long as the fastest."""
     if len(values) and values.min() > 0 and values.max() > 5 * values.min():
-        log_axis(ax)
+        style.log_axis(ax)
 
 
 def _reference_line(ax: Axes, view: StudyView) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from dva_sim.experiments.analysis.run_grid import (
     present,
 )
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     INK,
@@ -33,25 +33,10 @@ from dva_sim.experiments.report.figures.palette import (
     looks,
     name_lines,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    dodge,
-    fit_to,
-    has_lines,
-    hatch_stops,
-    hatch_words,
-    label_panels,
-    log_axis,
-    panel_grid,
-    place_of,
-    with_unit,
-    wrapped,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
+from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
 
@@ -64,24 +49,17 @@ if TYPE_CHECKING:
 
 _WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
 _STEP = 0.12  # between the bars of two lines, in stops
-CadenceOf = Callable[[Setting], Cadence | None]
 
 
-def cadences(view: StudyView, scenario: Mapping[str, Any]) -> CadenceOf:
-    """The cadence of each panel, where lock-step and delay are among the factors."""
-
-    @cache
-    def lookup(panel: tuple[tuple[str, Level], ...]) -> Cadence | None:
-        return cadence(scenario, dict(panel))
-
-    def cadence_of(panel: Setting) -> Cadence | None:
-        along_delay = view.over is not None and view.over.name == "link.delay_s"
-        return lookup(tuple(panel.items())) if along_delay and "req-rep" in view.lines else None
-
-    return cadence_of
+def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
+    """Of each panel shown; where a delay and a pattern that waits are among the factors."""
+    waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
+    if view.over is None or view.over.name != "link.delay_s" or not waits:
+        return [None for _ in view.shown]
+    return [cadence(scenario, panel) for panel in view.shown]
 
 
-class Differences(ReportFigure):
+class Differences(style.ReportFigure):
     """Each level minus the baseline, paired, with the band that covers all stops at once."""
 
     name = "differences"
@@ -89,11 +67,11 @@ class Differences(ReportFigure):
     pages = ("driving", "transport")
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        cadence_of = cadences(view, reading.scenario_of(view.part.name))
         if view.contrast is None or view.line is None:
             return None
+        there = cadences(view, reading.scenario_of(view.part.name))
         baseline = view.contrast[1]
         others = tuple(level for level in view.lines if level != baseline)
 
@@ -101,24 +79,29 @@ class Differences(ReportFigure):
             return view.difference(panel, level, baseline)
 
         name = level_name(view.line.name, baseline)
-        label = axis_label(view.measure, f"Difference against\n{name}")
+        label = style.axis_label(view.measure, f"Difference against\n{name}")
         limit = view.widest
         figure, axes, ends, cut, numbers = _curves(
             view, others, curve, label, (-limit, limit), home=0.0
         )
-        for ax, panel in zip(axes, view.shown, strict=True):
+        for ax, found in zip(axes, there, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
-            mark_boundary(ax, view.over, cadence_of(panel), text=True)
-        zoomed = _zoom_on_small(axes, view.smallest_effect)
+            mark_boundary(ax, view.over, found, text=True)
+        zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
         _name(view, others, figure, axes, ends)
         title = f"Difference against {name} in {_what(view)}"
-        boundary = _boundary_words(view, cadence_of)
-        caption = f"Above zero, {name} has the lower value.{zoomed}{boundary}"
-        reads = (_intervals_words(view), hatch_words(view), cut)
-        return self.finish(figure, caption, numbers, title=title, reads=reads)
+        words = caption(
+            "differences",
+            baseline=name,
+            zoomed=zoomed,
+            is_marked=view.smallest_effect is not None,
+            has_boundary=any(_boundary(view.over, found) is not None for found in there),
+        )
+        reads = (_intervals_words(view), style.hatch_words(view), cut)
+        return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
-class Levels(ReportFigure):
+class Levels(style.ReportFigure):
     """The measure itself along x, a line for each level."""
 
     name = "levels"
@@ -130,7 +113,7 @@ class Levels(ReportFigure):
         """Also, something must vary."""
         return super().applies(view, reading) and bool(view.line or view.over)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         grid = view.values
 
@@ -138,26 +121,25 @@ class Levels(ReportFigure):
             return person_means(view.curve(grid, panel, level))
 
         what = capital(_what(view))
-        label = axis_label(view.measure, wrapped(what))
+        label = style.axis_label(view.measure, style.wrapped(what))
         limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
         figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
         _name(view, view.lines, figure, axes, ends)
-        excess = "Zero is the reference run. " if _in_excess(view) else ""
-        caption = (
-            f"Mean over persons. {excess}Two intervals may overlap although the difference, which "
-            "is taken within persons, is clear."
-        )
-        reads = (_intervals_words(view), hatch_words(view), cut)
+        words = caption("levels", in_excess=_in_excess(view))
+        reads = (_intervals_words(view), style.hatch_words(view), cut)
         title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
-        return self.finish(figure, caption, numbers, title=title, reads=reads)
+        return self.finish(figure, words, numbers, title=title, reads=reads)
+
+
+def _boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
+    """Where along x the wanted rate becomes too high; None if it is not among the levels."""
+    return style.place_of(over, cadence.boundary_s) if over and cadence else None
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
     """The delay from which request/reply must fall behind the wanted rate."""
-    if over is None or cadence is None:
-        return
-    place = place_of(over, cadence.boundary_s)
-    if place is None:
+    place = _boundary(over, cadence)
+    if place is None or over is None or cadence is None:
         return
     ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
     if text:
@@ -180,7 +162,7 @@ def _curves(
     ylabel: str,
     limits: tuple[float, float],
     home: float = math.nan,
-) -> tuple[Figure, list[Axes], list[Ends], str, Numbers]:
+) -> tuple[Figure, list[Axes], list[Ends], str, style.Numbers]:
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
@@ -195,9 +177,9 @@ def _curves(
         The figure, its axes, the end of each line, what a caption must say of cut bands, and the
         numbers drawn.
     """
-    figure, axes = panel_grid(view, 3.4)
-    look, every, seen, numbers = looks(view.line), [], [np.array([home])], Numbers()
-    draw = _band if has_lines(view) else _points
+    figure, axes = style.panel_grid(view, 3.4)
+    look, every, seen, numbers = looks(view.line), [], [np.array([home])], style.Numbers()
+    draw = _band if style.has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for level, shift in _side_by_side(view, lines):
@@ -206,34 +188,31 @@ def _curves(
             seen.append(matrix.ravel())
             ends[level] = draw(ax, bands, look[level], shift, limits)
             numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
-        hatch_stops(ax, view.stops_outside(panel))
+        style.hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
-    label_panels(axes, view, ylabel)
-    return figure, axes, every, fit_to(axes[0], present(np.concatenate(seen))), numbers
+    style.label_panels(axes, view, ylabel)
+    return figure, axes, every, style.fit_to(axes[0], present(np.concatenate(seen))), numbers
 
 
 def _columns(measure: str, bands: Band) -> dict[str, Floats]:
     """A band as columns: mean, simultaneous and pointwise 95 % limits."""
-    edges = {
-        "mean": bands.mean,
-        "band_low": bands.low,
-        "band_high": bands.high,
-        "low": bands.pointwise_low,
-        "high": bands.pointwise_high,
-    }
-    return {with_unit(name, measure): values for name, values in edges.items()}
+    return style.in_units(
+        measure,
+        mean=bands.mean,
+        band_low=bands.low,
+        band_high=bands.high,
+        low=bands.pointwise_low,
+        high=bands.pointwise_high,
+    )
 
 
-def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
-    """Give small differences room, and mark those declared too small to matter."""
-    if smallest is None:
-        return ""
+def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
+    """Mark differences declared too small to matter; give them room, where they have none."""
     for ax in axes:
         ax.axhspan(-smallest, smallest, color=FAINT, alpha=0.5, lw=0, zorder=0)
-    words = " Grey: declared too small to matter."
     bottom, top = axes[0].get_ylim()
     if max(-bottom, top) < 10 * smallest:
-        return words
+        return False
     bottom, top = (_WIDER * end if abs(end) > smallest else end for end in (bottom, top))
     digits = (1, 2, 5) if max(-bottom, top) < 100 * smallest else (1,)
     steps = [k * 10.0**n for n in range(-3, 7) for k in digits if smallest <= k * 10.0**n]
@@ -243,18 +222,18 @@ def _zoom_on_small(axes: list[Axes], smallest: float | None) -> str:
     axes[0].set_ylim(bottom, top)
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].minorticks_off()
-    return f"{words} Axis: linear near zero, logarithmic beyond."
+    return True
 
 
 def _side_by_side(view: StudyView, lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
     """Each level's place beside its stop; close together where a line goes on to the next."""
-    if not has_lines(view):
-        return dodge(lines)
+    if not style.has_lines(view):
+        return style.dodge(lines)
     return [(level, _STEP * (i - (len(lines) - 1) / 2)) for i, level in enumerate(lines)]
 
 
 def _intervals_words(view: StudyView) -> str:
-    if has_lines(view):
+    if style.has_lines(view):
         return "Shaded: the 95 % band of a line. Bars: the 95 % interval of each level alone."
     return (
         "Thin bars: the 95 % band of all places of a mark. Thick bars: the interval of each alone."
@@ -265,7 +244,7 @@ def _name(
     view: StudyView, lines: tuple[Level, ...], figure: Figure, axes: list[Axes], ends: list[Ends]
 ) -> None:
     """Lines are named at their ends, marks in a key."""
-    if has_lines(view):
+    if style.has_lines(view):
         name_lines(axes, ends, view.line)
     elif view.line is not None:
         legend(figure, view.line, lines)
@@ -302,23 +281,11 @@ def _what(view: StudyView) -> str:
     return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
 
 
-def _boundary_words(view: StudyView, cadence_of: CadenceOf) -> str:
-    """Explain the dashed line, if any panel has one."""
-    cadences = [cadence_of(panel) for panel in view.shown]
-    over = view.over
-    if not any(c and over and place_of(over, c.boundary_s) is not None for c in cadences):
-        return ""
-    return (
-        " Dashed: from there on (2 d + P = T: round trip and processing fill the wanted period) "
-        "REQ/REP can no longer send as often as wanted."
-    )
-
-
 _ROOM = 1.08  # above the highest mark
 _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
-class CommandAge(ReportFigure):
+class CommandAge(style.ReportFigure):
     """How old a command is when it takes effect, as quantile ranges."""
 
     name = "command_age"
@@ -326,31 +293,29 @@ class CommandAge(ReportFigure):
     pages = ("driving",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         columns = [f"command_age_{q}_s" for q in _QUANTILES]
         if not all(view.part.has(column) for column in columns):
             return None
-        figure, axes = panel_grid(view, 3.0)
+        figure, axes = style.panel_grid(view, 3.0)
         look = looks(view.line)
-        grids, numbers = [view.part.grid(column) for column in columns], Numbers()
+        grids, numbers = [view.part.grid(column) for column in columns], style.Numbers()
         for ax, panel in zip(axes, view.shown, strict=True):
-            for level, offset in dodge(view.lines):
+            for level, offset in style.dodge(view.lines):
                 ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
                 _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
                 told = dict(zip(columns, ages, strict=True))
                 numbers.add(view.setting(panel, level), view.along_x() | told)
-        log_axis(axes[0])
-        label_panels(axes, view, axis_label("age_s", wrapped("Command age at application", 22)))
-        legend(figure, view.line)
-        caption = (
-            "From the making of a command to its effect at the motors: mark, the median; thick, "
-            "the middle half; thin, 5 to 95 % (averages over runs). The axis is logarithmic."
+        style.log_axis(axes[0])
+        style.label_panels(
+            axes, view, style.axis_label("age_s", style.wrapped("Command age at application", 22))
         )
-        return self.finish(figure, caption, numbers)
+        legend(figure, view.line)
+        return self.finish(figure, caption("command_age"), numbers)
 
 
-class CommandRate(ReportFigure):
+class CommandRate(style.ReportFigure):
     """Commands applied per second, beside what arithmetic allows request/reply."""
 
     name = "command_rate"
@@ -359,17 +324,17 @@ class CommandRate(ReportFigure):
     columns = ("command_rate_hz",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        cadence_of = cadences(view, reading.scenario_of(view.part.name))
-        figure, axes = panel_grid(view, 3.0)
-        look, every, numbers = looks(view.line), [], Numbers()
+        there = cadences(view, reading.scenario_of(view.part.name))
+        figure, axes = style.panel_grid(view, 3.0)
+        look, every, numbers = looks(view.line), [], style.Numbers()
         grid = view.part.grid("command_rate_hz")
-        for ax, panel in zip(axes, view.shown, strict=True):
+        for ax, panel, found in zip(axes, view.shown, there, strict=True):
             ends: Ends = {}
-            for i, (level, place) in enumerate(dodge(view.lines)):
+            for i, (level, place) in enumerate(style.dodge(view.lines)):
                 means = _cell_means(view.curve(grid, panel, level))
-                if has_lines(view):  # larger marks below, where lines lie on each other
+                if style.has_lines(view):  # larger marks below, where lines lie on each other
                     _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
                 else:
                     x = np.arange(len(means)) + place
@@ -377,22 +342,17 @@ class CommandRate(ReportFigure):
                 ends[level] = float(means[-1])
                 told = view.along_x() | {"command_rate_hz": means}
                 numbers.add(view.setting(panel, level), told)
-            _closed_form(ax, view, cadence_of(panel))
+            _closed_form(ax, view, found)
             every.append(ends)
         tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
         axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
-        label_panels(axes, view, axis_label("command_rate_hz"))
-        if has_lines(view):
+        style.label_panels(axes, view, style.axis_label("command_rate_hz"))
+        if style.has_lines(view):
             name_lines(axes, every, view.line)
         else:
             legend(figure, view.line)
-        caption = "Mean over runs, without commands that came too old or were overtaken."
-        if any(cadence_of(panel) for panel in view.shown):
-            caption += (
-                " Dashed: what REQ/REP allows by arithmetic, min(1/T, 1/(2 d + P)), with wanted "
-                "period T, one-way delay d and processing time P."
-            )
-        return self.finish(figure, caption, numbers)
+        words = caption("command_rate", has_cadence=any(there))
+        return self.finish(figure, words, numbers)
 
 
 def _cell_means(values: Floats) -> Floats:

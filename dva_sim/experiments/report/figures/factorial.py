@@ -13,18 +13,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
 from dva_sim.experiments.analysis.study_view import MOST_PANELS, StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import DIVERGING, INK, PAPER, SOFT
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    level_axis,
-    panel_title,
-    panels,
-    stops_axis,
-    with_unit,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -42,7 +33,7 @@ _ROW = 0.21  # height of each [in]
 _ARROW = "→"
 
 
-class FactorialEffects(ReportFigure):
+class FactorialEffects(style.ReportFigure):
     """Main effects and two-way interactions of a full factorial, with simultaneous intervals."""
 
     name = "factorial_effects"
@@ -53,7 +44,7 @@ class FactorialEffects(ReportFigure):
         """Also, every level must have met every other."""
         return super().applies(view, reading) and not reading.study.get("design")
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         factors = [f for f in view.part.factors if len(f.levels) > 1]
         if len(factors) < 2 or not view.part.ran.all():
@@ -62,15 +53,15 @@ class FactorialEffects(ReportFigure):
         if not any(np.isfinite(e.interval.low) for e in found):
             return None
         shown = _worth_showing(found)
-        figure, ((ax,),) = panels(1, 1, 1.0 + _ROW * (len(shown) + 1))
+        figure, ((ax,),) = style.panels(1, 1, 1.0 + _ROW * (len(shown) + 1))
         rows = _rows(ax, shown)
         ax.axvline(0, color=INK, lw=0.8, zorder=1)
-        ax.grid(axis="x")
-        ax.grid(axis="y", visible=False)
+        style.lying(ax)
         ax.set_ylim(rows + 0.2, -0.8)
-        ax.set_xlabel(axis_label(view.measure, f"Change of the {measure_name(view.measure)}"))
+        ax.set_xlabel(style.axis_label(view.measure, f"Change of the {measure_name(view.measure)}"))
+        words = caption("factorial_effects", left_out=len(found) - len(shown))
         title = f"Main effects and two-way interactions on the {measure_name(view.measure)}"
-        return self.finish(figure, _caption(found, shown), _numbers(view, found), title=title)
+        return self.finish(figure, words, _numbers(view, found), title=title)
 
 
 def _effects(view: StudyView, factors: Sequence[Factor]) -> tuple[Effect, ...]:
@@ -144,22 +135,12 @@ def _plain(word: str) -> Level:
     return level
 
 
-def _caption(found: Sequence[Effect], shown: Sequence[Effect]) -> str:
-    left_out = len(found) - len(shown)
-    rest = f" {left_out} smaller interactions are in the figure's CSV only." if left_out else ""
-    return (
-        "Dots: what a step from the first level to another changes on average (main effect). "
-        "Diamonds: how much more it changes if the second step is taken too (interaction). "
-        f"Filled: differs from zero. Bars: 95 % band of all effects at once.{rest}"
-    )
-
-
-def _numbers(view: StudyView, found: Sequence[Effect]) -> Numbers:
-    numbers = Numbers()
+def _numbers(view: StudyView, found: Sequence[Effect]) -> style.Numbers:
+    numbers = style.Numbers()
     for effect in found:
         interval = effect.interval
         edges = {"mean": interval.mean, "low": interval.low, "high": interval.high}
-        told = {with_unit(name, view.measure): value for name, value in edges.items()}
+        told = style.in_units(view.measure, **edges)
         words = {
             "factors": " x ".join(effect.factors),
             "from": " x ".join(str(_plain(word)) for word in effect.baselines),
@@ -194,20 +175,20 @@ class EffectField:
     high: Floats
 
 
-class HeatMap(ReportFigure):
+class HeatMap(style.ReportFigure):
     """The declared contrast over two factors; None where there is no second one worth it."""
 
     name = "heat_map"
     title = "The contrast over two factors"
     pages = ("driving",)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         fields = _fields(view)
         if not fields or view.over is None or view.line is None or view.contrast is None:
             return None
         second = fields[0].second
-        figure, grid = panels(
+        figure, grid = style.panels(
             len(fields), 1, max(2.4, 1.0 + 0.38 * len(second.levels)), sharex=True
         )
         axes = [ax for (ax,) in grid]
@@ -218,31 +199,18 @@ class HeatMap(ReportFigure):
             image = _colours(ax, field.mean, reach)
             has_zero |= _contours(ax, field)
             _write(ax, field, image, reach)
-            level_axis(ax, second)
-            stops_axis(ax, view.over)
-            panel_title(ax, field.panel)
+            style.level_axis(ax, second)
+            style.stops_axis(ax, view.over)
+            style.panel_title(ax, field.panel)
             ax.grid(False)
         for ax in axes[:-1]:
             ax.set_xlabel("")
         bar = figure.colorbar(image, ax=axes, pad=0.02)
-        bar.set_label(axis_label(view.measure, f"{first}\nminus {other}"))
+        bar.set_label(style.axis_label(view.measure, f"{first}\nminus {other}"))
         title = f"{capital(first)} minus {other} in {measure_name(view.measure)}, over two factors"
-        numbers = _heat_numbers(view, fields)
-        return self.finish(figure, _heat_caption(first, other, has_zero), numbers, title=title)
-
-
-def _heat_caption(first: str, second: str, has_zero: bool) -> str:
-    line = (
-        "Thick line: where the mean difference is zero, by straight lines between levels; dashed, "
-        "where the edges of the band are, so that between the dashed lines nothing can be told."
-        if has_zero
-        else "The mean difference is zero nowhere between these levels, so there is no line."
-    )
-    return (
-        f"In each field the mean difference, paired by person and trial. {_ABOVE}: {first} lies "
-        f"above {second}, {_BELOW}: below, by the 95 % band that covers all fields of a panel at "
-        f"once; without a mark it does not differ from zero. {line}"
-    )
+        marks = {"above": _ABOVE, "below": _BELOW}
+        words = caption("heat_map", first=first, second=other, has_zero=has_zero, **marks)
+        return self.finish(figure, words, _heat_numbers(view, fields), title=title)
 
 
 def _fields(view: StudyView) -> list[EffectField]:
@@ -317,7 +285,7 @@ def _mark(low: float, high: float) -> str:
 def _contours(ax: Axes, field: EffectField) -> bool:
     """The line of no effect with those of the band's edges; whether there is one."""
     has_zero = False
-    for values, style, width in (
+    for values, dashes, width in (
         (field.mean, "-", 2.2),
         (field.low, "--", 1),
         (field.high, "--", 1),
@@ -326,17 +294,18 @@ def _contours(ax: Axes, field: EffectField) -> bool:
         crosses = len(known) > 0 and known.min() < 0 < known.max()
         if crosses and min(values.shape) > 1:
             ax.contour(
-                np.ma.masked_invalid(values), [0.0], colors=INK, linestyles=style, linewidths=width
+                np.ma.masked_invalid(values), [0.0], colors=INK, linestyles=dashes, linewidths=width
             )
-            has_zero |= style == "-"
+            has_zero |= dashes == "-"
     return has_zero
 
 
-def _heat_numbers(view: StudyView, fields: Sequence[EffectField]) -> Numbers:
-    numbers = Numbers()
+def _heat_numbers(view: StudyView, fields: Sequence[EffectField]) -> style.Numbers:
+    numbers = style.Numbers()
     for field in fields:
         edges = {"mean": field.mean, "band_low": field.low, "band_high": field.high}
+        columns = style.in_units(view.measure, **edges)
         for row, level in enumerate(field.second.levels):
-            told = {with_unit(name, view.measure): values[row] for name, values in edges.items()}
+            told = {name: values[row] for name, values in columns.items()}
             numbers.add(field.panel | {field.second.name: level}, view.along_x() | told)
     return numbers

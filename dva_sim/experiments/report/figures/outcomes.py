@@ -6,6 +6,7 @@ The whole story: who responded, how soon, and what became of every event.
 from __future__ import annotations
 
 import itertools
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,22 +16,14 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, codes_of
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.budget import Stacks, stack
 from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    dodge,
-    outer_labels,
-    panels,
-    stops_axis,
-    wrapped,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, level_name
-from dva_sim.statistics import CUT, incidence
+from dva_sim.statistics import CUT, Incidence, incidence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +35,7 @@ _MOST_STOPS, _MOST_LINES, _POINTS = 4, 3, 241
 _TITLE = 70  # characters that the width holds
 
 
-class EndingsInTime(ReportFigure):
+class EndingsInTime(style.ReportFigure):
     """Cumulative incidence of each way, stacked; None where all went right."""
 
     name = "endings"
@@ -50,7 +43,7 @@ class EndingsInTime(ReportFigure):
     pages = ("driving",)
     tables = ("runs", "events")
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         endings = reading.endings
         if endings is None:
@@ -61,33 +54,31 @@ class EndingsInTime(ReportFigure):
         ]
         if not stops:
             return None
-        figure, axes = panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
-        times, numbers = np.linspace(0.0, endings.horizon, _POINTS), Numbers()
+        figure, axes = style.panels(len(lines), len(stops), 1.9, sharex=True, sharey=True)
+        times, numbers = np.linspace(0.0, endings.horizon, _POINTS), style.Numbers()
         for row, line in zip(axes, lines, strict=True):
             for ax, stop in zip(row, stops, strict=True):
                 mask = endings.under(line, stop)
                 if mask.any():
                     shares = _shares(endings, mask, times)
-                    _stack(ax, shares, times)
-                    where = view.setting(view.panels[0], line) | _stop(view, stop)
+                    stack_in_time(ax, shares, times)
+                    where = view.setting(view.panels[0], line) | style.stop_of(view, stop)
                     numbers.add(where, {"t_s": times} | shares)
                 ax.grid(False)
             name = level_name(view.line.name, line) if view.line else ""
-            row[0].set_ylabel(f"{wrapped(name, 24)}\nshare of events".strip())
+            words = style.wrapped(name, 24)
+            row[0].set_ylabel(f"{words}\nshare of events".strip())
         axes[0][0].set(xlim=(0, endings.horizon), ylim=(0, 1))
         axes[0][0].yaxis.set_major_formatter(lambda y, _: f"{100 * y:.0f} %")
         for ax, stop in zip(axes[0], stops, strict=True):
-            ax.set_title(wrapped(capital(brief(_stop(view, stop))), _TITLE // len(stops)))
+            ax.set_title(
+                style.wrapped(capital(brief(style.stop_of(view, stop))), _TITLE // len(stops))
+            )
         for ax in axes[-1]:
             ax.set_xlabel("Since the report [s]")
         key(figure, [box(FATES[way]) for way in endings.ways], [_named(w) for w in endings.ways])
-        place = f" with {brief(view.panels[0])}" if view.panels[0] else ""
-        caption = (
-            f"Share of the events of part {view.part.name}{place} that had ended in each way by "
-            "each moment (cumulative incidence, Aalen-Johansen), where not all were confirmed. The "
-            "shares at the right edge stand in the table, with intervals."
-        )
-        return self.finish(figure, caption, numbers)
+        words = caption("endings", part=view.part.name, place=brief(view.panels[0]))
+        return self.finish(figure, words, numbers)
 
 
 def _lines(endings: Endings, view: StudyView) -> tuple[Level, ...]:
@@ -101,21 +92,22 @@ def _all_right(endings: Endings, lines: Sequence[Level], stops: Sequence[Level])
     return all(bool(endings.is_right[endings.under(*place)].all()) for place in places)
 
 
-def _stop(view: StudyView, stop: Level) -> Setting:
-    return {view.over.name: stop} if view.over else {}
-
-
 def _shares(endings: Endings, mask: NDArray[np.bool_], times: Floats) -> dict[str, Floats]:
     """Cumulative incidence of each way at some times, and the share to which nothing happened."""
     ways = endings.ways[:-1]
     codes = {way: number for number, way in enumerate(ways, 1)}
     causes = np.array([codes.get(way, CUT) for way in endings.way[mask]], dtype=np.intp)
-    curve = incidence(endings.time[mask], causes, len(ways))
-    shares = {way: curve.at(times, code) for way, code in codes.items()}
-    return shares | {NOTHING: 1.0 - sum(shares.values(), np.zeros_like(times))}
+    return shares_of(incidence(endings.time[mask], causes, len(ways)), ways, NOTHING, times)
 
 
-def _stack(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
+def shares_of(curve: Incidence, ways: Sequence[str], rest: str, times: Floats) -> dict[str, Floats]:
+    """Cumulative incidence of each way at some times `(n,)`, and what is left to none of them."""
+    shares = {way: curve.at(times, code) for code, way in enumerate(ways, 1)}
+    return shares | {rest: 1.0 - sum(shares.values(), np.zeros_like(times))}
+
+
+def stack_in_time(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
+    """Shares that add up to one, one above the other."""
     floor = np.zeros_like(times)
     for way, share in shares.items():
         fill, top = FATES[way], floor + share
@@ -174,9 +166,7 @@ class Events:
 
     def under(self, panel: Setting, line: Level, stop: Level) -> NDArray[np.bool_]:
         """Which events happened under these levels `(n,)`."""
-        view = self._view
-        wanted = dict(panel)
-        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        wanted = self._view.setting(panel, line) | style.stop_of(self._view, stop)
         mask = np.ones(len(self), dtype=bool)
         for name, (factor, codes) in self._codes.items():
             mask &= codes == factor.levels.index(wanted[name])
@@ -219,73 +209,69 @@ def story_part(table: Table, view: StudyView) -> str | None:
     return next(iter(others or parts), None)
 
 
-def _events(view: StudyView, reading: Reading) -> Events | None:
-    """Those of the story; None where there are none."""
-    table = reading.table("events")
-    part = story_part(table, view)
-    events = Events(table, part, view) if part is not None else None
-    return events if events else None
+class _Story(style.ReportFigure):
+    """Of the events of the part that tells a story."""
 
-
-class StoryTimes(ReportFigure):
-    """Times of the events that were reached, guards and robots apart; of those who came."""
-
-    name = "story_times"
-    title = "Response, by who responded"
     pages = ("driving",)
     tables = ("runs", "events")
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
+        """Draw it, where there are events."""
+        table = reading.table("events")
+        part = story_part(table, view)
+        events = Events(table, part, view) if part is not None else None
+        return self.drawn(view, events) if events else None
+
+    @abstractmethod
+    def drawn(self, view: StudyView, events: Events) -> style.Drawn | None:
+        """The figure; None where there is nothing to be seen."""
+
+
+class StoryTimes(_Story):
+    """Times of the events that were reached, guards and robots apart; of those who came."""
+
+    name = "story_times"
+    title = "Response, by who responded"
+
+    def drawn(self, view: StudyView, events: Events) -> style.Drawn | None:
         """Draw it."""
-        events = _events(view, reading)
-        if events is None:
-            return None
-        shown, met, numbers = view.shown, events.kinds_of_times(), Numbers()
+        shown, met, numbers = view.shown, events.kinds_of_times(), style.Numbers()
         if not met:
             return None
-        figure, axes = panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
-        look = looks(view.line)
+        figure, axes = style.panels(len(shown), len(met), 2.4, sharex=True, sharey=True)
+        look, fate = looks(view.line), events.one_fate() or ""
         for row, panel in zip(axes, shown, strict=True):
             for ax, (title, (kind, column)) in zip(row, met.items(), strict=True):
-                for level, offset in dodge(view.lines):
+                for level, offset in style.dodge(view.lines):
                     masks = [events.by(kind) & events.under(panel, level, v) for v in view.stops]
                     times = [events.times(column, mask) for mask in masks]
                     _quartiles(ax, offset, times, look[level])
                     where = view.setting(panel, level) | {"responder_kind": kind, "time": column}
                     numbers.add(where, view.along_x() | _quantiles(times))
-                stops_axis(ax, view.over)
+                style.stops_axis(ax, view.over)
                 ax.set_title(title if row is axes[0] else "")
         axes[0][0].set_ylim(bottom=0)
-        outer_labels(axes, shown, "Since detection [s]")
+        style.outer_labels(axes, shown, "Since detection [s]")
         legend(figure, view.line)
-        caption = (
-            "Mark, the median; bar, the middle half, of the events that were reached or "
-            f"confirmed{_what_else_came(events)}."
-        )
+        words = caption("story_times", events=len(events), fate=_NAMES.get(fate, fate))
         title = f"Part {events.part}: response, by who responded"
-        return self.finish(figure, caption, numbers, title=title)
+        return self.finish(figure, words, numbers, title=title)
 
 
-class StoryOutcomes(ReportFigure):
+class StoryOutcomes(_Story):
     """What became of every event, as shares that add up to one; None if all met one fate."""
 
     name = "story_outcomes"
     title = "What became of the events"
-    pages = ("driving",)
-    tables = ("runs", "events")
-    has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def drawn(self, view: StudyView, events: Events) -> style.Drawn | None:
         """Draw it."""
-        events = _events(view, reading)
-        if events is None:
-            return None
         if events.one_fate() is not None:
             return None
         met = events.shares(np.ones(len(events), dtype=bool))
         parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
-        stacks, numbers = Stacks(view, "Share of events", parts), Numbers()
+        stacks, numbers = Stacks(view, "Share of events", parts), style.Numbers()
         for ax, panel, level in stacks.panels():
             shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
             told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
@@ -295,19 +281,9 @@ class StoryOutcomes(ReportFigure):
         stacks.axes[0].set_xlim(0, 1)
         stacks.axes[0].set_xticks([0, 0.5, 1])
         stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
-        caption = (
-            f"All {len(events):,} events of part {events.part}: each has one of these outcomes."
-        )
+        words = caption("story_outcomes", events=len(events), part=events.part)
         title = f"Part {events.part}: what became of the events"
-        return self.finish(stacks.figure, caption, numbers, title=title)
-
-
-def _what_else_came(events: Events) -> str:
-    """What became of all events, or where that is to be seen."""
-    if (fate := events.one_fate()) is not None:
-        name = _NAMES.get(fate, fate)
-        return f"; all {len(events):,} were {name}" if len(events) > 1 else f"; it was {name}"
-    return ": a fast median may hide misses, which the next figure shows"
+        return self.finish(stacks.figure, words, numbers, title=title)
 
 
 def _quartiles(ax: Axes, offset: float, times: list[Floats], look: Look) -> None:

@@ -136,11 +136,6 @@ def colours(factor: Factor | None) -> dict[Level, str]:
     return {level: look.colour for level, look in looks(factor).items()}
 
 
-def marks(factor: Factor | None) -> dict[Level, str]:
-    """A mark for each level, as lasting as its colour."""
-    return {level: look.mark for level, look in looks(factor).items()}
-
-
 def is_of_palette(colour: str) -> bool:
     """Whether a colour, as `#rrggbb`, is one of those that a figure may use."""
     own = [INK, SOFT, FAINT, WARNING, HAZARD, "#ffffff", *(look.colour for look in LOOKS)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -22,8 +21,7 @@ from dva_sim.experiments.report.figures import (
     tradeoff,
     transport,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn, styled
+from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, styled
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import FAILURES, Plugins, said
 from dva_sim.kernel.wording import listing
@@ -33,46 +31,42 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-SHIPPED: Final[tuple[ReportFigure, ...]] = (
-    contrast.AnswerFigure(),
-    distribution.Distributions(),
-    effect.Differences(),
-    effect.Levels(),
-    factorial.HeatMap(),
-    factorial.FactorialEffects(),
-    scatter.Scatter(),
-    scatter.Sobol(),
-    contrast.RepeatsFigure(),
-    budget.DelayBudget(),
-    effect.CommandAge(),
-    effect.CommandRate(),
-    tradeoff.TradeOff(),
-    outcomes.EndingsInTime(),
-    site_map.Trajectories(),
-    site_map.TypicalRun(),
-    site_map.WorstRun(),
-    outcomes.StoryTimes(),
-    outcomes.StoryOutcomes(),
-    shift.Trade(),
-    shift.Stages(),
-    shift.FatesOfEvents(),
-    shift.WayToBest(),
-    shift.Percentiles(),
-    shift.Burden(),
-    transport.Brought(),
-    transport.Taken(),
+SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
+    contrast.AnswerFigure,
+    distribution.Distributions,
+    effect.Differences,
+    effect.Levels,
+    factorial.HeatMap,
+    factorial.FactorialEffects,
+    scatter.Scatter,
+    scatter.Sobol,
+    contrast.RepeatsFigure,
+    budget.DelayBudget,
+    effect.CommandAge,
+    effect.CommandRate,
+    tradeoff.TradeOff,
+    outcomes.EndingsInTime,
+    site_map.Trajectories,
+    site_map.TypicalRun,
+    site_map.WorstRun,
+    outcomes.StoryTimes,
+    outcomes.StoryOutcomes,
+    shift.Trade,
+    shift.Stages,
+    shift.FatesOfEvents,
+    shift.WayToBest,
+    shift.Percentiles,
+    shift.Burden,
+    transport.Brought,
+    transport.Taken,
 )
 """In the order of the report; the first that applies answers the question."""
-
-
-def _itself(figure: ReportFigure) -> ReportFigure:
-    return figure
 
 
 PLUGINS: Final = Plugins(
     kind="figure",
     base=ReportFigure,  # type: ignore[type-abstract]
-    shipped={figure.name: partial(_itself, figure) for figure in SHIPPED},
+    shipped={kind.name: kind for kind in SHIPPED},
     folder="experiments/figures",
     group="dva_sim.figures",
     key="figures",
@@ -95,7 +89,7 @@ def load_figures(names: Iterable[str], base: Path | None = None) -> list[ReportF
         ConfigError: one cannot be had, has no usable name, or is there already.
     """
     found: list[ReportFigure] = []
-    taken = {figure.name for figure in SHIPPED}
+    taken = set(PLUGINS.shipped)
     for name in names:
         figure = PLUGINS.make(name, PLUGINS.find(name, base), {})
         problem = _problem_of_name(figure, taken)
@@ -131,8 +125,8 @@ def draw_all(reading: Reading, own: Sequence[ReportFigure] = ()) -> tuple[list[D
     view, drawn, problems = reading.view, [], []
     if view is None:
         return [], []
-    for figure in SHIPPED:
-        drawn += _drawn(figure, view, reading)
+    for kind in SHIPPED:
+        drawn += _drawn(kind(), view, reading)
     for figure in own:
         try:
             drawn += _drawn(figure, view, reading)

@@ -9,17 +9,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, nan_mean
 from dva_sim.experiments.analysis.study_view import StudyView, layout_of
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    log_axis,
-    panels,
-    with_unit,
-    wrapped,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
@@ -101,7 +93,7 @@ def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
     return [Cloud(name, at(level), level) for name, level in zip(names, view.lines, strict=True)]
 
 
-class Scatter(ReportFigure):
+class Scatter(style.ReportFigure):
     """A panel for each factor: a dot for each point, the mean over all its runs."""
 
     name = "scatter"
@@ -112,45 +104,32 @@ class Scatter(ReportFigure):
         """Only for designs of points in ranges."""
         return super().applies(view, reading) and bool(reading.points)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         clouds, names, where, panel = points_of(view, reading)
         ranges = (reading.study.get("design") or {}).get("ranges") or {}
-        columns = min(_ABREAST, len(names))
-        rows = -(-len(names) // columns)
-        figure, grid = panels(rows, columns, 2.7, sharey=True)
-        axes = [ax for row in grid for ax in row]
+        abreast = min(_ABREAST, len(names))
+        figure, grid, axes = style.places(len(names), abreast, 2.7, sharey=True)
         means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
-        for ax, name, x in zip(axes, names, where, strict=False):
+        for ax, name, x in zip(axes, names, where, strict=True):
             for cloud, y in zip(clouds, means, strict=True):
                 _dots(ax, x, y, _look(view, cloud))
-            ax.set_xlabel(wrapped(capital(head_of(name)), 30))
+            ax.set_xlabel(style.wrapped(capital(head_of(name)), 30))
             if (ranges.get(name) or {}).get("scale") == "log":
-                log_axis(ax, "x")
+                style.log_axis(ax, "x")
             if len(clouds) == 1 and clouds[0].level is None and view.contrast is not None:
                 ax.axhline(0, color=INK, lw=0.8, zorder=1)
-        for ax in axes[len(names) :]:
-            ax.set_visible(False)
         label = clouds[0].name if view.contrast is not None else measure_name(view.measure)
         for row in grid:
-            row[0].set_ylabel(axis_label(view.measure, wrapped(label, 26)))
+            row[0].set_ylabel(style.axis_label(view.measure, style.wrapped(label, 26)))
         if view.contrast is None:
             legend(figure, view.line)
-        numbers = Numbers()
+        numbers = style.Numbers()
         for cloud, y in zip(clouds, means, strict=True):
-            told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
+            told = dict(zip(names, where, strict=True)) | {style.with_unit("mean", view.measure): y}
             numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
         title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
-        return self.finish(figure, _SCATTER, numbers, title=title)
-
-
-_SCATTER = (
-    "Each small mark is a point of the ranges, the mean over all persons and trials there; all "
-    "other factors vary too, which is most of the scatter. Line: means of equally many points in "
-    "order of the factor; shaded, the 95 % interval of each by the scatter of its points, for "
-    "these persons. A slope is seen where the factor matters on average; what it does only "
-    "together with another is not."
-)
+        return self.finish(figure, caption("scatter"), numbers, title=title)
 
 
 def _what(view: StudyView, clouds: list[Cloud]) -> str:
@@ -200,7 +179,7 @@ def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 # --- Sobol's indices -------------------------------------------------------------------------
-class Sobol(ReportFigure):
+class Sobol(style.ReportFigure):
     """A panel for each cloud: how much of the variance over the ranges is each factor's."""
 
     name = "sobol"
@@ -212,12 +191,12 @@ class Sobol(ReportFigure):
         is_sample = bool((reading.study.get("design") or {}).get("saltelli"))
         return super().applies(view, reading) and is_sample and bool(reading.points)
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         clouds, names, where, panel = points_of(view, reading)
         height = 1.2 + 0.42 * len(names)
-        figure, (axes,) = panels(1, len(clouds), height, sharey=True, sharex=True)
-        numbers = Numbers()
+        figure, (axes,) = style.panels(1, len(clouds), height, sharey=True, sharex=True)
+        numbers = style.Numbers()
         for ax, cloud in zip(axes, clouds, strict=True):
             found = _sobol(cloud, names, where)
             for row, index in enumerate(found):
@@ -232,22 +211,13 @@ class Sobol(ReportFigure):
             ax.axvline(0, color=INK, lw=0.8)
             ax.set_title(cloud.name)
             ax.set_xlabel("Share of the variance")
-            ax.grid(axis="x")
-            ax.grid(axis="y", visible=False)
+            style.lying(ax)
         axes[0].set_yticks(range(len(names)), [capital(factor_name(name)) for name in names])
         axes[0].set_ylim(len(names) - 0.5, -0.5)
         title = (
             f"Which factors the {_what(view, clouds)} varies with: Sobol' indices{_place(panel)}"
         )
-        return self.finish(figure, _SOBOL, numbers, title=title)
-
-
-_SOBOL = (
-    "Dot: first-order index, the share of the variance over the ranges that would go if the factor "
-    "alone were fixed. Ring: total index, the share that would stay if all others were fixed; what "
-    "it has more than the dot are interactions. Bars: 95 % intervals over points and persons. "
-    "Estimates from few points may lie below 0 or above 1."
-)
+        return self.finish(figure, caption("sobol"), numbers, title=title)
 
 
 def _sobol(cloud: Cloud, names: list[str], where: Floats) -> tuple[SobolIndex, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pooled
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures.outcomes import shares_of, stack_in_time
 from dva_sim.experiments.report.figures.palette import (
     FAINT,
     FATES,
@@ -21,8 +22,14 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     looks,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import Drawn, Numbers, panels, with_unit
+from dva_sim.experiments.report.figures.style import (
+    Drawn,
+    Numbers,
+    ReportFigure,
+    panels,
+    with_limits,
+)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -73,17 +80,8 @@ class Trade(ShiftFigure):
             return None
         label = "Exposure of people in finding out what it is [s per event]"
         figure = _scatter(shifts, "exposure_look_s", label)
-        title = "The trade: how soon somebody is there, against how long people stand in danger"
-        caption = (
-            "Down and to the left is better; the line joins the policies that no other beats on "
-            f"both. Response is the mean of min(time, {shifts.follow:g} s) over all events. "
-            "Exposure is guards' time within the danger radius on the way to look, looking and "
-            f"leaving; containing comes on top and costs about {_act(shifts):.0f} s per event "
-            f"whoever was sent. {_bars_words(shifts)}"
-        )
-        return self.finish(
-            figure, caption, _scatter_numbers(shifts, "exposure_look_s"), title=title
-        )
+        words = caption("trade", shifts=shifts, act=_act(shifts))
+        return self.finish(figure, words, _scatter_numbers(shifts, "exposure_look_s"))
 
 
 class Stages(ShiftFigure):
@@ -96,15 +94,8 @@ class Stages(ShiftFigure):
     def drawn(self, shifts: Shifts) -> Drawn | None:
         """Draw it."""
         figure = _scatter(shifts, "containment_mean_s", "Restricted mean time to containment [s]")
-        title = "Looking first or containing first: response against containment"
-        caption = (
-            "Down and to the left is better; the line joins the policies that no other beats on "
-            f"both. Both are means of min(time, {shifts.follow:g} s) from the report: of all "
-            "events until somebody is on scene, and of the true ones until a person has dealt with "
-            f"them. The same guards do both. {_bars_words(shifts)}"
-        )
         numbers = _scatter_numbers(shifts, "containment_mean_s")
-        return self.finish(figure, caption, numbers, title=title)
+        return self.finish(figure, caption("stages", shifts=shifts), numbers)
 
 
 def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
@@ -140,28 +131,14 @@ def _scatter(shifts: Shifts, column: str, label: str) -> Figure:
 
 def _scatter_numbers(shifts: Shifts, column: str) -> Numbers:
     """Means, and ends of bars: the interval of the difference against the baseline."""
-    numbers = Numbers()
-    told: dict[str, Any] = {}
+    numbers, told = Numbers(), dict[str, Any]()
     for name in ("response_mean_s", column):
-        means, halves, stem = (
-            shifts.means(name),
-            _half_widths(shifts, name),
-            name.removesuffix("_s"),
-        )
-        told[name] = means
-        told[with_unit(f"{stem}_low", name)] = means - halves
-        told[with_unit(f"{stem}_high", name)] = means + halves
+        means, half = shifts.means(name), _half_widths(shifts, name)
+        told |= with_limits(name, means, means - half, means + half)
     for stop, title in enumerate(shifts.titles):
         at_stop: dict[str, Any] = {name: values[:, stop] for name, values in told.items()}
         numbers.add({"at": title}, at_stop | {"dispatch.policy": shifts.policies})
     return numbers
-
-
-def _bars_words(shifts: Shifts) -> str:
-    return (
-        f"Bars: 95 % interval of the difference against {shifts.baseline}, paired by shift, for "
-        "all policies and loads at once. The axes differ from panel to panel."
-    )
 
 
 def _act(shifts: Shifts) -> float:
@@ -207,8 +184,8 @@ class FatesOfEvents(ShiftFigure):
             for policy, ax in zip(chosen, row, strict=True):
                 events = dict(shifts.events_of(policy, stop))
                 if len(events["event_id"]):
-                    shares = _shares(measures.fates(events), times)
-                    _stack(ax, shares, times)
+                    shares = shares_of(measures.fates(events), measures.FATES, "open", times)
+                    stack_in_time(ax, {fate: shares[fate] for fate in _FATES}, times)
                     where = {"at": shifts.titles[stop], "dispatch.policy": policy}
                     numbers.add(where, {"t_s": times} | shares)
                 ax.set_xlim(0, shifts.follow)
@@ -220,12 +197,7 @@ class FatesOfEvents(ShiftFigure):
         for ax in axes[-1]:
             ax.set_xlabel("Time since the report [s]")
         key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
-        caption = (
-            "Cumulative incidence of each outcome (Aalen-Johansen), stacked: at every moment the "
-            "shares add up to one. All events, true and false, each followed for "
-            f"{shifts.follow:g} s."
-        )
-        return self.finish(figure, caption, numbers)
+        return self.finish(figure, caption("fates", follow=shifts.follow), numbers)
 
 
 def chosen_policies(shifts: Shifts) -> list[str]:
@@ -234,21 +206,6 @@ def chosen_policies(shifts: Shifts) -> list[str]:
     quickest = [shifts.policies[i] for i in np.argsort(response, kind="stable")]
     wanted = [FLOOR, *reversed([str(c) for c in shifts.view.contrast or ()]), *quickest]
     return list(dict.fromkeys(p for p in wanted if p in shifts.policies))[:4]
-
-
-def _shares(curve: Any, times: Any) -> dict[str, Any]:
-    """Cumulative incidence of each outcome at these times, and what is still open."""
-    shares = {fate: curve.at(times, 1 + i) for i, fate in enumerate(measures.FATES)}
-    return shares | {"open": 1.0 - sum(shares.values())}
-
-
-def _stack(ax: Axes, shares: dict[str, Any], times: Any) -> None:
-    bottom = np.zeros_like(times)
-    for fate in _FATES:
-        colour, hatch = FATES[fate]
-        top = bottom + shares[fate]
-        ax.fill_between(times, bottom, top, facecolor=colour, hatch=hatch, edgecolor=PAPER, lw=0)
-        bottom = top
 
 
 # --- one line per policy ---------------------------------------------------------------------
@@ -266,11 +223,7 @@ class WayToBest(ShiftFigure):
         figure, (axes,) = panels(1, len(shifts.stops), _height(len(names)), sharey=True)
         for stop, ax in enumerate(axes):
             found = shifts.progress(stop)
-            told: dict[str, Any] = {
-                "share": found.mean,
-                "share_low": found.low,
-                "share_high": found.high,
-            }
+            told = with_limits("share", found.mean, found.low, found.high)
             numbers.add({"at": shifts.titles[stop]}, told | {"dispatch.policy": names})
             for row, policy in enumerate(names):
                 colour, mark = look[policy]
@@ -281,29 +234,11 @@ class WayToBest(ShiftFigure):
             _policy_axis(ax, names, capital(shifts.titles[stop]))
         target = "the oracle" if shifts.target == BEST else "a fresh unit at every base"
         axes[len(axes) // 2].set_xlabel(f"Share of the way from {FLOOR} to {target} [%]")
+        is_oracle = shifts.target == BEST
+        beats = np.zeros(1) if is_oracle else 100 * shifts.means("beats_bound_share")
+        words = caption("way", is_oracle=is_oracle, low=np.nanmin(beats), high=np.nanmax(beats))
         title = f"{self.title}: 0 is {FLOOR}, 100 {target}"
-        return self.finish(figure, _way_words(shifts), numbers, title=title)
-
-
-def _way_words(shifts: Shifts) -> str:
-    words = (
-        f"(random - policy) / (random - {'oracle' if shifts.target == BEST else 'bound'}) of the "
-        "restricted mean response, paired by shift; the 95 % intervals hold for all policies of a "
-        "panel at once. "
-    )
-    if shifts.target == BEST:
-        return words + (
-            "The oracle knows all alarms before they come and follows the plan with the least sum "
-            "of response times; nobody can be beyond it."
-        )
-    beats = shifts.means("beats_bound_share")
-    return words + (
-        "The bound is the response of the best unit for each event if it stood idle at its base or "
-        "a station: no queue, no limit of operators, the event's own luck. It is none for who is "
-        "out already and needs no time to get ready: "
-        f"{100 * np.nanmin(beats):.0f} to {100 * np.nanmax(beats):.0f} % of events were answered "
-        "sooner."
-    )
+        return self.finish(figure, words, numbers, title=title)
 
 
 class Percentiles(ShiftFigure):
@@ -325,11 +260,7 @@ class Percentiles(ShiftFigure):
                 colour = look[policy].colour
                 value, low, high = pooled(shifts.events_of(policy, stop), _QUANTILES, shifts.follow)
                 where = {"at": shifts.titles[stop], "dispatch.policy": policy}
-                told: dict[str, Any] = {
-                    "response_s": value,
-                    "response_low_s": low,
-                    "response_high_s": high,
-                }
+                told = with_limits("response_s", value, low, high)
                 shown = {"quantile": _QUANTILES, "drawn_until_s": [shifts.follow] * len(_QUANTILES)}
                 numbers.add(where, told | shown)
                 inside = [np.minimum(x, shifts.follow) for x in (value, low, high)]
@@ -346,17 +277,8 @@ class Percentiles(ShiftFigure):
         axes[len(axes) // 2].set_xlabel(
             "Time to response by 50 % (filled), 90 % and 95 % of all events [s]"
         )
-        never = (
-            f" An arrow, or a bar up to {shifts.follow:g} s: perhaps not reached."
-            if missing
-            else ""
-        )
-        caption = (
-            "Over all events of the cohort, those that nobody ever reached counting as infinitely "
-            f"late.{never} Broad bars: 95 % interval of each percentile alone, shifts drawn anew. "
-            "The axes differ from panel to panel."
-        )
-        return self.finish(figure, caption, numbers)
+        words = caption("percentiles", follow=shifts.follow, missing=missing)
+        return self.finish(figure, words, numbers)
 
 
 class Burden(ShiftFigure):
@@ -396,15 +318,9 @@ class Burden(ShiftFigure):
             _policy_axis(ax, names, text)
             if column.startswith("use"):
                 ax.set_xlim(0, 1.02)
-        title = "How busy people are, and how evenly work and service are spread"
-        caption = (
-            f"Small to large: {', '.join(shifts.titles)}. Means over shifts. Use: share of the "
-            "measured time with an order. Evenness: Jain's index of the guards' busy time, 1 if "
-            "all work the same. On the right, the restricted mean response in the worst zone over "
-            f"that in the best, of zones with at least {measures.FEWEST_IN_ZONE} events in the "
-            "shift: chance alone lifts it above 1, under every policy."
-        )
-        return self.finish(figure, caption, numbers, title=title)
+        fewest = measures.FEWEST_IN_ZONE
+        words = caption("burden", loads=shifts.titles, fewest=fewest)
+        return self.finish(figure, words, numbers)
 
 
 def _height(rows: int) -> float:

@@ -25,12 +25,21 @@ from dva_sim.experiments.report.figures.palette import (
     key,
     look_of,
 )
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import ASIDE, WIDTH, Drawn, Numbers, panels, wrapped
+from dva_sim.experiments.report.figures.style import (
+    ASIDE,
+    WIDTH,
+    Drawn,
+    Numbers,
+    ReportFigure,
+    panels,
+    stop_of,
+    wrapped,
+)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import capital, number, percent, quantity
+from dva_sim.kernel.wording import capital, number, quantity
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
 
 if TYPE_CHECKING:
@@ -78,7 +87,7 @@ class Trajectories(ReportFigure):
                     ax.plot(*way.T, color=SOFT, lw=1.3, ls=(0, (3, 2)), zorder=8)
                 for way in ways.under(level, stop):
                     _way(ax, way, paint[level])
-                    where = view.setting(view.panels[0], level) | _at(view, stop)
+                    where = view.setting(view.panels[0], level) | stop_of(view, stop)
                     numbers.add(where, {"x_m": way[:, 0], "y_m": way[:, 1]})
                 ax.set_title(wrapped(_heading(view, level, stop), _TITLE // abreast), fontsize=8.5)
                 ax.label_outer()
@@ -86,17 +95,9 @@ class Trajectories(ReportFigure):
                 ax.set_visible(False)
         axes[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         scale_bar(axes[-1][0], low)
-        caption = (
-            f"The same person and trial{'; dashed, the reference run' if aside else ''}. Ring: "
-            "where a way begins; dot: where it "
-            f"ends.{'' if site else ' The files of the site were not found, so it is left out.'}"
-        )
+        words = caption("trajectories", has_reference=bool(aside), has_site=site is not None)
         within = f" ({setting(view.panels[0])})" if view.panels[0] else ""
-        return self.finish(figure, caption, numbers, title=f"Ways taken{within}")
-
-
-def _at(view: StudyView, stop: Level) -> dict[str, Level]:
-    return {view.over.name: stop} if view.over else {}
+        return self.finish(figure, words, numbers, title=f"Ways taken{within}")
 
 
 class DrivenWays:
@@ -107,7 +108,6 @@ class DrivenWays:
         rows = {key: np.asarray(values) for key, values in tracks.items()}
         here = (rows["part"] == view.part.name) & np.isfinite(rows["x_m"].astype(float))
         self._part = _first_trial({key: values[here] for key, values in rows.items()})
-        self._factors = view.part.factors
 
     def __bool__(self) -> bool:
         return len(self._part["x_m"]) > 0
@@ -124,10 +124,9 @@ class DrivenWays:
     def under(self, line: Level, stop: Level) -> list[Floats]:
         """Ways under one line and stop, in the panel the answer speaks of."""
         view = self._view
-        wanted = dict(view.panels[0])
-        wanted |= {f.name: v for f, v in ((view.line, line), (view.over, stop)) if f}
+        wanted = view.setting(view.panels[0], line) | stop_of(view, stop)
         mask = ~self._part["is_reference"].astype(bool)
-        for factor in self._factors:
+        for factor in view.part.factors:
             mask &= codes_of(self._part, factor) == factor.levels.index(wanted[factor.name])
         return self._moved(mask)
 
@@ -281,8 +280,8 @@ class _TimeLapse(ReportFigure):
         scale_bar(rows[-1][0], low)
         _key(figure, list(moved), len(episode.incidents) > 0)
         title = f"{capital(self.which)} run: {_what(view, episode)}"
-        caption = _caption(view, episode, self.which)
-        return self.finish(figure, caption, numbers, title=title, reads=(_READS,))
+        words = caption("time_lapse", episode=episode, which=self.which, runs=len(view.part))
+        return self.finish(figure, words, numbers, title=title, reads=(_READS,))
 
 
 class TypicalRun(_TimeLapse):
@@ -310,19 +309,6 @@ def _what(view: StudyView, episode: KeptEpisode) -> str:
 _READS = (
     "Typical and worst run: six moments with the way so far; a nose shows where an agent heads."
 )
-
-
-def _caption(view: StudyView, episode: KeptEpisode, which: str) -> str:
-    chosen = {
-        "typical": "nearest to the median of all runs",
-        "worst": "with the largest value",
-    }[which]
-    return (
-        f"Of the {episode.kept:,} runs whose ways were kept, the one {chosen} (person "
-        f"{episode.person}, trial {episode.trial}); {percent(episode.rank)} of all "
-        f"{len(view.part):,} runs have a smaller value."
-        f"{' Cross: an incident, once it has begun.' if episode.incidents else ''}"
-    )
 
 
 def kind_of(name: str) -> str:

@@ -1,6 +1,6 @@
-"""The numbers behind a figure, written down as they are drawn, to be kept beside it as CSV.
+"""One look for all figures, and what each is: `ReportFigure`, drawn on quiet axes as stable bytes.
 
-One look for all figures: colours that stay with their pattern, quiet axes, stable bytes.
+The numbers behind a figure are written down as they are drawn, to be kept beside it as CSV.
 """
 
 from __future__ import annotations
@@ -8,10 +8,11 @@ from __future__ import annotations
 import csv
 import io
 import textwrap
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from dva_sim.simulation.labels import brief, factor_name, level_name, measure_na
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from dva_sim.experiments.report.summary import Reading
 
 
 _DIGITS = 9
@@ -65,6 +68,17 @@ def with_unit(word: str, measure: str) -> str:
     """`mean_s` for the mean of a measure in seconds."""
     ending = ending_of(measure)
     return f"{word}_{ending}" if ending else word
+
+
+def in_units(measure: str, **columns: Any) -> dict[str, Any]:
+    """Columns of a measure, such as its mean and limits, under names that end in its unit."""
+    return {with_unit(word, measure): values for word, values in columns.items()}
+
+
+def with_limits(column: str, middle: Any, low: Any, high: Any) -> dict[str, Any]:
+    """A column with its limits: `response_s`, `response_low_s` and `response_high_s`."""
+    stem = column.removesuffix(f"_{ending_of(column)}")
+    return {column: middle} | in_units(column, **{f"{stem}_low": low, f"{stem}_high": high})
 
 
 def _text(value: Any) -> str:
@@ -161,6 +175,23 @@ def panels(
     figure = Figure(figsize=(WIDTH, height * rows), dpi=150, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     return figure, [list(row) for row in axes]
+
+
+def places(
+    count: int, abreast: int, height: float, **options: Any
+) -> tuple[Figure, list[list[Axes]], list[Axes]]:
+    """Axes for so many panels, some abreast: the grid, and the panels that are seen."""
+    figure, grid = panels(-(-count // abreast), abreast, height, **options)
+    flat = [ax for row in grid for ax in row]
+    for ax in flat[count:]:
+        ax.set_visible(False)
+    return figure, grid, flat[:count]
+
+
+def lying(axes: Axes) -> None:
+    """Values run along x, so that is where lines of the grid help."""
+    axes.grid(axis="x", visible=True)
+    axes.grid(axis="y", visible=False)
 
 
 def finish(
@@ -358,9 +389,81 @@ def dodge(lines: tuple[Level, ...]) -> list[tuple[Level, float]]:
     return [(level, (i - (len(lines) - 1) / 2) * width) for i, level in enumerate(lines)]
 
 
+def stop_of(view: StudyView, stop: Level) -> Setting:
+    """The level along x that a stop stands for, by its factor."""
+    return {view.over.name: stop} if view.over else {}
+
+
 def place_of(over: Factor, value: float) -> float | None:
     """Where a value lies between the evenly spaced levels; None outside of them."""
     levels = np.array([float(v) for v in over.levels if isinstance(v, int | float)])
     if not over.is_numeric or len(levels) < 2 or not levels[0] <= value <= levels[-1]:
         return None
     return float(np.interp(value, levels, np.arange(len(levels))))
+
+
+class ReportFigure(ABC):
+    """A figure is drawn wherever its tables and columns are there, in the look of the report.
+
+    `dva-sim check figure mine.py:Mine` tries what all figures promise: the same results give the
+    same bytes; every number that is drawn stands in the CSV beside the figure; words are legible,
+    colours are the palette's; what was not measured is left out and makes no error; nothing stays
+    open and nothing is changed.
+
+    Attributes:
+        name: Of its files, in small letters, digits and underscores.
+        title: What is seen, in a line; a drawing may have a title that tells more.
+        tables: Tables that the results must hold.
+        columns: Columns of the table `runs` of which some run of the answer's part must have a
+            number.
+        pages: Kinds of reports that it belongs to, `driving`, `shift` or `transport`; all of them
+            where none is named.
+        has_panels: Whether it has a panel for each setting of the factors that are neither lines
+            nor along x; the report then says which factors those are.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    tables: ClassVar[tuple[str, ...]] = ("runs",)
+    columns: ClassVar[tuple[str, ...]] = ()
+    pages: ClassVar[tuple[str, ...]] = ()
+    has_panels: ClassVar[bool] = False
+
+    def applies(self, view: StudyView, reading: Reading) -> bool:
+        """Whether the results hold what is drawn: its page, its tables and its columns."""
+        if self.pages and reading.page.name not in self.pages:
+            return False
+        return all(map(reading.table, self.tables)) and all(map(view.part.has, self.columns))
+
+    @abstractmethod
+    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+        """Draw it.
+
+        Args:
+            view: The part that the answer speaks of: its lines, what runs along x, its panels.
+            reading: All else that the results hold: `reading.table("events")`, `reading.finding`,
+                `reading.scenario_of(part)`.
+
+        Returns:
+            What `finish` gives; None where there is nothing to be seen.
+        """
+
+    def finish(
+        self,
+        figure: Figure,
+        caption: str,
+        numbers: Numbers,
+        *,
+        title: str = "",
+        reads: Sequence[str] = (),
+    ) -> Drawn:
+        """The finished figure, as vectors and pixels, with nothing that changes day by day.
+
+        Args:
+            figure: As drawn, of `panels`.
+            caption: How to read it.
+            numbers: What was drawn, for the CSV.
+            title: What is seen, if more can be said than the figure's own title does.
+            reads: What else must be known to read it, in sentences that other figures share.
+        """
+        return finish(figure, self.name, title or self.title, caption, numbers=numbers, reads=reads)

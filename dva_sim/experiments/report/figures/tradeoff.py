@@ -8,17 +8,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, person_means, present
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    axis_label,
-    has_lines,
-    panel_grid,
-    panel_title,
-    with_unit,
-)
+from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
@@ -36,7 +28,7 @@ EXPOSURES = ("exposure_look_s", "exposure_s", "person_exposure_s")
 RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time_s")
 
 
-class TradeOff(ReportFigure):
+class TradeOff(style.ReportFigure):
     """Response over exposure, a line for each level of the compared factor through its stops."""
 
     name = "tradeoff"
@@ -44,51 +36,43 @@ class TradeOff(ReportFigure):
     pages = ("driving",)
     has_panels = True
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         columns = _columns(view)
         if columns is None:
             return None
-        figure, axes = panel_grid(view, 3.6)
-        numbers, ends = Numbers(), []
+        figure, axes = style.panel_grid(view, 3.6)
+        numbers, ends = style.Numbers(), []
         for ax, panel in zip(axes, view.shown, strict=True):
             for level in view.lines:
                 bands = [_band(view, column, panel, level) for column in columns]
                 _line(ax, view, level, *bands)
                 ends.append((ax, bands[0].mean, bands[1].mean))
                 told = {
-                    with_unit(f"{word}_{edge}", column): getattr(found, name)
+                    style.with_unit(f"{word}_{edge}", column): getattr(found, name)
                     for word, column, found in zip(
                         ("exposure", "response"), columns, bands, strict=True
                     )
                     for edge, name in _EDGES.items()
                 }
                 numbers.add(view.setting(panel, level), view.along_x() | told)
-            panel_title(ax, panel, 78 // len(axes))
+            style.panel_title(ax, panel, 78 // len(axes))
             ax.grid(True, axis="both")
             ax.margins(0.12)
         _fit(axes[0], view, columns)
         for ax, x, y in ends:
             _name_stops(ax, view, x, y)
-        figure.supxlabel(axis_label(columns[0]), fontsize="medium")
-        figure.supylabel(axis_label(columns[1]), fontsize="medium")
+        figure.supxlabel(style.axis_label(columns[0]), fontsize="medium")
+        figure.supylabel(style.axis_label(columns[1]), fontsize="medium")
         legend(figure, view.line)
         title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
-        return self.finish(figure, _caption(view), numbers, title=title)
+        along = (
+            factor_name(view.over.name) if style.has_lines(view) and view.over is not None else ""
+        )
+        return self.finish(figure, caption("tradeoff", along=along), numbers, title=title)
 
 
 _EDGES = {"mean": "mean", "low": "pointwise_low", "high": "pointwise_high"}
-
-
-def _caption(view: StudyView) -> str:
-    along = ""
-    if has_lines(view) and view.over is not None:
-        along = f", from one {factor_name(view.over.name)} to the next"
-    return (
-        f"Down and to the left is better. Each mark is a configuration, the mean over "
-        f"persons{along}; crosses are 95 % intervals of each mean alone. Times in danger are "
-        "summed over all people."
-    )
 
 
 def _columns(view: StudyView) -> tuple[str, str] | None:
@@ -126,7 +110,7 @@ def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Ban
     x, y = exposure.mean, response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
-    ax.plot(x, y, "-" if has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
+    ax.plot(x, y, "-" if style.has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
 
 
 def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
@@ -135,7 +119,7 @@ def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
         return
     wide, high = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
     named: list[int] = []
-    for stop in (0, len(x) - 1) if has_lines(view) else range(len(x)):
+    for stop in (0, len(x) - 1) if style.has_lines(view) else range(len(x)):
         gaps = [(abs(x[i] - x[stop]) / wide, abs(y[i] - y[stop]) / high) for i in named]
         if any(max(gap) < _NEAR for gap in gaps):
             continue

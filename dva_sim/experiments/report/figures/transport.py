@@ -9,17 +9,9 @@ import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
-from dva_sim.experiments.report.figures.report_figure import ReportFigure
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    log_axis,
-    panels,
-    stops_axis,
-    with_unit,
-)
-from dva_sim.kernel.units import ending_of
+from dva_sim.experiments.report.prose import caption
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,42 +50,25 @@ FELT = (
     ShownMeasure("delay_felt_s", "Delay as the person takes it [s]", is_log=True),
 )
 
-_BROUGHT_CAPTION = (
-    "Mean over persons; bars, where they are longer than the mark, the middle 90 % of persons, who "
-    "meet competitors of different luck. A round trip lasts from a command until the first picture "
-    "taken after it was applied has arrived. The age in force is that of the newest command that "
-    "the robot has, over time. A drive that was not done counts with its horizon."
-)
-_TAKEN_CAPTION = (
-    "With all headers and what is sent again. A dashed line at 1 is an equal share. Jain's index "
-    "is 1 if session and TCP flows have the same rate; a session that wants less than its share "
-    "lowers it without taking anything from anybody. Bars as above."
-)
 
-
-class _Measures(ReportFigure):
+class _Measures(style.ReportFigure):
     """A panel for each of some measures that the runs have."""
 
     pages = ("transport",)
     shown: ClassVar[tuple[ShownMeasure, ...]]
-    caption: ClassVar[str]
 
-    def draw(self, view: StudyView, reading: Reading) -> Drawn | None:
+    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
         there = [each for each in self.shown if view.part.has(each.column)]
         if not there:
             return None
-        rows = (len(there) + 1) // 2
-        figure, grid = panels(rows, 2, 2.3)
-        axes = [ax for row in grid for ax in row]
-        for ax, each in zip(axes, there, strict=False):
+        figure, _, axes = style.places(len(there), 2, 2.3)
+        for ax, each in zip(axes, there, strict=True):
             _panel(ax, view, each)
-        for ax in axes[len(there) :]:
-            ax.set_visible(False)
         for ax in axes[: len(there) - 2]:
             ax.set_xlabel("")
         legend(figure, view.line)
-        return self.finish(figure, self.caption, _numbers(view, there))
+        return self.finish(figure, caption(self.name), _numbers(view, there))
 
 
 class Brought(_Measures):
@@ -102,7 +77,6 @@ class Brought(_Measures):
     name = "brought"
     title = "What each transport brings, and how one drives with it"
     shown = FELT + BROUGHT
-    caption = _BROUGHT_CAPTION
 
 
 class Taken(_Measures):
@@ -111,22 +85,18 @@ class Taken(_Measures):
     name = "taken"
     title = "What each transport takes, and what it leaves to TCP"
     shown = TAKEN
-    caption = _TAKEN_CAPTION
 
 
-def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
+def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> style.Numbers:
     """Means over persons and the middle 90 % of them, in the units of the table of runs."""
-    numbers, panel = Numbers(), view.panels[0]
+    numbers, panel = style.Numbers(), view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in shown}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
         told: dict[str, Floats] = {}
         for name, curve in curves.items():
             persons = person_means(curve)
-            stem = name.removesuffix(f"_{ending_of(name)}")
-            told[name] = nan_mean(persons, axis=0)
-            for end, values in zip(("low", "high"), _middle(persons), strict=True):
-                told[with_unit(f"{stem}_{end}", name)] = values
+            told |= style.with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
         numbers.add(view.setting(panel, level), view.along_x() | told)
     return numbers
 
@@ -138,9 +108,9 @@ def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
         place = WIDTH * ((index + 0.5) / count - 0.5)
         _marks(ax, place, values, look)
     ax.set_title(shown.title, fontweight="normal")
-    stops_axis(ax, view.over)
+    style.stops_axis(ax, view.over)
     if shown.is_log:
-        log_axis(ax)
+        style.log_axis(ax)
     else:
         ax.set_ylim(bottom=0)
     if shown.column.startswith(("share_of_fair", "jain")):
