@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -69,6 +69,28 @@ class Issued(NamedTuple):
     sent: float
     sample_age: float
     captured: float
+
+
+class Accepted(NamedTuple):
+    """A command that a robot accepted, whoever sent it.
+
+    Attributes:
+        robot: Which, by id.
+        source: Who sent it, as the message says.
+        session: As the message says.
+        message_id: Its number.
+        seen_tick: The newest picture's time behind it, by the robot's own clock [ms].
+        arrived: When, as the robot says [s].
+        time: Now [s].
+    """
+
+    robot: str
+    source: str
+    session: int | None
+    message_id: int
+    seen_tick: int | None
+    arrived: float
+    time: float
 
 
 class Applied(NamedTuple):
@@ -195,6 +217,9 @@ class Recorder:
 
     Args:
         keep_traffic: Also keep each message sent, for pictures and recordings.
+
+    Attributes:
+        on_accepted: Told of each command that a robot accepts.
     """
 
     def __init__(self, keep_traffic: bool = False) -> None:
@@ -204,11 +229,11 @@ class Recorder:
         self.violations: Counter[str] = Counter()
         self.drives: list[DriveLog] = []
         self.newest_drive: dict[str, DriveLog] = {}  # of each robot
-        self.newest_command: dict[str, Applied] = {}  # of each robot, whoever's drive it is
         self.views: dict[str, list[TrackPoint]] = defaultdict(list)
         self.traffic: list[Sent] | None = [] if keep_traffic else None
         self.exposure: dict[str, float] = defaultdict(float)
         self._issued: dict[tuple[str, int], Issued] = {}
+        self.on_accepted: Callable[[Accepted], object] = lambda _: None
 
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
         """Add a line to the timeline."""
@@ -248,7 +273,6 @@ class Recorder:
         ages = issued.sample_age, issued.captured
         command = Applied(issued.made, issued.sent, arrived, now, until, *ages)
         drive.applied.append(command)
-        self.newest_command[drive.robot] = command
 
     def drive_ordered(self, drive: DriveLog) -> None:
         """An operator shall drive a robot."""

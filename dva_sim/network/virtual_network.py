@@ -18,6 +18,7 @@ SUBSCRIBE_AGAIN = 1.0  # where a subscription may get lost; assumed [s]
 
 Links = Callable[[str, str], tuple[Link, Link]]
 Traffic = Callable[[float, str, str, int, Any], None]
+Delivered = Callable[[float, str, str, Any], None]
 
 
 class VirtualNetwork:
@@ -28,6 +29,7 @@ class VirtualNetwork:
         links: Gives the link from one node to another, and the one back.
         traffic: Told of each message sent: time [s], from, to, size [B], what.
         connector: Makes the connections.
+        delivered: Told of each request and publication that arrives: time [s], from, to, what.
 
     Attributes:
         dropped: Publications that found the pipe of a subscriber full.
@@ -39,10 +41,12 @@ class VirtualNetwork:
         links: Links,
         traffic: Traffic | None = None,
         connector: Connector | None = None,
+        delivered: Delivered | None = None,
     ) -> None:
         self.clock = clock
         self.links = links
         self.traffic = traffic or (lambda *_: None)
+        self.delivered = delivered or (lambda *_: None)
         self.connector = connector or Connector()
         self.dropped = 0
         self._services: dict[str, Service] = {}
@@ -216,6 +220,7 @@ class VirtualWire(VirtualClient):
             tag, data = payload
             service = network.service(self.peer)
             if service is not None:
+                network.delivered(network.clock.now, self.node, self.peer, data)
                 service(Request(data, lambda reply: self._answer(made, tag, reply)))
 
         made = network.connector.connect(
@@ -275,10 +280,15 @@ class VirtualSubscription(VirtualClient):
 
     def _new_connection(self) -> AnyConnection:
         network = self._network
+
+        def heard(payload: Any) -> None:
+            network.delivered(network.clock.now, self.peer, self.node, payload)
+            self._handler(payload)
+
         return network.connector.connect(
             network.clock,
             network.links(self.node, self.peer),
             self._joined,
-            self._handler,
+            heard,
             publishes=True,
         )

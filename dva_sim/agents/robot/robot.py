@@ -27,7 +27,7 @@ from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import DriveLog
+from dva_sim.kernel.recorder import Accepted, DriveLog
 from dva_sim.network.messaging import Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
@@ -347,13 +347,18 @@ class RobotAgent:
     ) -> None:
         assert isinstance(message.body, m.SetTeleOp)
         self.applied += 1
-        if message.body.seen_tick is not None:
-            self.picture_age = (self.controller.tick(now) - message.body.seen_tick) / 1000
+        tick = message.body.seen_tick
+        if tick is not None:
+            self.picture_age = (self.controller.tick(now) - tick) / 1000
+        number, recorder = message.message_id, self.device.recorder
+        recorder.on_accepted(
+            Accepted(
+                self.device.id_tag, message.source, message.session, number, tick, arrived, now
+            )
+        )
         drive = self._drive_of(self.device.id_tag)
         if drive is not None and set_point is not None:
-            self.device.recorder.command_applied(
-                drive, message.source, message.message_id, arrived, now, set_point.until
-            )
+            recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
     def _move(self, set_point: TimedSetPoint) -> None:
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:

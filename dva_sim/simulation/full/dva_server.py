@@ -37,6 +37,7 @@ class DvaAgent:
         self.events: dict[int, Event] = {}
         self._memory, self._keep_events = memory, keep_events
         self._told: dict[int, State] = {}
+        self._policy_failures = 0
         self._problem: str | None = None
         self.beats: Counter[str] = Counter()
         self._heard: dict[tuple[str, str], tuple[str, Subscription]] = {}
@@ -98,6 +99,7 @@ class DvaAgent:
     def _carry_out(self, sends: list[Send]) -> None:
         """Keep what has changed, then say it: what was said must not be forgotten."""
         self._keep_changes()
+        self._count_failures()
         for send in sends:
             self.device.ask(
                 send.to,
@@ -126,6 +128,16 @@ class DvaAgent:
             if self._keep_events:
                 self.events[event.number] = event
             self._tell(event)
+
+    def _count_failures(self) -> None:
+        """Count what a policy got wrong, and tell of the first time."""
+        failures, known = self.desk.counters["policy failed"], self._policy_failures
+        if failures > known:
+            self.device.recorder.counters["failed: an answer of a policy"] += failures - known
+            self._policy_failures = failures
+            if not known:
+                why = self.desk.dispatcher.last_failure
+                self.device.tell(f"its policy failed, so min_eta decides: {why}", "order")
 
     def _complain(self, problem: str | None) -> None:
         """Say once what goes wrong with the memory; the DVA works on."""

@@ -223,7 +223,7 @@ def _mean_or(instead: float, rows: list[Row], column: str) -> float:
 
 
 def plugin_failures(recording: Recording) -> int:
-    """How often an operator, filter, mapping or drive of a user gave no answer that is one."""
+    """How often a policy, operator, filter, mapping, pattern or drive of a user failed."""
     counted = recording.recorder.counters.items()
     return sum(count for what, count in counted if what.startswith("failed: an answer of "))
 

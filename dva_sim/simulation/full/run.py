@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from typing import Any
 
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
-from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder, TrackPoint
 from dva_sim.network.connections import Connector, Load
@@ -27,8 +28,8 @@ from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
 from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
-from dva_sim.simulation.full.safety_checks import broken_event_rules, broken_rules
-from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.full.safety_checks import SafetyAudit
+from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import Scenario
 
 # Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
@@ -92,7 +93,7 @@ class Run:
     def __init__(self, scenario: Scenario, seed: int, keep_traffic: bool = False) -> None:
         self.scenario, self.clock, self.recorder = scenario, Clock(), Recorder(keep_traffic)
         self.network = VirtualNetwork(
-            self.clock, self._link_between, self.recorder.message_sent, connector_of(scenario)
+            self.clock, self._link_between, self._sent, connector_of(scenario), self._delivered
         )
         self.stage = Stage(scenario, seed, self.network, self.recorder)
         check_partitions(scenario.link.partitions, self.stage.labels.values())
@@ -105,8 +106,18 @@ class Run:
         for number in range(1, scenario.operator.count + 1):
             add_operator(self.stage, number, self.field.truth)
         self.field.schedule_incidents()
+        self.audit = SafetyAudit(
+            self.recorder,
+            limits=scenario.robot,
+            robots=self.field.robots,
+            book=self.dva.desk.book,
+            rules=self.dva.desk.dispatcher.orders.rules,
+            processing=max(
+                (mean_of(robot.processing_s) for robot in self.stage.robots), default=0.0
+            ),
+            dva=DVA,
+        )
         self.dva.start()
-        self._last_mission: dict[str, float] = {}
         self.clock.every(WATCH_PERIOD, self._watch)
         self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
 
@@ -167,6 +178,13 @@ class Run:
 
     # --- the network -------------------------------------------------------------------
 
+    def _sent(self, now: float, source: str, to: str, size: int, payload: Any) -> None:
+        self.recorder.message_sent(now, source, to, size, payload)
+        self.audit.sent(now, source, to, payload)
+
+    def _delivered(self, now: float, source: str, to: str, payload: Any) -> None:
+        self.audit.delivered(now, source, to, payload)
+
     def _make_links(self) -> dict[str, tuple[Link, Link]]:
         """To each robot and back, by its id."""
         links = {}
@@ -214,7 +232,6 @@ class Run:
         """Check the rules that must hold at every moment."""
         now = self.clock.now
         self.field.world.advance_to(now)
-        self._watch_robots(now)
         dangers = self.field.dangers(now)
         for name, who in self.field.people():
             if who.activity == SAFE:
@@ -222,22 +239,7 @@ class Run:
             x, y = who.walking.place
             if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
                 self.recorder.exposure[name] += WATCH_PERIOD
-        deadline = self.scenario.dispatch.rules().escalate_after
-        for rule, what in broken_event_rules(self.dva.desk.book, deadline, now):
-            self.recorder.violated(rule, now, "dva", what)
-
-    def _watch_robots(self, now: float) -> None:
-        recorder = self.recorder
-        for robot in self.field.robots.values():
-            label = robot.device.label
-            if robot.controller.mode is Mode.MISSION:
-                self._last_mission[label] = now
-            drive = recorder.newest_drive.get(robot.device.id_tag)
-            mission = self._last_mission.get(label, 0.0)
-            command = recorder.newest_command.get(robot.device.id_tag)
-            limits = self.scenario.robot
-            for rule, what in broken_rules(robot, drive, command, limits, mission, now):
-                recorder.violated(rule, now, label, what)
+        self.audit.check(now)
 
     def _sample(self) -> None:
         """Note where everybody is who is on the site."""

@@ -1,61 +1,322 @@
-"""Checks of the safety rules from outside: nothing here trusts what a robot says of itself.
+"""An audit of the safety rules from outside: what it can see itself, it believes nobody.
 
-What a robot may do follows from the log of commands with their true times, and from the
-body in the world; a robot that trusts a command too long is found out.
+It listens on the network, so it knows which permissions the DVA really gave, when a robot was told
+that one is over, and when an emergency reached it. It sees the bodies move, and it is told of every
+command that a robot accepted, whoever sent it. `CHECKED` says which rules it holds that against.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
 
+from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.core.events import ACT_STEPS, STEPS, EventBook
-from dva_sim.kernel.recorder import Applied, DriveLog
+from dva_sim.core.assignments import Rules
+from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventBook, State, apart
+from dva_sim.kernel.recorder import Accepted, Recorder
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
 from dva_sim.simulation.scenario import RobotConfig
 from dva_sim.worlds.bodies import G
 
 MOVING = 0.05  # above this a robot is going somewhere [m/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second [s]
+OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
+MOST_KEPT = 1000  # of the newest messages to a robot, and of its sessions
+
+CHECKED: Final = {
+    "S1": "a robot moves by a command that arrived within the watchdog, behind it a picture within "
+    "the age limit; slack: until it can have braked",
+    "S2": "no command acts by a session that is over, no robot changes hands while it moves "
+    f"({MOVING:g} m/s); slack: until it has confirmed the end, {OBEYS_WITHIN:g} s and ten messages",
+    "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
+    "S4": f"speed and turn rate stay within the motors' limits; slack: {SLACK - 1:.0%}, and "
+    f"{MOVING:g} m/s backwards",
+    "S5": "every command, drive, mission and subscription has a permission that the DVA gave; "
+    "no slack",
+    "S6": "every report becomes an event, every event is in one state and the counts agree; none "
+    f"waits, or is in one pair of hands, beyond its limit; slack: {PENDING_SLACK:g} s",
+    "S7": "the times of every event are in order; no slack",
+}
+"""What the audit checks of each rule, at every message and twice a second."""
+CHECKED_IN_SHORT: Final = (
+    f"S1 to S7 checked twice a second; slack {SLACK - 1:.0%} of speed, {PENDING_SLACK:g} s of "
+    f"deadlines, {OBEYS_WITHIN:g} s to obey"
+)
 
 Broken = tuple[str, str]
+_COMMAND = re.compile(  # as everybody here writes them, but any other would do no harm
+    rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>.*<SetTeleOp>", re.DOTALL
+)
+_ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
-def broken_rules(
-    robot: RobotAgent,
-    drive: DriveLog | None,
-    command: Applied | None,
-    config: RobotConfig,
-    last_mission: float,
-    now: float,
-) -> Iterator[Broken]:
-    """Rules that do not hold for a robot now, each with what was seen.
+class Held(NamedTuple):
+    """A permission that the DVA gave: to whom, for what."""
+
+    holder: str
+    level: str
+    sensors: tuple[str, ...]
+
+    def allows(self, level: str) -> bool:
+        """Whether it is for `teleoperation`, or for `missions`."""
+        return self.level in (level, "both")
+
+
+class Request(NamedTuple):
+    """A message that reached a robot, and is not answered yet."""
+
+    message: m.Message
+    at: float
+
+
+@dataclass
+class Witness:
+    """What is known of one robot without asking it; times in [s].
+
+    Attributes:
+        obeys_within: How long it may take to obey a message.
+        sessions: By session: what the DVA gave.
+        over: By session: from when on nobody may act by it.
+        unanswered: By sender and number: what it has not answered yet.
+        arrivals: By sender and number: when the newest commands arrived.
+        stopped: When the newest emergency was obeyed, or should have been.
+        ordered: When the newest order that was accepted had arrived.
+        on_mission: Whether that order was a mission.
+        owner: Who gave it.
+        allowed: Until when its newest command lets it move.
+        offset: What is to be added to its own clock to have the time.
+        last_mission: When it was last seen on a mission.
+    """
+
+    obeys_within: float
+    sessions: OrderedDict[int, Held] = field(default_factory=OrderedDict)
+    over: dict[int, float] = field(default_factory=dict)
+    unanswered: dict[tuple[str, int], Request] = field(default_factory=dict)
+    arrivals: OrderedDict[tuple[str, int], float] = field(default_factory=OrderedDict)
+    stopped: float = -1.0
+    ordered: float = -1.0
+    on_mission: bool = False
+    owner: str | None = None
+    allowed: float = 0.0
+    offset: float | None = None
+    last_mission: float = 0.0
+
+    def permits(self, source: str, session: int | None, level: str, now: float) -> Broken | None:
+        """Why a device must not act, or None."""
+        held = self.sessions.get(session or 0)
+        if held is None or held.holder != source or not held.allows(level):
+            return "S5", f"obeys {source}, who has no permission for {level}"
+        if now > self.over.get(session or 0, now):
+            return "S2", f"obeys {source}, whose session was over"
+        return None
+
+
+class SafetyAudit:
+    """Holds what happens against the rules, and tells the recorder what breaks one.
 
     Args:
-        robot: The robot.
-        drive: Its newest drive, over or not.
-        command: The newest one that took effect; its drive may be over and another ordered.
-        config: Its limits as the scenario states them.
-        last_mission: When it was last seen on a mission, driving by itself [s].
-        now: Time [s].
+        recorder: Told what broke which rule.
+        limits: Of the robots, as the scenario states them.
+        robots: The robots by id; they may come later.
+        book: The DVA's events.
+        rules: Of the DVA.
+        processing: Of a message at a robot, mean [s].
+        dva: Its id.
     """
+
+    def __init__(
+        self,
+        recorder: Recorder,
+        *,
+        limits: RobotConfig,
+        robots: Mapping[str, RobotAgent],
+        book: EventBook,
+        rules: Rules,
+        processing: float,
+        dva: str,
+    ) -> None:
+        self._recorder, self._limits, self._robots = recorder, limits, robots
+        self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
+        self._ledger = EventLedger(book, rules)
+        self._witnesses: dict[str, Witness] = {}
+        recorder.on_accepted = self.accepted
+
+    def witness(self, robot: str) -> Witness:
+        """What is known of a robot."""
+        known = self._witnesses.get(robot)
+        if known is None:
+            known = self._witnesses[robot] = Witness(self._obeys_within)
+        return known
+
+    # --- what is seen on the network -------------------------------------------------------
+
+    def delivered(self, now: float, source: str, to: str, data: Any) -> None:
+        """A message, or a picture, has reached somebody; `source` is who really sent it."""
+        if to in self._robots:
+            self._reaches_robot(now, source, to, data)
+        elif to == self._dva:
+            if b"<EventReport>" in data:
+                self._ledger.asked(_read(data))
+        elif isinstance(data, CameraFrame) and source in self._robots:
+            witness = self.witness(source)
+            if witness.offset is None:
+                witness.offset = data.captured - data.observation.tick / 1000
+
+    def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
+        witness = self.witness(robot)
+        command = _COMMAND.search(data)
+        if command is not None:
+            witness.arrivals.setdefault((command[2].decode(), int(command[1])), now)
+            if len(witness.arrivals) > MOST_KEPT:
+                witness.arrivals.popitem(last=False)
+            return
+        message = _read(data)
+        if message is None:
+            return
+        witness.unanswered.setdefault((message.source, message.message_id), Request(message, now))
+        if source == self._dva and isinstance(message.body, m.PermissionGrant):
+            grant = message.body
+            witness.sessions[grant.session] = Held(grant.holder, grant.level, grant.sensors)
+            if len(witness.sessions) > MOST_KEPT:
+                session, _ = witness.sessions.popitem(last=False)
+                witness.over.pop(session, None)
+
+    def sent(self, now: float, source: str, to: str, data: Any) -> None:
+        """A message has been sent."""
+        if source == self._dva and self._ledger.waits and b"<reply>" in data:
+            self._report(self._ledger.answered(_read(data)), now, "dva")
+        witness = self._witnesses.get(source)
+        if witness is None or not witness.unanswered or not isinstance(data, bytes):
+            return
+        reply = _read(data) if b"<reply>" in data else None
+        if reply is None or not isinstance(reply.body, m.Reply):
+            return
+        asked = witness.unanswered.pop((reply.destination, reply.body.answers), None)
+        if asked is not None:
+            found = self._answered(witness, self._robots[source], asked, reply.body.code, now)
+            self._report(found, now, self._robots[source].device.label)
+
+    def _answered(
+        self, witness: Witness, robot: RobotAgent, asked: Request, code: int, now: float
+    ) -> Iterator[Broken]:
+        """A robot has answered a request, and so has obeyed it or not."""
+        message, body = asked.message, asked.message.body
+        match body:
+            case m.Emergency():
+                witness.stopped = max(witness.stopped, now)
+            case m.PermissionRevocation() if message.source == self._dva:
+                _end(witness, body.session, now)
+            case m.PermissionGrant() if message.source == self._dva and code == m.OK:
+                self._replaced(witness, body, now)
+        if code != m.OK:
+            return
+        if isinstance(body, m.DevSub):
+            held = [h for h in witness.sessions.values() if h.holder == message.source]
+            if not any(body.sensor in h.sensors for h in held):
+                yield "S5", f"lets {message.source} read {body.sensor}"
+        if isinstance(body, _ORDERS):
+            yield from self._ordered(witness, robot, asked, now)
+
+    def _ordered(
+        self, witness: Witness, robot: RobotAgent, asked: Request, now: float
+    ) -> Iterator[Broken]:
+        """A robot has begun to do what somebody asked for."""
+        message = asked.message
+        level = "teleoperation" if isinstance(message.body, m.StartTeleOp) else "missions"
+        broken = witness.permits(message.source, message.session, level, now)
+        if broken is not None:
+            yield broken
+        if asked.at < witness.stopped:
+            if robot.controller.mode is not Mode.IDLE:  # else it repeats what it once said
+                yield "S3", "obeys an order from before the emergency"
+            return
+        another = witness.owner not in (None, message.source)
+        if another and abs(robot.body.speed) > MOVING and not _pushed(robot, now):
+            yield "S2", f"goes over to {message.source} at {robot.body.speed:.2f} m/s"
+        witness.owner, witness.ordered = message.source, asked.at
+        witness.on_mission = level == "missions"
+
+    @staticmethod
+    def _replaced(witness: Witness, grant: m.PermissionGrant, now: float) -> None:
+        """A robot has a new holder: every other session to act on it is over."""
+        if grant.level == "sensors":
+            return
+        for session, held in witness.sessions.items():
+            if session < grant.session and held.level != "sensors":
+                _end(witness, session, now)
+
+    # --- what robots accept ----------------------------------------------------------------
+
+    def accepted(self, command: Accepted) -> None:
+        """A robot has accepted a command to drive, from whomever."""
+        witness, limits = self.witness(command.robot), self._limits
+        found: list[Broken] = []
+        broken = witness.permits(command.source, command.session, "teleoperation", command.time)
+        if broken is not None:
+            found.append(broken)
+        if witness.stopped > max(witness.ordered, -0.5):
+            found.append(("S3", "obeys a command after an emergency, before a new order"))
+        key = command.source, command.message_id
+        arrived = witness.arrivals.pop(key, command.arrived)
+        witness.allowed = arrived + limits.watchdog_s
+        if command.seen_tick is not None and witness.offset is not None:
+            pictured = command.seen_tick / 1000 + witness.offset
+            witness.allowed = min(witness.allowed, pictured + limits.max_age_s)
+        self._report(found, command.time, self._robots[command.robot].device.label)
+
+    # --- twice a second --------------------------------------------------------------------
+
+    def check(self, now: float) -> None:
+        """Hold what is seen now against the rules."""
+        for id_tag, robot in self._robots.items():
+            witness = self.witness(id_tag)
+            self._overdue(witness, robot, now)
+            self._report(broken_by_moving(witness, robot, now), now, robot.device.label)
+        self._report(self._ledger.check(now), now, "dva")
+
+    def _overdue(self, witness: Witness, robot: RobotAgent, now: float) -> None:
+        """What a robot has not answered in time counts as obeyed by then."""
+        if not witness.unanswered:
+            return
+        late = [k for k, v in witness.unanswered.items() if now > v.at + witness.obeys_within]
+        for key in late:
+            message, at = witness.unanswered.pop(key)
+            body, by = message.body, at + witness.obeys_within
+            if isinstance(body, m.Emergency) and robot.body.powered:
+                witness.stopped = max(witness.stopped, by)
+            elif message.source != self._dva:
+                pass
+            elif isinstance(body, m.PermissionRevocation):
+                _end(witness, body.session, by)
+            elif isinstance(body, m.PermissionGrant):
+                self._replaced(witness, body, by)
+
+    def _report(self, found: Iterator[Broken] | list[Broken], now: float, who: str) -> None:
+        for rule, what in found:
+            self._recorder.violated(rule, now, who, what)
+
+
+def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
+    """Rules that the motion of a robot breaks now."""
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
-    mode = robot.controller.mode
-    braking = min(spec.max_deceleration, robot.body.grip * G)
-    stopping = spec.max_speed / braking + 4 * spec.motor_time_constant
-    # What another robot has pushed moves on, until its own brakes have stopped it.
-    pushed = robot.body.last_touch + stopping >= now
-    if mode is not Mode.MISSION and abs(speed) > MOVING and not pushed:
-        allowed = max(_allowed_until(command, config), last_mission)
+    pushed, stopping = _pushed(robot, now), _stopping(robot)
+    if robot.controller.mode is Mode.MISSION and witness.on_mission:
+        witness.last_mission = now
+    if abs(speed) > MOVING and not pushed:
+        allowed = max(witness.allowed, witness.last_mission)
         if now > allowed + stopping:
             yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
-    driven = mode is Mode.TELEOPERATION and robot.body.powered
-    if driven and drive is not None and drive.ended is None:
-        if robot.controller.owner != drive.operator:
-            yield "S2", f"is owned by {robot.controller.owner}, driven by {drive.operator}"
-        if _moved_by_the_past(robot, drive):
-            yield "S3", "obeys a session from before the emergency"
+        if witness.stopped > witness.ordered and now > witness.stopped + stopping:
+            since = now - witness.stopped
+            yield "S3", f"moves at {speed:.2f} m/s, {since:.1f} s after an emergency"
     # Comparisons that a nan fails, too; nobody drives backwards.
     forward = -MOVING <= speed <= spec.max_speed * SLACK
     within = forward and abs(turn_rate) <= spec.max_turn_rate * SLACK
@@ -63,29 +324,107 @@ def broken_rules(
         yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
 
 
-def _allowed_until(command: Applied | None, config: RobotConfig) -> float:
-    """When a command ceases to hold, by its true age and its reception [s]."""
-    if command is None:
-        return 0.0
-    return min(command.arrived + config.watchdog_s, command.issued + config.max_age_s)
+def _stopping(robot: RobotAgent) -> float:
+    """How long it takes a robot to stand from full speed [s]."""
+    spec = robot.body.spec
+    braking = min(spec.max_deceleration, robot.body.grip * G)
+    return spec.max_speed / braking + 4 * spec.motor_time_constant
 
 
-def _moved_by_the_past(robot: RobotAgent, drive: DriveLog) -> bool:
-    emergency = robot.controller.emergency_at
-    if emergency < 0 or not drive.applied or drive.started is None:
-        return False
-    return drive.applied[-1].time > emergency > drive.started
+def _pushed(robot: RobotAgent, now: float) -> bool:
+    """What another robot has pushed moves on, until its own brakes have stopped it."""
+    return robot.body.last_touch + _stopping(robot) >= now
 
 
-def broken_event_rules(book: EventBook, deadline: float, now: float) -> Iterator[Broken]:
-    """Events that wait beyond their deadline [s] or are miscounted (S6), or out of order (S7)."""
-    if sum(book.counts.values()) != book.total:
-        yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
-    for event in (*book.open.values(), *book.closed.values()):
-        waited = now - event.waiting_since
-        if event.waits_for is not None and waited > deadline + PENDING_SLACK:
+def _end(witness: Witness, session: int, when: float) -> None:
+    witness.over[session] = min(when, witness.over.get(session, when))
+
+
+def _read(data: bytes) -> m.Message | None:
+    try:
+        return decode(data)
+    except ProtocolError:
+        return None
+
+
+class EventLedger:
+    """A second book of the events, by what was reported and what the DVA's own book shows.
+
+    Args:
+        book: The DVA's.
+        rules: How long an event may wait, or be in one pair of hands.
+    """
+
+    def __init__(self, book: EventBook, rules: Rules) -> None:
+        self._book, self._rules = book, rules
+        self._asked: dict[tuple[str, int], m.EventReport] = {}
+        self._open: set[int] = set()
+        self._now = 0.0
+
+    @property
+    def waits(self) -> bool:
+        """Whether a report is not answered yet."""
+        return bool(self._asked)
+
+    def asked(self, message: m.Message | None) -> None:
+        """A report is on its way into the book."""
+        if message is None or not isinstance(message.body, m.EventReport):
+            return
+        if message.body.event_id is None and message.body.finding == "detected":
+            self._asked[message.source, message.message_id] = message.body
+            if len(self._asked) > MOST_KEPT:
+                del self._asked[next(iter(self._asked))]
+
+    def answered(self, reply: m.Message | None) -> Iterator[Broken]:
+        """The DVA has taken a report: then there is an event."""
+        if reply is None or not isinstance(reply.body, m.Reply):
+            return
+        report = self._asked.pop((reply.destination, reply.body.answers), None)
+        if report is None or reply.body.code != m.OK:
+            return
+        near, kind = max(self._book.merge_distance, SAME_SPOT), report.kind
+        known = (*self._book.open.values(), *self._book.closed.values())
+        same = (e for e in known if e.kind == kind)
+        if not any(apart(e.position, report.position) < near for e in same):
+            yield "S6", f"a {report.kind} was reported, and is in no book"
+
+    def check(self, now: float) -> Iterator[Broken]:
+        """What is wrong with the book now."""
+        book = self._book
+        if now < self._now:
+            yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
+        self._now = now
+        if sum(book.counts.values()) != book.total:
+            yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
+        for state in (State.PENDING, State.ASSIGNED, State.ON_SCENE):
+            count = sum(e.state is state for e in book.open.values())
+            if count != book.counts[state]:
+                yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
+        for number in book.open.keys() & book.closed.keys():
+            yield "S6", f"event {number} is open and closed"
+        for number in self._open - book.open.keys() - book.closed.keys():
+            yield "S6", f"event {number} was open, and is in no book"
+        self._open = set(book.open)
+        for event in (*book.open.values(), *book.closed.values()):
+            yield from self._of_event(event, now)
+
+    def _of_event(self, event: Event, now: float) -> Iterator[Broken]:
+        waited, rules = now - event.waiting_since, self._rules
+        if event.waits_for is not None and waited > rules.escalate_after + PENDING_SLACK:
             yield "S6", f"event {event.number} is {event.state} after {waited:.0f} s"
+        begun = _taken_in_hand(event)
+        if begun is not None and now - begun > rules.order_limit + PENDING_SLACK:
+            yield "S6", f"event {event.number} is in one pair of hands for {now - begun:.0f} s"
         for steps in (STEPS, ACT_STEPS):
             times = [event.times[step] for step in steps if step in event.times]
             if times != sorted(times):
                 yield "S7", f"times of event {event.number} are out of order"
+
+
+def _taken_in_hand(event: Event) -> float | None:
+    """Since when the same responder has had an event that is not settled [s]."""
+    if event.state in (State.ASSIGNED, State.ON_SCENE):
+        return event.times.get("assigned")
+    if event.open and event.state is State.CONFIRMED and event.actor is not None:
+        return max(event.times.get("act_assigned", 0.0), event.times["confirmed"])
+    return None

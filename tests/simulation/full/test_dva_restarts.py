@@ -11,7 +11,7 @@ from dva_sim.core.store import Store
 from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.safety_checks import broken_event_rules
+from dva_sim.simulation.full.safety_checks import EventLedger
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import build
 
@@ -68,7 +68,8 @@ def test_every_event_is_dealt_with_once_whenever_the_dva_is_killed(
     assert [e.kind for e in killed.events] == ["fire", "gas_leak", "flood"]
     assert [e.state for e in killed.events] == [State.CONTAINED] * 3
     assert sorted(killed.run.field.contained) == [0, 1, 2]
-    assert list(broken_event_rules(killed.dva.desk.book, DEADLINE, HORIZON)) == []
+    desk = killed.dva.desk
+    assert list(EventLedger(desk.book, desk.orders.rules).check(HORIZON)) == []
 
 
 @pytest.mark.invariant("S8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,3 +71,18 @@ def test_a_false_alarm_is_responded_to_and_settled_but_not_confirmed() -> None:
     assert math.isnan(row["confirmation_mean_s"])
     assert not event["is_true"]
     assert row["settled_per_min"] == pytest.approx(60.0 / recording.duration)
+
+
+def test_a_policy_that_raises_is_counted_and_told(tmp_path: Path) -> None:
+    """The default decides instead: without the count a study compared it with itself."""
+    (tmp_path / "mine.py").write_text(
+        "from dva_sim.core.dispatch import Policy\n"
+        "class Mine(Policy):\n"
+        "    def advise(self, situation, rng):\n"
+        "        raise RuntimeError('no idea')\n"
+    )
+    policy = {"dispatch.policy": f"{tmp_path / 'mine.py'}:Mine"}
+    recording = simulate(scenarios.build(scenarios.load("fire-drill"), policy), 3)
+    assert measures.run_row(recording)["plugin_failures"] > 0
+    told = [line.what for line in recording.recorder.timeline if "policy failed" in line.what]
+    assert told == ["its policy failed, so min_eta decides: RuntimeError: no idea"]

@@ -1,0 +1,323 @@
+"""The audit of the safety rules: for each rule a program with a planted bug that breaks it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from dva_sim.agents.robot.controller import Decision, Mode, RobotController, TimedSetPoint
+from dva_sim.core.events import EventBook, State
+from dva_sim.core.orders import Orders
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.safety_checks import CHECKED
+from dva_sim.simulation.full.stage import DVA, id_of
+
+ROBOT, STRANGER = id_of("robot", 1), "02:00:00:09:00:01"
+EARLY = {"horizon_s": 60}
+
+
+def played(**changes: object) -> Run:
+    """A drive to a fire, one minute of it at most."""
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), EARLY | changes), 1)
+    run.run()
+    return run
+
+
+def staged(**changes: object) -> Run:
+    """Everybody in place and nothing to do; the test lets time pass."""
+    quiet = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
+    return Run(scenarios.build(scenarios.load("drive-to-event"), quiet | changes), 1)
+
+
+def ask(run: Run, time: float, body: m.Body, session: int = 5, source: str = DVA) -> None:
+    """Somebody sends the robot a request at a time [s]; the DVA if nobody else is named."""
+    device = run.dva.device if source == DVA else stranger(run)
+    run.clock.call_at(time, lambda: device.ask(ROBOT, body, session=session))
+
+
+def stranger(run: Run) -> Any:
+    """A device that nobody has registered."""
+    device = run.stage.device("operator", 200)
+    device.id_tag = device.outbox.source = STRANGER
+    return device
+
+
+def broken(run: Run) -> set[str]:
+    return set(run.recorder.violations)
+
+
+def test_what_the_audit_checks_is_said_of_every_rule_it_can_find_broken() -> None:
+    assert list(CHECKED) == [f"S{number}" for number in range(1, 8)]
+    assert all("slack" in said for said in CHECKED.values())
+
+
+def test_an_honest_drive_breaks_no_rule() -> None:
+    assert played().recorder.violations == {}
+
+
+@pytest.mark.invariant("S1")
+def test_a_robot_that_does_not_mind_how_old_the_picture_is_breaks_s1(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The phone has just issued the command; the picture behind it is seconds old."""
+    honest = RobotController._set
+
+    def careless(self: RobotController, message: m.Message, body: Any, *args: Any) -> Decision:
+        newest = m.SetTeleOp(body.speed, body.turn_rate, None)
+        return honest(self, message, newest, *args)
+
+    def frozen(run: Run) -> Run:
+        """The camera gives its first picture for ever."""
+        robot = run.field.robots[ROBOT]
+        see, first = robot.observe, []
+
+        def observe() -> Any:
+            first.append(see())
+            return first[0]
+
+        robot.observe = observe  # type: ignore[method-assign]
+        return run
+
+    def drive() -> Run:
+        changes = {"robot.max_age_s": 2.0, "robot.watchdog_s": 30.0, **EARLY}
+        run = frozen(Run(scenarios.build(scenarios.load("drive-to-event"), changes), 1))
+        run.run()
+        return run
+
+    assert broken(drive()) == set()
+    monkeypatch.setattr(RobotController, "_set", careless)
+    assert broken(drive()) == {"S1"}
+
+
+def obeys_anybody(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RobotController, "_refusal", lambda *_: None)
+
+
+@pytest.mark.invariant("S5")
+def test_a_robot_that_obeys_a_stranger_breaks_s5(monkeypatch: pytest.MonkeyPatch) -> None:
+    def attacked() -> Run:
+        run = staged()
+        ask(run, 10.0, m.StartTeleOp(), source=STRANGER)
+        for second in range(11, 20):
+            ask(run, second, m.SetTeleOp(0.3, 0.0), source=STRANGER)
+        run.clock.run(25.0)
+        return run
+
+    assert broken(attacked()) == set()
+    obeys_anybody(monkeypatch)
+    assert "S5" in broken(attacked())
+
+
+@pytest.mark.invariant("S5")
+def test_a_robot_that_lets_anybody_read_its_sensors_breaks_s5(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def read() -> Run:
+        run = staged()
+        ask(run, 10.0, m.DevSub("temperature", 1.0), source=STRANGER)
+        run.clock.run(12.0)
+        return run
+
+    assert broken(read()) == set()
+    monkeypatch.setattr(RobotController, "_subscription", lambda *_: Decision(m.OK))
+    assert broken(read()) == {"S5"}
+
+
+@pytest.mark.invariant("S2")
+def test_a_robot_that_does_not_hear_that_a_session_is_over_breaks_s2(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def revoked() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        ask(run, 15.0, m.PermissionRevocation(ROBOT, DVA, 5))
+        for second in range(12, 40):
+            ask(run, second + 0.5, m.SetTeleOp(0.1, 0.3))
+        run.clock.run(45.0)
+        return run
+
+    assert broken(revoked()) == set()
+    monkeypatch.setattr(RobotController, "_revoked", lambda *_: Decision(m.OK))
+    assert "S2" in broken(revoked())
+
+
+@pytest.mark.invariant("S2")
+def test_a_robot_that_changes_hands_while_it_moves_breaks_s2(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    other = id_of("operator", 1)
+
+    def handed_over() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        for second in range(12, 16):
+            ask(run, second, m.SetTeleOp(0.5, 0.0))
+        ask(run, 15.2, m.PermissionGrant(other, "both", 6))
+        start = m.Message(ROBOT, 9_999, other, "12:00:00", 6, m.StartTeleOp())
+        wire: list[Any] = []
+
+        def begin() -> None:
+            wire.append(run.network.connect(other, ROBOT, lambda *_: None, True))
+            wire[0].send(1, encode(start))
+
+        run.clock.call_at(15.25, begin)
+        run.clock.run(20.0)
+        return run
+
+    assert broken(handed_over()) == set()
+    monkeypatch.setattr(RobotController, "_begin", lambda *_: None)
+    assert "S2" in broken(handed_over())
+
+
+@pytest.mark.invariant("S3")
+@pytest.mark.parametrize("lies", [False, True])
+def test_a_robot_that_drives_on_after_an_emergency_breaks_s3_whatever_it_says(
+    monkeypatch: pytest.MonkeyPatch, lies: bool
+) -> None:
+    def stopped() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        for second in range(12, 40):
+            ask(run, second, m.SetTeleOp(0.1, 0.4))
+        ask(run, 20.5, m.Emergency(), session=0)
+        run.clock.run(45.0)
+        return run
+
+    def deaf(self: RobotController, now: float) -> Decision:
+        self.emergency_at = now if lies else -1.0
+        return Decision(m.OK, "stopped")
+
+    assert broken(stopped()) == set()
+    monkeypatch.setattr(RobotController, "_emergency", deaf)
+    assert "S3" in broken(stopped())
+
+
+@pytest.mark.invariant("S3")
+def test_a_robot_that_moves_by_itself_after_an_emergency_breaks_s3(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its mode says Mission, so that no command is looked for; its body gives it away."""
+    run = staged()
+    ask(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+    goal = m.Position(*run.stage.site.frame.to_latlon(30.0, 12.0))
+    ask(run, 12.0, m.GoTo((goal,)))
+    ask(run, 20.0, m.Emergency(), session=0)
+
+    def deaf(self: RobotController, now: float) -> Decision:
+        self.emergency_at = now
+        return Decision(m.OK, "stopped")
+
+    monkeypatch.setattr(RobotController, "_emergency", deaf)
+    run.clock.run(30.0)
+    assert run.field.robots[ROBOT].controller.mode is Mode.MISSION
+    assert broken(run) == {"S3"}
+
+
+@pytest.mark.invariant("S4")
+def test_motors_that_ignore_their_limit_break_s4(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = staged()
+    run.clock.run(10.0)
+    body = run.field.robots[ROBOT].body
+    body.body.angular_velocity = 2.0
+    run.audit.check(10.0)
+    assert "S4" in broken(run)
+
+
+@pytest.mark.invariant("S6")
+@pytest.mark.parametrize(
+    "lose",
+    [
+        lambda book, event: book.open.pop(event.number),
+        lambda book, event: book.counts.update({State.ASSIGNED: book.counts[State.ASSIGNED] + 1}),
+        lambda book, event: book.closed.update({event.number: event}),
+        lambda book, event: setattr(event, "state", State.ON_SCENE),
+    ],
+    ids=["lost", "counted twice", "open and closed", "in a state nobody counted"],
+)
+def test_a_book_that_loses_or_doubles_an_event_breaks_s6(
+    lose: Callable[[EventBook, Any], object],
+) -> None:
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), EARLY), 1)
+    run.clock.run(10.0)
+    assert broken(run) == set()
+    book = run.dva.desk.book
+    lose(book, next(iter(book.open.values())))
+    run.clock.run(11.0)
+    assert "S6" in broken(run)
+
+
+@pytest.mark.invariant("S6")
+def test_a_report_that_the_dva_thanks_for_and_forgets_breaks_s6(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def forgetful(self: EventBook, *args: Any, **more: Any) -> Any:
+        event = honest(self, *args, **more)
+        del self.open[event.number], self.waiting[event.number]
+        self.total -= 1
+        self.counts[event.state] -= 1
+        return event
+
+    honest = EventBook.add
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), EARLY), 1)
+    monkeypatch.setattr(EventBook, "add", forgetful)
+    run.clock.run(10.0)
+    assert "S6" in broken(run)
+
+
+@pytest.mark.invariant("S6")
+def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+    def kept() -> Run:
+        """The operator says yes, and then nothing."""
+        changes = {"horizon_s": 90, "dispatch.order_limit_s": 20, "link.delay_s": 3.0}
+        return played(**changes)
+
+    assert broken(kept()) == set()
+    monkeypatch.setattr(Orders, "take_back", lambda *_: [])
+    assert "S6" in broken(kept())
+
+
+@pytest.mark.invariant("S7")
+def test_times_out_of_order_break_s7() -> None:
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), EARLY), 1)
+    run.clock.run(10.0)
+    event = next(iter(run.dva.desk.book.open.values()))
+    event.times["assigned"] = event.times["detected"] - 1.0
+    run.clock.run(11.0)
+    assert broken(run) == {"S7"}
+
+
+def test_time_that_runs_back_breaks_s7() -> None:
+    run = staged()
+    run.clock.run(10.0)
+    run.audit.check(9.0)
+    assert broken(run) == {"S7"}
+
+
+def test_a_set_point_that_never_expires_breaks_s1(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A robot is told once to turn on the spot, slowly forward, and never again."""
+
+    def told_once() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        ask(run, 12.0, m.SetTeleOp(0.1, 0.4))
+        run.clock.run(30.0)
+        return run
+
+    honest = RobotController._set
+
+    def trusting(self: RobotController, *args: Any) -> Decision:
+        decision = honest(self, *args)
+        return decision._replace(set_point=TimedSetPoint(0.1, 0.4, 1e6))
+
+    assert broken(told_once()) == set()
+    monkeypatch.setattr(RobotController, "_set", trusting)
+    assert broken(told_once()) == {"S1"}
