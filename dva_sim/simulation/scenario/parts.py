@@ -269,6 +269,8 @@ class DispatchConfig(Config):
         most_waiting: More events than that do not wait: the newest is escalated at once.
         merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
         order_limit_s: Who has not settled an event so long after the order gives it back.
+        depart_within_s: So does who has taken an order up and not set out after this; null: never.
+        still_within_s: And who is on the way and has not moved for so long; null: never.
         bid_within_s: How long an auction takes bids.
     """
 
@@ -282,6 +284,8 @@ class DispatchConfig(Config):
     merge_distance_m: NonNegative = 8.0
     max_attempts: Annotated[int, Field(ge=1)] = 4
     order_limit_s: Positive = 900.0
+    depart_within_s: Positive | None = 300.0
+    still_within_s: Positive | None = 60.0
     bid_within_s: Positive = 2.0
 
     def rules(self) -> Rules:
@@ -294,6 +298,8 @@ class DispatchConfig(Config):
             merge_distance=self.merge_distance_m,
             max_attempts=self.max_attempts,
             order_limit=self.order_limit_s,
+            depart_within=never if self.depart_within_s is None else self.depart_within_s,
+            still_within=never if self.still_within_s is None else self.still_within_s,
             bid_within=self.bid_within_s,
         )
 

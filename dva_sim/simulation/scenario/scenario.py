@@ -46,6 +46,9 @@ from dva_sim.simulation.scenario.parts import (
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.site import load_site, map_site
 
+NEWER = ("pattern_options",), ("dispatch", "depart_within_s", "still_within_s")
+"""Keys that came after results were published: a part, or some keys of one."""
+
 
 class Scenario(Config):
     """Everything one run needs but its seed.
@@ -97,10 +100,15 @@ class Scenario(Config):
 
     @model_serializer(mode="wrap")
     def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Options of a pattern are written only where there are any: a hash stays what it was."""
+        """What is newer is written only where it is not as usual: a hash stays what it was."""
         written: dict[str, Any] = usual(self)
-        if not written.get("pattern_options", True):
-            del written["pattern_options"]
+        for part, *keys in NEWER:
+            inner = written.get(part) if keys else written
+            usually = type(self).model_fields[part].get_default(call_default_factory=True)
+            for key in keys or [part]:
+                value = getattr(usually, key) if keys else usually
+                if isinstance(inner, dict) and key in inner and inner[key] == value:
+                    del inner[key]
         return written
 
     @model_validator(mode="after")
