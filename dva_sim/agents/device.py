@@ -183,7 +183,10 @@ class AgentDevice:
         except ProtocolError as error:
             self.recorder.counters["refused"] += 1
             return self._bad_message(error)
-        body = self._imposture(message, sender) or self._misdirection(message) or handler(message)
+        body = self._imposture(message, sender) or self._misdirection(message)
+        if body is None and isinstance(message.body, m.Reply):
+            body = m.Reply(message.message_id, m.NOT_SUPPORTED, "a reply to nothing")
+        body = body or handler(message)
         if body.code != m.OK:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
         reply = self.reply(message, body)

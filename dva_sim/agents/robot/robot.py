@@ -303,6 +303,8 @@ class RobotAgent:
         decision = self.controller.handle(message, arrived, now, moving)
         if self.trace is not None:
             self.trace.decided(message, arrived, now, moving, decision)
+        if self.controller.doubts.unasked is not None:
+            self._ask_about(self.controller.doubts.unasked)
         if decision.set_point is not None:
             self._move(decision.set_point)
         if decision.code == m.OK:
@@ -318,6 +320,16 @@ class RobotAgent:
         if self.controller.mission_status is not mission:
             self._publish_mission()
         return decision
+
+    def _ask_about(self, device: str) -> None:
+        """Ask the DVA whether it has granted this robot to a device; its answer decides."""
+        me, dva = self.device.id_tag, self.device.dva
+        self.device.recorder.counters["asked the DVA who holds a robot"] += 1
+
+        def answered(reply: m.Reply) -> None:
+            self._decide(m.Message(me, 1, dva, "00:00:00", 0, reply), self.device.clock.now)
+
+        self.device.ask(dva, m.GetGrant(device), answered)
 
     def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
         """What a decision means to others than the motors."""

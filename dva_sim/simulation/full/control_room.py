@@ -22,12 +22,13 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
-from dva_sim.core.sessions import LOW_BITS, Permissions, Sessions
+from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.stage import DVA, Stage, middle_of
 from dva_sim.simulation.scenario import (

@@ -111,6 +111,8 @@ class DvaAgent:
         # Whoever refuses to hear that something is over knows nothing of it: it is over there.
         if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
             self._carry_out(self.desk.delivered(send, self.device.clock.now))
+        elif isinstance(send.body, m.PermissionGrant):
+            self._carry_out(self.desk.refused_grant(send, reply, self.device.clock.now))
         else:
             self._undelivered(send)
 
