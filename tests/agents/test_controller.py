@@ -94,14 +94,14 @@ def test_an_older_command_never_follows_a_newer_one(driven: Bench) -> None:
 
 @pytest.mark.invariant("S2")
 def test_commands_of_others_and_of_old_sessions_never_act(driven: Bench) -> None:
-    assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.NOT_PERMITTED
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), session=6).code == m.BAD_SESSION
 
 
 @pytest.mark.invariant("S2")
 def test_a_new_grant_stops_the_robot_and_fences_the_old_holder(driven: Bench) -> None:
     assert driven.say(DVA, m.PermissionGrant(RUI, "teleoperation", 8)).set_point == STAND
-    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.NOT_PERMITTED
     assert driven.say(RUI, m.StartTeleOp(), session=8, moving=True).code == m.BUSY
     assert driven.say(RUI, m.StartTeleOp(), session=8).code == m.OK
 
@@ -287,7 +287,7 @@ CODES = {
 TABLE = """
 mode message           none     sensors  teleoperation missions both
 I    StartTeleOp       perm I   perm I   ok T          perm I   ok T
-I    SetTeleOp         mode I   mode I   mode I        mode I   mode I
+I    SetTeleOp         perm I   perm I   mode I        perm I   mode I
 I    StopTeleOp        perm I   perm I   ok I          perm I   ok I
 I    begins            perm I   perm I   perm I        ok M     ok M
 I    CancelMission     perm I   perm I   perm I        ok I     ok I
@@ -295,7 +295,7 @@ I    GetMissionStatus  ok I     ok I     ok I          ok I     ok I
 I    GetSensorInfo     ok I     ok I     ok I          ok I     ok I
 I    Emergency         ok I     ok I     ok I          ok I     ok I
 M    StartTeleOp       perm M   perm M   -             perm M   busy M
-M    SetTeleOp         mode M   mode M   -             mode M   mode M
+M    SetTeleOp         perm M   perm M   -             perm M   mode M
 M    StopTeleOp        perm M   perm M   -             perm M   ok M
 M    begins            perm M   perm M   -             busy M   busy M
 M    CancelMission     perm M   perm M   -             ok I     ok I
@@ -303,7 +303,7 @@ M    GetMissionStatus  ok M     ok M     -             ok M     ok M
 M    GetSensorInfo     ok M     ok M     -             ok M     ok M
 M    Emergency         ok I     ok I     -             ok I     ok I
 T    StartTeleOp       perm T   perm T   ok T          -        ok T
-T    SetTeleOp         mode T   mode T   ok T          -        ok T
+T    SetTeleOp         perm T   perm T   ok T          -        ok T
 T    StopTeleOp        perm T   perm T   ok I          -        ok I
 T    begins            perm T   perm T   perm T        -        busy T
 T    CancelMission     perm T   perm T   perm T        -        ok T

@@ -421,11 +421,11 @@ class RobotController:
         return Decision(m.OK, set_point=STAND)
 
     def _set(self, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Decision:
-        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
-            return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
+        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
+            return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
         if message.message_id <= self.last_set_id:
             return Decision(m.OUT_OF_ORDER, "a newer command was received before")
         self.last_set_id = message.message_id

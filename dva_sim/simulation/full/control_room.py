@@ -182,6 +182,7 @@ def add_operator(
     setup = OperatorSetup(
         pattern=stage.pattern,
         window=command.window,
+        heeds=command.heeds,
         rate_hz=command.rate_hz,
         timeout=command_timeout_s(scenario),
         attempts=command.attempts,

@@ -167,6 +167,7 @@ class CommandConfig(Config):
             link's round trip needs.
         attempts: How often it is sent before the link counts as lost.
         window: How many requests may be unanswered at once under `pipelined`.
+        heeds: Whether the app acts on being refused. As the document has it, it does not.
     """
 
     rate_hz: Annotated[
@@ -179,6 +180,7 @@ class CommandConfig(Config):
         int, Field(ge=1, le=10), Key("attempts of a request", stated="attempts")
     ] = 3
     window: Annotated[int, Field(ge=2, le=1000)] = 8
+    heeds: Annotated[bool, Key("whether the app heeds refusals", stated=False)] = True
 
 
 class RequestConfig(Config):
@@ -194,6 +196,23 @@ class RequestConfig(Config):
 
     timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
+
+
+class DisturbanceConfig(Config):
+    """What goes wrong with the first drive, to see how soon its operator knows.
+
+    Attributes:
+        kind: `revoke`: the DVA ends the permission. `take_over`: and gives the robot to another.
+            `refuse`: from then on the robot answers every command with NOT_PERMITTED.
+        after_s: So long after the drive began.
+        holder_told: Whether the word of the DVA reaches who held the robot.
+    """
+
+    kind: Annotated[
+        Literal["none", "revoke", "take_over", "refuse"], Key("disturbance of the drive")
+    ] = "none"
+    after_s: Positive = 10.0
+    holder_told: bool = True
 
 
 class CameraConfig(Config):

@@ -34,6 +34,7 @@ from dva_sim.simulation.scenario.parts import (
     CameraConfig,
     CommandConfig,
     DispatchConfig,
+    DisturbanceConfig,
     EventConfig,
     GuardConfig,
     OperatorConfig,
@@ -46,7 +47,12 @@ from dva_sim.simulation.scenario.parts import (
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.site import load_site, map_site
 
-NEWER = ("pattern_options",), ("dispatch", "depart_within_s", "still_within_s")
+NEWER = (
+    ("pattern_options",),
+    ("dispatch", "depart_within_s", "still_within_s"),
+    ("command", "heeds"),
+    ("disturbance",),
+)
 """Keys that came after results were published: a part, or some keys of one."""
 
 
@@ -87,6 +93,7 @@ class Scenario(Config):
     network_depth: Annotated[Depth, Key("depth of the network model", stated=False)] = "auto"
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()
+    disturbance: DisturbanceConfig = DisturbanceConfig()
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
@@ -103,12 +110,15 @@ class Scenario(Config):
         """What is newer is written only where it is not as usual: a hash stays what it was."""
         written: dict[str, Any] = usual(self)
         for part, *keys in NEWER:
-            inner = written.get(part) if keys else written
-            usually = type(self).model_fields[part].get_default(call_default_factory=True)
-            for key in keys or [part]:
-                value = getattr(usually, key) if keys else usually
-                if isinstance(inner, dict) and key in inner and inner[key] == value:
-                    del inner[key]
+            ours, usually = (
+                getattr(self, part),
+                type(self).model_fields[part].get_default(call_default_factory=True),
+            )
+            if not keys and ours == usually:
+                written.pop(part, None)
+            for key in keys:
+                if part in written and getattr(ours, key) == getattr(usually, key):
+                    written[part].pop(key, None)
         return written
 
     @model_validator(mode="after")
