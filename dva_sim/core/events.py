@@ -151,7 +151,7 @@ class EventBook:
             return None
         limit = self.merge_distance
         every = (e for e in self.open.values() if e.kind == kind)
-        return next((e for e in every if _apart(e.position, position) < limit), None)
+        return next((e for e in every if apart(e.position, position) < limit), None)
 
     def reported_by(self, source: str, kind: str, position: Position) -> list[Event]:
         """The open events that a device reported there and has not taken back."""
@@ -159,7 +159,7 @@ class EventBook:
         return [
             e
             for e in self.open.values()
-            if e.kind == kind and source in e.sources and _apart(e.position, position) < near
+            if e.kind == kind and source in e.sources and apart(e.position, position) < near
         ]
 
     def merge(self, event: Event, severity: float) -> None:
@@ -238,7 +238,7 @@ class EventBook:
             self.closed.popitem(last=False)
 
 
-def _apart(a: Position, b: Position) -> float:
+def apart(a: Position, b: Position) -> float:
     """Distance of two places that are near each other [m]."""
     north = (a.latitude - b.latitude) * DEGREE
     east = (a.longitude - b.longitude) * DEGREE * math.cos(math.radians(a.latitude))

@@ -25,6 +25,7 @@ from dva_sim.kernel.config import (
     validate,
 )
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.patterns import Pattern, load_pattern
@@ -34,6 +35,7 @@ from dva_sim.simulation.scenario.parts import (
     CameraConfig,
     CommandConfig,
     DispatchConfig,
+    DvaConfig,
     EventConfig,
     GuardConfig,
     OperatorConfig,
@@ -87,6 +89,7 @@ class Scenario(Config):
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
+    dva: DvaConfig = DvaConfig()
     patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[
         float,
@@ -97,8 +100,10 @@ class Scenario(Config):
 
     @model_serializer(mode="wrap")
     def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Options of a pattern are written only where there are any: a hash stays what it was."""
+        """What came later is written only where it is used: a hash stays what it was."""
         written: dict[str, Any] = usual(self)
+        if self.dva == DvaConfig():
+            written.pop("dva", None)
         if not written.get("pattern_options", True):
             del written["pattern_options"]
         return written
@@ -109,6 +114,10 @@ class Scenario(Config):
             raise ValueError("robots need an operator: operator.count is 0")
         if not self.robot.count and not self.guard.count:
             raise ValueError("nobody can respond: robot.count and guard.count are 0")
+        operators = {f"operator-{number}" for number in range(1, self.operator.count + 1)}
+        for name in self.dva.supervisors:
+            if ":" not in name and name not in operators:
+                raise ValueError(f"dva.supervisors: {unknown('operator', name, operators)}")
         return self
 
 
