@@ -324,6 +324,30 @@ class Orders:
         within = now - event.waiting_since < self.rules.escalate_after
         return event.state is State.ASSIGNED and within
 
+    def taken_away(self, robot: str, now: float) -> list[Send]:
+        """A robot is another's from now on: others have to look at what it was sent to."""
+        sends: list[Send] = []
+        for event in self.engaged.all(robot):
+            sends += self._called_off(event)
+            if _somebody_looks(event):
+                sends += self._reopen(event, now)
+        return sends
+
+    def confirmed_by_another(self, event: Event, now: float) -> list[Send]:
+        """Somebody who was not sent has confirmed it: nobody need look any more."""
+        sends = self._called_off(event) if _somebody_looks(event) else []
+        return sends + self.found(event, "", "confirmed", now)
+
+    def supersede(self, event: Event, now: float) -> list[Send]:
+        """It is known better as another event: nobody need look there."""
+        return [*self._called_off(event), *self.expire(event, now)]
+
+    def _called_off(self, event: Event) -> list[Send]:
+        """Who looks, or still winds that up, is free; and is told."""
+        holder = event.holder
+        self._release(event)
+        return [Send(holder, m.OrderProgress(event.number, OVER))] if holder else []
+
     def escalate(self, event: Event, now: float) -> list[Send]:
         """Nobody has come in time: others than the DVA's own have to."""
         self.book.move(event, State.ESCALATED, now)

@@ -34,11 +34,13 @@ class Sessions:
         untold: By session: what a robot has not said to have heard yet. Until then it may
             still obey whom it should not.
         changes: How often `untold` has changed.
+        reserved: Robots that are being handed over: held, as far as others are concerned.
     """
 
     permissions: Permissions
     untold: dict[int, Send] = field(default_factory=dict)
     changes: int = 0
+    reserved: set[str] = field(default_factory=set)
     _over: list[Send] = field(default_factory=list)
     _unheard: list[Send] = field(default_factory=list)
 
@@ -67,7 +69,25 @@ class Sessions:
     def is_held(self, robot: str) -> bool:
         """Whether somebody else than the DVA holds a robot."""
         grant = self.permissions.grants.get(robot)
-        return grant is not None and grant.holder != self.permissions.own
+        held = grant is not None and grant.holder != self.permissions.own
+        return held or robot in self.reserved
+
+    def observe(self, robot: str, sensors: tuple[str, ...]) -> Send:
+        """The DVA reads sensors of a robot itself: what to tell the robot."""
+        own = self.permissions.own
+        grant, _ = self.permissions.request(robot, own, "sensors", sensors)
+        assert grant is not None
+        told = m.PermissionGrant(own, grant.level, grant.session, None, sensors)
+        return Send(robot, told, grant.session)
+
+    def observes(self, robot: str) -> int:
+        """The session in which the DVA reads sensors of a robot; 0: it does not."""
+        grant = self.permissions.observers.get((robot, self.permissions.own))
+        return grant.session if grant is not None else 0
+
+    def is_untold(self, robot: str) -> bool:
+        """Whether a robot has not said yet that it knows of the end of a session."""
+        return any(send.to == robot for send in self.untold.values())
 
     def give_back(self, body: m.PermissionRevocation) -> bool:
         """A holder needs its session no longer; False if it has no such session."""

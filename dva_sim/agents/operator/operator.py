@@ -72,6 +72,9 @@ class OperatorAgent:
                 self._on_order(order)
             case m.OrderProgress(event_id=event, state="done"):
                 self._on_recall(event)
+            case m.HandoverRequest(device=robot, label=asker):
+                if not self._gives_up(robot, asker):
+                    return m.Reply(message.message_id, m.BUSY, "at work with it")
             case _:
                 return m.Reply(message.message_id, m.NOT_SUPPORTED, "an operator drives robots")
         return m.Reply(message.message_id, m.OK, "")
@@ -99,6 +102,14 @@ class OperatorAgent:
     def _asked_again(self, work: Work) -> int:
         order, times = self._again
         return times if order is work.order else 0
+
+    def _gives_up(self, robot: str, asker: str) -> bool:
+        """Whether somebody may have a robot: not while it is driven, or watched, to an event."""
+        work = self.works.get(robot)
+        keeps = work is not None and not work.over and work.log.started is not None
+        label = self.device.label_of(robot)
+        self.device.tell(f"{'keeps' if keeps else 'gives up'} {label}: {asker} asks", "order")
+        return not keeps
 
     # --- what there is to do -----------------------------------------------------------
 

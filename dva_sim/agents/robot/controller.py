@@ -214,10 +214,12 @@ class RobotController:
                 return Decision(m.OK, content=self.mission_status)
             case m.TaskAnnouncement() | m.TaskAward():
                 return self._auction(message)
-            case m.GetSensorInfo():
+            case m.GetSensorInfo(device=None):
                 return Decision(m.OK, content=m.SensorInfo(self.camera_url, self.sensors))
             case m.Reply():
                 return self._told_by_dva(body)
+            case m.GetSensorInfo():
+                return Decision(m.UNKNOWN_DEVICE, "ask the DVA for the sensors of others")
             case _:
                 return Decision(m.NOT_SUPPORTED, f"a robot does not take {type(body).__name__}")
 

@@ -6,6 +6,7 @@ from collections import Counter
 from functools import partial
 
 from dva_sim.agents.device import HEARTBEAT, STATUS, AgentDevice
+from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
@@ -95,6 +96,9 @@ class DvaAgent:
         topics = [] if device.device_type == DETECTOR else [HEARTBEAT]
         if device.device_type in (ROBOT, GUARD):
             topics.append(STATUS)
+        if device.device_type == ROBOT:
+            me = self.device.id_tag
+            topics += [sensor_topic(name, me) for name in self.desk.sensing.alarms]
         for topic in topics:
             address, earlier = self._heard.get((source, topic), ("", None))
             if address == device.address:
@@ -110,7 +114,9 @@ class DvaAgent:
         message = self.device.read(data, source)
         if message is not None:
             self.beats[source] += isinstance(message.body, m.Heartbeat)
-            self.desk.note(message, self.device.clock.now)
+            sends = self.desk.note(message, self.device.clock.now)
+            if sends or isinstance(message.body, m.SensorValue):
+                self._carry_out(sends)
 
     def _tick(self) -> None:
         self._carry_out(self.desk.tick(self.device.clock.now))
@@ -130,7 +136,8 @@ class DvaAgent:
     def _answered(self, send: Send, reply: m.Reply) -> None:
         # Whoever refuses to hear that something is over knows nothing of it: it is over there.
         if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
-            self._carry_out(self.desk.delivered(send, self.device.clock.now))
+            now = self.device.clock.now
+            self._carry_out(self.desk.delivered(send, now, reply.content))
         elif isinstance(send.body, m.PermissionGrant):
             self._carry_out(self.desk.refused_grant(send, reply, self.device.clock.now))
         else:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dva_sim.agents.robot.command_queue import ServiceTime
-from dva_sim.agents.robot.sensors import SensorConfig
+from dva_sim.agents.robot.sensors import FASTEST, SLOWEST, SensorConfig
 from dva_sim.core.assignments import Rules
 from dva_sim.core.permissions import LEVELS
 from dva_sim.kernel.config import AlsoCalled, Config, Key
@@ -17,6 +17,7 @@ from dva_sim.worlds.hazards import KINDS, make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+SUPERVISOR = r"^(operator-[1-9][0-9]*|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
 AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says what is wrong with it
 
 
@@ -341,6 +342,20 @@ class AccessConfig(Config):
     sensors: tuple[str, ...] | None = None
     from_s: NonNegative = 0.0
     until_s: Positive | None = None
+
+
+class DvaConfig(Config):
+    """What the DVA does beside giving orders.
+
+    Attributes:
+        sensors: Which sensors of robots it heeds: much of it raises an event, or confirms one.
+        sensor_rate_hz: How often it wants their values.
+        supervisors: Who may take a robot from its holder: labels of operators, or ids.
+    """
+
+    sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()
+    sensor_rate_hz: Annotated[float, Field(ge=SLOWEST, le=FASTEST)] = 1.0
+    supervisors: tuple[Annotated[str, Field(pattern=SUPERVISOR)], ...] = ()
 
 
 class PatrolConfig(Config):

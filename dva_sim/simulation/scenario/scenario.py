@@ -25,6 +25,7 @@ from dva_sim.kernel.config import (
     validate,
 )
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.patterns import Pattern, load_pattern
@@ -35,6 +36,7 @@ from dva_sim.simulation.scenario.parts import (
     CommandConfig,
     DispatchConfig,
     DisturbanceConfig,
+    DvaConfig,
     EventConfig,
     GuardConfig,
     OperatorConfig,
@@ -52,6 +54,7 @@ NEWER = (
     ("dispatch", "depart_within_s", "still_within_s"),
     ("command", "heeds"),
     ("disturbance",),
+    ("dva",),
 )
 """Keys that came after results were published: a part, or some keys of one."""
 
@@ -97,6 +100,7 @@ class Scenario(Config):
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
+    dva: DvaConfig = DvaConfig()
     patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[
         float,
@@ -127,6 +131,10 @@ class Scenario(Config):
             raise ValueError("robots need an operator: operator.count is 0")
         if not self.robot.count and not self.guard.count:
             raise ValueError("nobody can respond: robot.count and guard.count are 0")
+        operators = {f"operator-{number}" for number in range(1, self.operator.count + 1)}
+        for name in self.dva.supervisors:
+            if ":" not in name and name not in operators:
+                raise ValueError(f"dva.supervisors: {unknown('operator', name, operators)}")
         return self
 
 
