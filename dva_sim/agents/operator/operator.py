@@ -17,7 +17,7 @@ from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 
 ASK_LATER = 2.0  # when the robot is held by somebody else [s]
-ASK_AGAIN_MOST = 3  # times for one order, when the robot knows nothing of the permission
+ASK_BEFORE, ASK_AFTER = 3, 1  # how often, for one order: before a drive has begun, and after
 START_TRIES = 20
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
 STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
@@ -97,7 +97,7 @@ class OperatorAgent:
         """Whether an order that a robot refuses is tried once more: the DVA is asked first."""
         times = 1 + self._asked_again(work)
         self._again = work.order, times
-        return times <= ASK_AGAIN_MOST
+        return times <= (ASK_BEFORE if work.log.started is None else ASK_AFTER)
 
     def _asked_again(self, work: Work) -> int:
         order, times = self._again

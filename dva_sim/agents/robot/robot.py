@@ -155,7 +155,7 @@ class MissionLoop:
 
 FRAME = "frame|"  # topic of the camera
 LONGEST_HELD = 1e6  # [s]
-HOLDER_BYTES = 400  # what saying who holds it takes at most
+WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
 STATUS_PERIOD = 1.0  # [s]
 EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
@@ -355,7 +355,7 @@ class RobotAgent:
         network, me, fares = self.device.network, self.device.id_tag, self._fares
         self._told = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
         held = min(self.device.clock.now - self._held_since, LONGEST_HELD)
-        if network.ready(me, HOLDER, HOLDER_BYTES):
+        if network.ready(me, HOLDER, WHATEVER_WAITS):
             self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
 
     def _ask_about(self, device: str) -> None:
