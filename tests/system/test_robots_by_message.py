@@ -191,7 +191,7 @@ def test_a_published_command_to_another_robot_is_counted_and_not_obeyed() -> Non
     run = staged()
     robot = run.field.robots[ROBOT]
     other = m.Message(id_of("robot", 2), 1, DVA, "12:00:00", 5, m.SetTeleOp(0.5, 0.0))
-    robot.inbox.published(encode(other))
+    robot._published(encode(other))
     run.clock.run(1.0)
     assert run.recorder.counters["refused: to another device"] == 1
     assert robot.refused == 0

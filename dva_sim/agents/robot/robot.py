@@ -246,6 +246,7 @@ class RobotAgent:
             self._handle,
             setup.pattern.newest_wins or setup.conflates,
             setup.limit,
+            device.admit,
         )
         self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
@@ -283,26 +284,29 @@ class RobotAgent:
 
     # --- messages ----------------------------------------------------------------------
 
+    def _published(self, data: bytes) -> None:
+        """A command has arrived of the one who drives; what is none takes no time."""
+        message = self.device.read(data, self.controller.owner)
+        if message is None:
+            return
+        if message.destination == self.device.id_tag:
+            self.inbox.published(data, message)
+        else:
+            self.device.recorder.counters["refused: to another device"] += 1
+
     def _handle(self, letter: Letter) -> None:
         """A letter's processing is done."""
-        if self.device.silent:
+        if self.device.silent or letter.message is None:
             return
-        if letter.answer is None:
-            owner = self.controller.owner
-            message = self.device.read(letter.data, owner)
-            if message is None:
-                return
-            if message.destination == self.device.id_tag:
-                self._decide(message, letter.arrived)
-            else:
-                self.device.recorder.counters["refused: to another device"] += 1
+        if letter.request is None:
+            self._decide(letter.message, letter.arrived)
             return
 
         def decide(message: m.Message) -> m.Reply:
             decision = self._decide(message, letter.arrived)
             return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
-        letter.answer(self.device.answer(letter.data, decide, letter.sender))
+        self.device.conclude(letter.request, letter.message, decide)
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
         now = self.device.clock.now
@@ -421,7 +425,7 @@ class RobotAgent:
         if mode is Mode.TELEOPERATION and self._setup.pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
-                me, source, command_topic(me), self.inbox.published
+                me, source, command_topic(me), self._published
             )
         if self.controller.mission is not None:
             self._missions.begin(self.controller.mission, self.device.frame)
