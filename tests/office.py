@@ -13,6 +13,7 @@ from dva_sim.core.dispatch import MinEta, Policy
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.permissions import Access
+from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start
 from dva_sim.protocol import messages as m
@@ -57,8 +58,11 @@ class Office:
         rules: Rules | None = None,
         ground: SiteKnowledge | None = None,
         access: Access | None = None,
+        sensing: Sensing | None = None,
+        supervisors: frozenset[str] = frozenset(),
     ) -> None:
         self.policy, self.ground, self.access = policy or MinEta(), ground, access
+        self.sensing, self.supervisors = sensing, supervisors
         self.rules = rules or Rules(escalate_after=ESCALATE_AFTER)
         self.number = 0
         self.sent: list[Send] = []
@@ -80,6 +84,8 @@ class Office:
             sessions=sessions,
             ground=self.ground,
             access=self.access,
+            sensing=self.sensing,
+            supervisors=self.supervisors,
         )
 
     # --- what devices say --------------------------------------------------------------
@@ -101,8 +107,17 @@ class Office:
         self.sent += sends
         return reply, sends
 
-    def status(self, robot: str, metres: float, now: float = 0.0) -> None:
-        self._publish(robot, m.RobotStatus("Idle", east(metres), 0.0, 0.0, 0.0, 5), now)
+    def status(self, robot: str, metres: float, now: float = 0.0, speed: float = 0.0) -> None:
+        self._publish(robot, m.RobotStatus("Idle", east(metres), 0.0, speed, 0.0, 5), now)
+
+    def shows(self, robot: str, sensor: str, *values: float, now: float = 0.0) -> list[Send]:
+        """A sensor of a robot shows these values, one after the other; what that leads to."""
+        sends: list[Send] = []
+        for value in values:
+            body = m.SensorValue(sensor, (value,), "1", 5)
+            sends += self.desk.note(m.Message(DVA, 1, robot, "12:00:00", 0, body), now)
+        self.sent += sends
+        return sends
 
     def is_in(self, mode: str, now: float = 0.0, robot: str = ROBOT) -> None:
         self._publish(robot, m.RobotStatus(mode, east(10), 0.0, 0.0, 0.0, 5), now)

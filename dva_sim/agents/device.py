@@ -12,11 +12,12 @@ from dva_sim.network.messaging import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.exchange import NOON, Outbox, ReplyCache, key_of
+from dva_sim.protocol.exchange import NOON, Hearing, Nuisances, Outbox, ReplyCache, key_of
 from dva_sim.worlds.geo import GeoFrame
 
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
 STATUS = "status|"
+HOLDER = "holder|"
 HEARTBEAT_PERIOD = 2.0  # [s]
 REGISTER_AGAIN = 2.0  # pause after a registration that was not answered, or refused [s]
 LONGEST_BID = 1e6  # no offer to go somewhere is longer [s]
@@ -71,6 +72,7 @@ class AgentDevice:
     outbox: Outbox = field(init=False)
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
+    _nuisances: Nuisances = field(default_factory=Nuisances)
 
     def __post_init__(self) -> None:
         self.outbox = Outbox(self.id_tag, *self.time_of_day)
@@ -133,7 +135,7 @@ class AgentDevice:
         message = self.outbox.message(peer, body, self.clock.now, session)
 
         def answered(data: bytes) -> None:
-            reply = self._reply_to(message, data)
+            reply = self.reply_to(message, data)
             if reply is None:
                 on_failure()  # what was asked may have been done, but nobody can tell
             else:
@@ -142,7 +144,7 @@ class AgentDevice:
 
         requester.request(encode(message), answered, on_failure)
 
-    def _reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
+    def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
         """The reply in `data`, if it is one, from the device asked, to this very request."""
         said = self.read(data, message.destination)
         if said is None or not isinstance(said.body, m.Reply):
@@ -160,35 +162,61 @@ class AgentDevice:
 
     def serve(self, handler: Handler) -> None:
         """Let `handler` take the requests on the acknowledged channel."""
+        self.network.serve(self.id_tag, lambda request: self.take(request, handler))
 
-        def take(request: Request) -> None:
-            request.answer(self.answer(request.data, handler, request.sender))
-
-        self.network.serve(self.id_tag, take)
-
-    def answer(self, data: bytes, handler: Handler, sender: str | None = None) -> bytes:
-        """The reply to a request as bytes: an error reply to bad bytes, once per request.
-
-        Args:
-            data: The request.
-            handler: Takes it if it is valid and was not answered before.
-            sender: Whose key it came by, if keys are used.
-        """
-        key = key_of(sender, data)
-        known = self._replies.get(key)
+    def take(self, request: Request, handler: Handler) -> None:
+        """Answer a request: by what was answered before, by a refusal, or by `handler`."""
+        known = self._replies.get(key_of(request.sender, request.data))
+        message = self.admit(request) if known is None else None
         if known is not None:
-            return known
+            request.answer(known)
+        elif message is not None:
+            self.conclude(request, message, handler)
+
+    def admit(self, request: Request) -> m.Message | None:
+        """The message of a request, if it is one, and for this device.
+
+        What is none is refused here and now, before it costs anything but reading it; who sends
+        little else is not answered, and then not read (`Nuisances`). What may be an emergency
+        always is.
+        """
+        now, count = self.clock.now, self.recorder.counters
+        hearing = self._nuisances.hearing(request.peer, now)
+        if hearing is Hearing.IGNORED and b"<EmergencyMsg" not in request.data:
+            self._nuisances.bad(request.peer, now)
+            count["refused unread: of a peer that sends no messages"] += 1
+            return None
         try:
-            message = decode(data)
+            message = decode(request.data)
         except ProtocolError as error:
-            self.recorder.counters["refused"] += 1
-            return self._bad_message(error)
-        body = self._imposture(message, sender) or self._misdirection(message) or handler(message)
-        if body.code != m.OK:
-            self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
-        reply = self.reply(message, body)
-        # An emergency acts whenever it comes: a button whose bytes never change must not fail.
-        return reply if urgent(message) else self._replies.put(key, message.source, reply)
+            count["refused"] += 1
+            self._nuisances.bad(request.peer, now)
+            if hearing is Hearing.ANSWERED:
+                request.answer(self._bad_message(error))
+            return None
+        self._nuisances.good(request.peer, now)
+        refusal = self._imposture(message, request.sender) or self._misdirection(message)
+        if refusal is None and isinstance(message.body, m.Reply):
+            refusal = m.Reply(message.message_id, m.NOT_SUPPORTED, "a reply to nothing")
+        if refusal is not None:
+            count[f"refused: {m.CODE_NAMES[refusal.code]}"] += 1
+            request.answer(self.reply(message, refusal))
+            return None
+        return message
+
+    def conclude(self, request: Request, message: m.Message, handler: Handler) -> None:
+        """Let `handler` take a message that was admitted, once, and answer it."""
+        key = key_of(request.sender, request.data)
+        reply = self._replies.get(key)
+        if reply is None:
+            body = handler(message)
+            if body.code != m.OK:
+                self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
+            reply = self.reply(message, body)
+            # An emergency acts whenever it comes: a button whose bytes never change must not fail.
+            if not urgent(message):
+                self._replies.put(key, message.source, reply)
+        request.answer(reply)
 
     def _imposture(self, message: m.Message, sender: str | None) -> m.Reply | None:
         """The refusal of a message that speaks for another device than its key is of.

@@ -247,6 +247,8 @@ class Patrols:
         own = sessions.permissions.own
         if entry is None or not isinstance(body, m.PermissionGrant) or body.holder != own:
             return []
+        if body.level == "sensors":
+            return []
         return [self._round(entry, body.session)]
 
     def _with_a_beat(self, registry: Registry) -> Iterator[DeviceEntry]:

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
-from dva_sim.core.events import EventBook, State
+from dva_sim.core.events import Event, EventBook, State, apart
+from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import GUARD, OPERATOR, ROBOT, DeviceEntry, Registry
+from dva_sim.core.registry import GUARD, OPERATOR, REMOTE, ROBOT, DeviceEntry, Registry
+from dva_sim.core.sensing import (
+    CONFIDENCE,
+    SEVERITY,
+    Sensing,
+    is_no_news,
+    only_felt,
+    within_reach,
+)
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
@@ -37,6 +47,8 @@ class Dva:
         ground: What is known of the place.
         access: Who may ask for what.
         patrols: Which robots go round while nothing happens.
+        sensing: Which sensors of robots the DVA heeds.
+        supervisors: Ids of the devices that may take a robot from its holder.
 
     Attributes:
         registry: Who is there.
@@ -58,11 +70,15 @@ class Dva:
         ground: SiteKnowledge | None = None,
         access: Access | None = None,
         patrols: Patrols | None = None,
+        sensing: Sensing | None = None,
+        supervisors: frozenset[str] = frozenset(),
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
         self.registry, self.book = Registry(), EventBook(rules.merge_distance)
         self.orders = Orders(rules, self.registry, self.book, sessions)
         self.dispatcher = Dispatcher(policy, travel, self.orders, rng, ground or SiteKnowledge())
+        self.sensing = sensing or Sensing()
+        self.handovers = Handovers(self.orders, supervisors)
         self.counters: Counter[str] = self.orders.counters
         self.refused = 0
         self._rules, self._patrols = rules, patrols or Patrols()
@@ -76,22 +92,43 @@ class Dva:
         reply, sends = self._handle(message, now)
         return reply, self._and_revocations(sends)
 
-    def note(self, message: m.Message, now: float) -> None:
-        """Take a published message: heartbeat or status; nobody waits for an answer."""
-        entry = self.registry.heard(message.source, now)
+    def note(self, message: m.Message, now: float) -> list[Send]:
+        """Take a published message; nobody waits for an answer, but it may be one to act on."""
+        entry, body = self.registry.heard(message.source, now), message.body
         if entry is None:
             self.refused += 1
-        elif isinstance(message.body, m.RobotStatus):
-            self.registry.locate(entry, message.body.position)
-            entry.mode = message.body.mode
-        elif isinstance(message.body, m.PersonStatus):
-            self.registry.locate(entry, message.body.position)
+        elif isinstance(body, m.RobotStatus):
+            self.registry.locate(entry, body.position)
+            entry.mode = body.mode
+            self.handovers.seen(message.source, body, now)
+        elif isinstance(body, m.PersonStatus):
+            self.registry.locate(entry, body.position)
+        elif isinstance(body, m.SensorValue) and entry.position is not None:
+            return self._and_revocations(self._felt(message, body, entry.position, now))
+        return []
 
-    def delivered(self, send: Send, now: float) -> list[Send]:
-        """What was sent was answered with OK."""
+    def delivered(self, send: Send, now: float, content: object = None) -> list[Send]:
+        """What was sent was answered with OK, and with this."""
         self.sessions.heard(send)
-        sends = self._patrols.held(send, self.registry, self.sessions)
+        body, sends = send.body, self._patrols.held(send, self.registry, self.sessions)
+        if isinstance(body, m.GetSensorInfo):
+            self.sensing.told(send.to, content, now)
+            sends = self.sensing.renew(self.registry, self.sessions, now)
+        elif isinstance(body, m.HandoverRequest):
+            sends = self.handovers.answered(send, True, now) + self.dispatcher.decide(now)
+        elif isinstance(body, m.PermissionGrant) and body.holder == self.sessions.permissions.own:
+            sends += self.sensing.permitted(send) if body.level == "sensors" else []
         return self._and_revocations(sends + self.orders.taken_up(send))
+
+    def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
+        """A robot did not take a grant; it may have said which session would do."""
+        floor = reply.content
+        if reply.code == m.BAD_SESSION and isinstance(floor, m.SessionFloor):
+            again = self.sessions.above(send, floor.session)
+            if again is not None:
+                self.counters["granted again above"] += 1
+                return self._and_revocations([again])
+        return self.undelivered(send, now)
 
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """What was sent did not arrive, or was declined: take it back."""
@@ -103,6 +140,12 @@ class Dva:
             sends = self.dispatcher.decide(now)
         elif isinstance(body, m.Relocation):
             self.dispatcher.situations.forget_move(send.to)
+        elif isinstance(body, m.GetSensorInfo):
+            self.sensing.told(send.to, None, now)
+        elif isinstance(body, m.DevSub):
+            self.sessions.permissions.end(send.session)  # it may have started anew
+        elif isinstance(body, m.HandoverRequest):
+            sends = self.handovers.answered(send, False, now)
         else:
             self.sessions.undelivered(send)
         return self._and_revocations(sends)
@@ -116,6 +159,8 @@ class Dva:
             self.check_access(now)
         sends += self.orders.take_back(now)
         self.sessions.remind()
+        self.handovers.lapse(now)
+        sends += self.sensing.renew(self.registry, self.sessions, now)
         sends += self.dispatcher.decide(now)
         sends += self._patrols.set_out(self.registry, self.sessions, self.orders.engaged, now)
         return self._and_revocations(sends)
@@ -127,6 +172,7 @@ class Dva:
             self.dispatcher.auctions.next_deadline(),
             self.registry.next_silence(),
             self._access_ends,
+            self.sensing.next_due(),
         )
 
     def go_on(self) -> list[Send]:
@@ -157,8 +203,12 @@ class Dva:
                 return self._permission(message, entry, body, now)
             case m.PermissionRevocation():
                 return self._give_back(message, body)
+            case m.GetGrant():
+                return self._grant_of(message, entry, body)
             case m.GetDeviceList():
                 return self._ok(message, [], m.DeviceList(self._shown()))
+            case m.GetSensorInfo():
+                return self._sensors(message, body)
             case _:
                 name = type(body).__name__
                 return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
@@ -181,11 +231,14 @@ class Dva:
         if entry is None:
             return self._refuse(message, m.BUSY, "the registry is full")
         entry.registrations.append((message.message_id, message.timestamp))
+        if body.device_type == ROBOT:
+            sends = sends + self.sensing.met(message.source)
         return self._ok(message, sends)
 
     def _gone(self, device: str, now: float) -> list[Send]:
         """A device is there no more: what it held is free, what it did is open to others."""
         self.sessions.take_back_all(device)
+        self.sensing.forget(device)
         self.dispatcher.situations.forget_move(device)
         return self.orders.abandon(device, now)
 
@@ -204,24 +257,65 @@ class Dva:
         if body.level == "sensors" and body.sensors and not sensors:
             text = f"{asker.device.label} may read none of these of {robot.device.label}"
             return self._refuse(message, m.NOT_PERMITTED, text)
-        if body.level != "sensors" and self._serves_another(body.device, message.source):
-            return self._refuse(message, m.BUSY, f"robot {body.device} serves another order")
+        if body.level != "sensors":
+            holder = self.handovers.holder(body.device, message.source, now)
+            if holder is not None:
+                return self._held(message, asker.device, body, holder, now)
+            if wait := self.handovers.waits(body.device, message.source):
+                return self._refuse(message, m.BUSY, wait)
         wish = m.PermissionRequest(body.device, body.level, sensors)
         granted = self.sessions.grant(robot.device, asker.device, wish)
         if granted is None:
             return self._refuse(message, m.BUSY, f"robot {body.device} is held by another")
         content, sends = granted
+        if body.level != "sensors":
+            self.handovers.granted(body.device, content.session, now)
         return self._ok(message, sends, content)
 
-    def _serves_another(self, robot: str, asker: str) -> bool:
-        engaged = self.orders.engaged
-        return any(not engaged.is_at(asker, event) for event in engaged.all(robot))
+    def _held(
+        self,
+        message: m.Message,
+        asker: m.Device,
+        body: m.PermissionRequest,
+        holder: m.Holder,
+        now: float,
+    ) -> Reaction:
+        """Somebody else has the robot: who asks is told who, and may ask that one for it."""
+        if body.takeover == "force" and asker.id_tag not in self.handovers.supervisors:
+            text = f"{asker.label} is no supervisor"
+            return self._refuse(message, m.NOT_PERMITTED, text)
+        step, sends = self.handovers.wish(body, asker, holder, now)
+        text = f"held by {holder.label} for {holder.held_for:.0f} s" + (step and f"; {step}")
+        told = holder if body.takeover is not None else None  # 1.3 does not know it
+        sends = sends + self.dispatcher.decide(now) if body.takeover == "force" else sends
+        self.refused += 1
+        return m.Reply(message.message_id, m.BUSY, text, told), sends
+
+    def _sensors(self, message: m.Message, body: m.GetSensorInfo) -> Reaction:
+        """What a robot can show, or all of them; they are asked when somebody first asks."""
+        robot = self.registry.entries.get(body.device or "")
+        if body.device and (robot is None or robot.device.device_type != ROBOT or robot.silent):
+            return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
+        sends = self.sensing.ask_all(self.registry, body.device)
+        content = self.sensing.listed(self.registry, body.device)
+        if content is None:
+            text = "the robots are being asked; ask again"
+            return m.Reply(message.message_id, m.BUSY, text), sends
+        return self._ok(message, sends, content)
 
     def _give_back(self, message: m.Message, body: m.PermissionRevocation) -> Reaction:
         """A holder needs its permission no longer; only its own."""
         if body.holder != message.source or not self.sessions.give_back(body):
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
         return self._ok(message, [])
+
+    def _grant_of(self, message: m.Message, asker: DeviceEntry, body: m.GetGrant) -> Reaction:
+        """What a robot is told when it asks whether it was granted to a device."""
+        grant = self.sessions.permissions.grants.get(message.source)
+        if asker.device.device_type != ROBOT or grant is None or grant.holder != body.holder:
+            return self._refuse(message, m.NOT_PERMITTED, f"{body.holder} holds no such robot")
+        told = m.Permission(body.holder, grant.level, grant.session, grant.address, grant.sensors)
+        return self._ok(message, [], told)
 
     def check_access(self, now: float) -> None:
         """Permissions in use end with the rule that allowed them."""
@@ -257,6 +351,9 @@ class Dva:
         if body.finding == "refuted":
             return self._withdrawal(message, body, now)
         event = self.book.near(body.kind, body.position)
+        sends: list[Send] = []
+        if event is None:
+            event, sends = self._told_better(message.source, body, now)
         if event is None and self.book.full:
             return self._refuse(message, m.BUSY, "so many events are open that no more fit")
         if event is None:
@@ -265,7 +362,48 @@ class Dva:
         else:
             self.book.merge(event, body.severity)
         self.book.note_source(event, message.source, body.confidence)
-        return self._ok(message, self.dispatcher.decide(now))
+        return self._ok(message, sends + self.dispatcher.decide(now))
+
+    def _felt(
+        self, message: m.Message, body: m.SensorValue, place: m.Position, now: float
+    ) -> list[Send]:
+        """What a robot's sensor shows may be an event, or speak for one that is known."""
+        alarm, robot = self.sensing.crossed(message.source, body), message.source
+        if alarm is None:
+            return []
+        event = within_reach(self.book.open.values(), alarm.kind, place)
+        if event is None:
+            if is_no_news(self.book, alarm.kind, place, now):
+                return []
+            self.counters["event raised by a sensor"] += 1
+            report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
+            return self._sighting(replace(message, body=report), report, now)[1]
+        others = event.sources.keys() - {robot}
+        self.book.merge(event, 0.0)
+        self.book.note_source(event, robot, CONFIDENCE)
+        there = apart(event.position, place) < self._rules.merge_distance
+        if not (there and others) or event.state is State.CONFIRMED:
+            return []
+        self.counters["event confirmed by a sensor"] += 1
+        return self.orders.confirmed_by_another(event, now) + self.dispatcher.decide(now)
+
+    def _told_better(
+        self, source: str, body: m.EventReport, now: float
+    ) -> tuple[Event | None, list[Send]]:
+        """Where it is that a robot has felt: who reports that has seen the place.
+
+        The event is moved there, or ends, if somebody is on the way to where it was felt.
+        """
+        felt = (e for e in self.book.open.values() if only_felt(e, self.registry))
+        event = within_reach(felt, body.kind, body.position)
+        if event is None or source in event.sources:
+            return None, []
+        if event.state is State.PENDING:
+            event.position = body.position
+            return event, []
+        if event.state is State.CONFIRMED:
+            return None, []  # people are at it: what was reported may be something else
+        return None, self.orders.supersede(event, now)
 
     def _withdrawal(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
         """What all who reported it have taken back, before anybody was sent, is over."""
@@ -319,7 +457,7 @@ class Dva:
         return tuple(shown)
 
     def _listed(self) -> Iterable[m.Device]:
-        for device_type in (ROBOT, OPERATOR, GUARD):
+        for device_type in (ROBOT, OPERATOR, REMOTE, GUARD):
             for entry in self.registry.of_type(device_type):
                 yield entry.device
 
@@ -327,7 +465,7 @@ class Dva:
     def _ok(
         message: m.Message,
         sends: list[Send],
-        content: m.DeviceList | m.Permission | None = None,
+        content: m.DeviceList | m.Permission | m.SensorList | None = None,
     ) -> Reaction:
         return m.Reply(message.message_id, m.OK, "", content), sends
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from dva_sim.core.registry import OPERATOR
+from dva_sim.core.registry import DRIVERS
 from dva_sim.protocol.messages import Device
 
 Level = Literal["teleoperation", "missions", "both", "sensors"]
@@ -51,7 +51,8 @@ class AccessRule:
 
 @dataclass(frozen=True)
 class Access:
-    """The rules: what no rule allows is refused. Only operators drive, whatever they say.
+    """The rules: what no rule allows is refused. Only `DRIVERS` drive,
+    whatever the rules say.
 
     Attributes:
         rules: Any one that allows something suffices.
@@ -61,7 +62,7 @@ class Access:
 
     def allows(self, holder: Device, robot: Device, level: str, now: float) -> bool:
         """Whether a device may have a level of permission on a robot."""
-        if level != "sensors" and holder.device_type != OPERATOR:
+        if level != "sensors" and holder.device_type not in DRIVERS:
             return False
         wanted = _INCLUDES.get(level, {level})
         rules = (r for r in self.rules if r.is_about(holder, robot, now))

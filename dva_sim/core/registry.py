@@ -10,6 +10,9 @@ from dataclasses import dataclass, field
 from dva_sim.protocol.messages import Device, Position, Registration
 
 ROBOT, GUARD, OPERATOR, DETECTOR = "Robot", "Guard", "TeleOp", "Sensor"
+REMOTE = "Remote Control"  # may drive robots, and is sent no orders
+SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
+DRIVERS = frozenset({OPERATOR, REMOTE, *SAME_AS})
 MAX_DEVICES = 20_000
 
 
@@ -85,7 +88,8 @@ class Registry:
     def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
         device, entry.place = entry.device, len(self.entries)
-        self.entries[device.id_tag] = self._of_type[device.device_type][device.id_tag] = entry
+        kind = SAME_AS.get(device.device_type, device.device_type)
+        self.entries[device.id_tag] = self._of_type[kind][device.id_tag] = entry
         self._heard[device.id_tag] = self._changed[device.id_tag] = entry
         self.version += 1
         return entry

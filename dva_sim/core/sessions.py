@@ -6,10 +6,11 @@ There is one holder at a time, whose session is a fencing token (`Permissions`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import TypeVar
 
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS, is_absurd
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +34,13 @@ class Sessions:
         untold: By session: what a robot has not said to have heard yet. Until then it may
             still obey whom it should not.
         changes: How often `untold` has changed.
+        reserved: Robots that are being handed over: held, as far as others are concerned.
     """
 
     permissions: Permissions
     untold: dict[int, Send] = field(default_factory=dict)
     changes: int = 0
+    reserved: set[str] = field(default_factory=set)
     _over: list[Send] = field(default_factory=list)
     _unheard: list[Send] = field(default_factory=list)
 
@@ -66,7 +69,25 @@ class Sessions:
     def is_held(self, robot: str) -> bool:
         """Whether somebody else than the DVA holds a robot."""
         grant = self.permissions.grants.get(robot)
-        return grant is not None and grant.holder != self.permissions.own
+        held = grant is not None and grant.holder != self.permissions.own
+        return held or robot in self.reserved
+
+    def observe(self, robot: str, sensors: tuple[str, ...]) -> Send:
+        """The DVA reads sensors of a robot itself: what to tell the robot."""
+        own = self.permissions.own
+        grant, _ = self.permissions.request(robot, own, "sensors", sensors)
+        assert grant is not None
+        told = m.PermissionGrant(own, grant.level, grant.session, None, sensors)
+        return Send(robot, told, grant.session)
+
+    def observes(self, robot: str) -> int:
+        """The session in which the DVA reads sensors of a robot; 0: it does not."""
+        grant = self.permissions.observers.get((robot, self.permissions.own))
+        return grant.session if grant is not None else 0
+
+    def is_untold(self, robot: str) -> bool:
+        """Whether a robot has not said yet that it knows of the end of a session."""
+        return any(send.to == robot for send in self.untold.values())
 
     def give_back(self, body: m.PermissionRevocation) -> bool:
         """A holder needs its session no longer; False if it has no such session."""
@@ -110,6 +131,28 @@ class Sessions:
         elif isinstance(body, m.PermissionRevocation) and send.to == body.device:
             self._unheard.append(send)
 
+    def above(self, send: Send, floor: int) -> Send | None:
+        """A robot has refused a grant, and told the highest session it knows: one above that.
+
+        Its holder hears that the first is over, and asks for the new one. None: that grant holds
+        no longer, or no session can be so high; then it is as if it had not arrived.
+        """
+        body, known = send.body, self.permissions
+        grant = known.grants.get(send.to)
+        if not isinstance(body, m.PermissionGrant) or grant is None:
+            return None
+        if grant.session != body.session or is_absurd(floor, known.count << LOW_BITS):
+            return None
+        known.count = max(known.count, floor >> LOW_BITS)
+        grant = known.renew(grant)
+        over = m.PermissionRevocation(send.to, grant.holder, send.session)
+        if grant.holder != known.own:
+            self._over.append(Send(grant.holder, over))
+        again = m.PermissionGrant(
+            grant.holder, grant.level, grant.session, grant.address, grant.sensors
+        )
+        return Send(send.to, again, grant.session)
+
     def heard(self, send: Send) -> None:
         """A robot knows that a session is over."""
         body = send.body
@@ -145,7 +188,6 @@ class Sessions:
 K = TypeVar("K")
 
 MOST_OBSERVERS = 10_000
-LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +261,12 @@ class Permissions:
         else:
             self.grants[robot] = grant
         return grant, grant != held
+
+    def renew(self, grant: Grant) -> Grant:
+        """The same right with a session above all that were handed out."""
+        self.changes += 1
+        renewed = self.grants[grant.robot] = replace(grant, session=self._new_session(False))
+        return renewed
 
     def _new_session(self, only_sensors: bool) -> int:
         """Only the right to drive is fenced by the height of its session."""

@@ -8,7 +8,7 @@ A `Transport` is a set of nodes that can ask each other (request/reply) and tell
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -27,11 +27,13 @@ class Request(NamedTuple):
         data: Its bytes.
         answer: Takes the bytes of the reply; once, now or later.
         sender: Id of the device whose key opened the connection; None without keys.
+        peer: What the connection it came by is known by here; nobody else can use that.
     """
 
     data: bytes
     answer: Answer
     sender: str | None = None
+    peer: Hashable = None
 
 
 Service = Callable[[Request], object]

@@ -371,7 +371,8 @@ class SocketNetwork:
         route, body = frames[:start], frames[start:]
         # Anything but one frame is no message; its empty text is refused as such, and answered.
         data = body[0] if len(body) == 1 else b""
-        service(Request(data, lambda reply: self.send(router, [*route, reply]), sender))
+        # The first frame is what the socket itself calls the connection: nobody can take another's.
+        service(Request(data, lambda reply: self.send(router, [*route, reply]), sender, route[0]))
 
     def send(self, socket: Socket, frames: list[bytes]) -> None:
         """Send without waiting; what does not fit is dropped and counted."""

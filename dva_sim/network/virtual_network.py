@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from dva_sim.kernel.clock import Clock
@@ -221,7 +222,8 @@ class VirtualWire(VirtualClient):
             service = network.service(self.peer)
             if service is not None:
                 network.delivered(network.clock.now, self.node, self.peer, data)
-                service(Request(data, lambda reply: self._answer(made, tag, reply)))
+                answer = partial(self._answer, made, tag)
+                service(Request(data, answer, peer=self.node))
 
         made = network.connector.connect(
             network.clock,

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from collections import OrderedDict, deque
+from collections.abc import Hashable
+from enum import Enum
 from hashlib import blake2b
 
 from dva_sim.protocol.codec import encode, timestamp
 from dva_sim.protocol.messages import Body, Heartbeat, Message
 
 NOON = 43_200.0  # when a run in virtual time begins [s since midnight]
+LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
+A_DAY = 345_600  # sessions: the DVA hands out at most four a second
+
+
+def is_absurd(session: int, known: int) -> bool:
+    """Whether no honest DVA can have come to a session by now.
+
+    It is more than a day ahead of the highest that is known, or leaves no room for another day.
+    Whoever knows none yet (0) cannot tell the former.
+    """
+    count, newest = session >> LOW_BITS, (1 << LOW_BITS) - 1
+    return count > newest - A_DAY or (bool(known) and count > (known >> LOW_BITS) + A_DAY)
 
 
 class Outbox:
@@ -81,3 +95,59 @@ class ReplyCache:
             for key in forgotten:
                 self._replies.pop(key, None)
         return reply
+
+
+class Hearing(Enum):
+    """How a peer is heard: answered, read but not answered, or not even read."""
+
+    ANSWERED = "answered"
+    READ = "read"
+    IGNORED = "ignored"
+
+
+class Nuisances:
+    """Who sends what is no message, and is listened to less and less; pure.
+
+    Each connection has a count of its bad messages that goes down with time, and is halved by
+    each good one. Above `UNANSWERED` nobody tells it any more what was wrong; above `UNREAD` it is
+    not read, but for what may be an emergency, until it has been quiet for a while. What it sends
+    meanwhile is counted like all that is refused.
+    """
+
+    UNANSWERED = 20.0  # bad messages; a program that errs is told of it
+    UNREAD = 100.0
+    MOST = 200.0  # the count goes no higher: who stops is read again 10 s later
+    FORGIVEN = 10.0  # in a second
+    PEERS = 1000  # those longest unheard of are forgotten first
+
+    def __init__(self) -> None:
+        self._counts: OrderedDict[Hashable, tuple[float, float]] = OrderedDict()
+
+    def hearing(self, peer: Hashable, now: float) -> Hearing:
+        """How a peer is heard now [s]."""
+        if not self._counts:
+            return Hearing.ANSWERED
+        count = self._count(peer, now)
+        if count > self.UNREAD:
+            return Hearing.IGNORED
+        return Hearing.READ if count > self.UNANSWERED else Hearing.ANSWERED
+
+    def bad(self, peer: Hashable, now: float) -> None:
+        """It has sent what is no message."""
+        self._counts[peer] = min(self.MOST, self._count(peer, now) + 1.0), now
+        self._counts.move_to_end(peer)
+        if len(self._counts) > self.PEERS:
+            self._counts.popitem(last=False)
+
+    def good(self, peer: Hashable, now: float) -> None:
+        """It has sent a message."""
+        if peer in self._counts:
+            count = self._count(peer, now) / 2
+            if count < 1.0:
+                del self._counts[peer]
+            else:
+                self._counts[peer] = count, now
+
+    def _count(self, peer: Hashable, now: float) -> float:
+        count, when = self._counts.get(peer, (0.0, now))
+        return max(0.0, count - self.FORGIVEN * (now - when))

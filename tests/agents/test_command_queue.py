@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import pytest
 
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
@@ -17,15 +19,16 @@ EMERGENCY = encode(m.Message(ROBOT, 9, ANYBODY, "12:00:00", 0, m.Emergency()))
 class Bench:
     """An inbox that takes 0.05 s for each message."""
 
-    def __init__(self, processing: float = 0.05) -> None:
+    def __init__(self, processing: float = 0.05, read: Any = None) -> None:
         self.clock, self.done = Clock(), list[bytes]()
-        self.inbox = CommandQueue(self.clock, lambda: processing, self._handle, latest_wins=True)
+        service = lambda: processing  # noqa: E731
+        self.inbox = CommandQueue(self.clock, service, self._handle, latest_wins=True, read=read)
 
     def _handle(self, letter: Letter) -> None:
         self.done.append(letter.data)
 
-    def ask(self, data: bytes) -> None:
-        self.inbox.request(Request(data, lambda _: None))
+    def ask(self, data: bytes, peer: str = "") -> None:
+        self.inbox.request(Request(data, lambda _: None, peer=peer))
 
 
 @pytest.mark.parametrize(
@@ -55,3 +58,40 @@ def test_where_processing_takes_no_time_nothing_waits() -> None:
     bench = Bench(processing=0.0)
     bench.ask(b"now")
     assert bench.done == [b"now"]
+
+
+class Noted(NamedTuple):
+    """A message of a peer, as the queue is given it."""
+
+    body: m.Body
+
+
+def test_who_sends_much_waits_for_itself_and_not_the_others() -> None:
+    bench = Bench()
+    for number in range(50):
+        bench.ask(b"<SetTeleOp>flood %d" % number, peer="flood")
+    bench.ask(b"<SetTeleOp>holder", peer="holder")
+    bench.clock.run(0.16)
+    assert bench.done[:3] == [b"<SetTeleOp>flood 0", b"<SetTeleOp>flood 1", b"<SetTeleOp>holder"]
+
+
+def test_a_queue_that_one_peer_has_filled_takes_what_another_sends() -> None:
+    bench = Bench()
+    for number in range(LIMIT + 50):
+        bench.ask(b"<SetTeleOp>%d" % number, peer="flood")
+    dropped = bench.inbox.overflowed
+    bench.ask(b"<SetTeleOp>holder", peer="holder")
+    assert (dropped, bench.inbox.overflowed) == (49, 50)
+    bench.clock.run(0.16)
+    assert b"<SetTeleOp>holder" in bench.done
+
+
+def test_what_is_refused_when_it_arrives_takes_no_time_and_no_place() -> None:
+    read = lambda request: Noted(m.StartTeleOp()) if request.data == b"good" else None  # noqa: E731
+    bench = Bench(read=read)
+    for _ in range(5 * LIMIT):
+        bench.ask(b"bad")
+    bench.ask(b"good")
+    bench.clock.run(0.051)
+    assert bench.done == [b"good"]
+    assert (bench.inbox.longest, bench.inbox.overflowed) == (1, 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import pymunk
 import pytest
@@ -191,7 +192,7 @@ def test_a_published_command_to_another_robot_is_counted_and_not_obeyed() -> Non
     run = staged()
     robot = run.field.robots[ROBOT]
     other = m.Message(id_of("robot", 2), 1, DVA, "12:00:00", 5, m.SetTeleOp(0.5, 0.0))
-    robot.inbox.published(encode(other))
+    robot._published(encode(other))
     run.clock.run(1.0)
     assert run.recorder.counters["refused: to another device"] == 1
     assert robot.refused == 0
@@ -309,3 +310,29 @@ def test_a_frame_is_published_when_it_has_been_encoded_one_at_a_time() -> None:
     (first, _), (last, _) = shown[0], shown[-1]
     # The next frame is taken at the first tick of the camera after the last one was encoded.
     assert (last - first) / (len(shown) - 1) == pytest.approx(0.3, abs=0.001)
+
+
+@pytest.mark.invariant("S11")
+def test_nobody_can_talk_a_robot_to_death() -> None:
+    """Twenty strangers send rubbish, fifty a second each, while the DVA drives the robot."""
+    served: dict[str, list[float]] = {"alone": [], "flooded": []}
+    for name, strangers in (("alone", 0), ("flooded", 20)):
+        run = staged()
+        send(run, 2.0, m.PermissionGrant(DVA, "both", 5))
+        send(run, 3.0, m.StartTeleOp())
+        for number in range(60):
+            begun = 4.0 + 0.1 * number
+            answered = lambda _, t=begun, s=served[name]: s.append(run.clock.now - t)  # noqa: B023,E731
+            ask = partial(run.dva.device.ask, ROBOT, m.SetTeleOp(0.1, 0.3), answered, session=5)
+            run.clock.call_at(begun, ask)
+        for number in range(strangers):
+            wire = run.network.connect(f"stranger-{number}", ROBOT, lambda *_: None, True)
+            for tag in range(500):
+                run.clock.call_at(1.0 + tag / 50, wire.send, tag, b"<msg>rubbish %d</msg>" % tag)
+        run.clock.run(15.0)
+        assert run.field.robots[ROBOT].applied == 60
+    assert max(served["flooded"]) == pytest.approx(max(served["alone"]), abs=0.001)
+    counted = run.recorder.counters
+    unread = counted["refused unread: of a peer that sends no messages"]
+    assert counted["refused"] + unread == 20 * 500
+    assert unread > 5000

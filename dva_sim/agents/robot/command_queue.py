@@ -6,9 +6,9 @@ That time is always the same, or drawn from a distribution.
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from typing import Annotated, Literal, NamedTuple
+from collections import OrderedDict, deque
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,12 @@ from dva_sim.network.messaging import Answer, Request
 from dva_sim.network.zmtp import Flow
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.messages import Emergency
+from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
+
+
+PUBLISHED: Final = object()  # stands for whoever publishes commands: one at a time
 
 
 class Letter(NamedTuple):
@@ -31,14 +34,69 @@ class Letter(NamedTuple):
     Attributes:
         data: Its bytes.
         arrived: When [s].
-        answer: Takes the reply; None if nobody waits for one.
-        sender: Whose key it came by, if keys are used.
+        request: What it came by; None if nobody waits for an answer.
+        message: What it says, where the queue was told how to read it.
     """
 
     data: bytes
     arrived: float
-    answer: Answer | None
-    sender: str | None
+    request: Request | None = None
+    message: Message | None = None
+
+    @property
+    def answer(self) -> Answer | None:
+        """Takes the reply; None if nobody waits for one."""
+        return None if self.request is None else self.request.answer
+
+
+class FairQueue:
+    """First come, first served among peers who wait with one message; else by turns.
+
+    Whoever sends much waits for itself: of a queue that is full, the newest of who has most in it
+    makes room for the others.
+
+    Args:
+        limit: How many messages may wait.
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit, self._length = limit, 0
+        self._peers: OrderedDict[Hashable, deque[Letter]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return self._length
+
+    def put(self, letter: Letter) -> bool:
+        """Take a letter in; False if one was dropped for it, or itself."""
+        peer = PUBLISHED if letter.request is None else letter.request.peer
+        has_room = self._length < self._limit
+        if not has_room:
+            most = max(self._peers, key=lambda one: len(self._peers[one]))
+            if most == peer or len(self._peers[most]) == 1:
+                return False
+            self._peers[most].pop()
+            self._length -= 1
+        self._peers.setdefault(peer, deque()).append(letter)
+        self._length += 1
+        return has_room
+
+    def pop(self) -> Letter:
+        """The next one; who has more waits until all others have had their turn."""
+        peer, letters = self._peers.popitem(last=False)
+        letter = letters.popleft()
+        if letters:
+            self._peers[peer] = letters
+        self._length -= 1
+        return letter
+
+    def forget_published(self) -> int:
+        """Drop what nobody waits to be answered: how many those were."""
+        gone = len(self._peers.pop(PUBLISHED, ()))
+        self._length -= gone
+        return gone
+
+
+Read = Callable[[Request], Message | None]
 
 
 class CommandQueue:
@@ -51,6 +109,8 @@ class CommandQueue:
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
         limit: How many messages of a class may wait.
+        read: Reads what arrives, before it waits: what is None was refused, and takes no time.
+            Without it all is taken as bytes, and only emergencies are read.
 
     Attributes:
         flow: Where published commands come from, if it can be told to wait: then a full inbox
@@ -64,53 +124,47 @@ class CommandQueue:
         handle: Callable[[Letter], object],
         latest_wins: bool,
         limit: int = LIMIT,
+        read: Read | None = None,
     ) -> None:
         self._clock, self._service, self._handle = clock, service, handle
-        self._latest_wins, self._limit = latest_wins, limit
+        self._latest_wins, self._limit, self._read = latest_wins, limit, read
         self.flow: Flow | None = None
         self._paused = False
-        self._emergencies: deque[Letter] = deque()
-        self._control: deque[Letter] = deque()
-        self._commands: deque[Letter] = deque()
+        self._emergencies, self._control = FairQueue(limit), FairQueue(limit)
+        self._commands = FairQueue(limit)
         self._busy = False
         self.longest = self.superseded = self.overflowed = 0
 
     def request(self, request: Request) -> None:
-        """A request has arrived; somebody waits for the answer.
+        """A request has arrived; somebody waits for the answer."""
+        data, message = request.data, None
+        if self._read is not None:
+            message = self._read(request)
+            if message is None:
+                return
+            urgent, moves = isinstance(message.body, Emergency), isinstance(message.body, SetTeleOp)
+        else:
+            urgent = b"<EmergencyMsg" in data and _is_emergency(data)
+            moves = b"<SetTeleOp>" in data
+        queue = self._emergencies if urgent else self._commands if moves else self._control
+        self._put(queue, Letter(data, self._clock.now, request, message))
 
-        Only what calls itself an emergency is validated here, so that nothing else overtakes;
-        the rest is when its turn comes.
-        """
-        data = request.data
-        queue = self._control
-        if b"<EmergencyMsg" in data and _is_emergency(data):
-            queue = self._emergencies
-        elif b"<SetTeleOp>" in data:
-            queue = self._commands
-        self._put(queue, Letter(data, self._clock.now, request.answer, request.sender))
-
-    def published(self, data: bytes) -> None:
-        """A command has arrived that nobody waits to be answered."""
+    def published(self, data: bytes, message: Message | None = None) -> None:
+        """A command has arrived that nobody waits to be answered; who has read it, says so."""
         if self._latest_wins:
             self.superseded += self.forget_published()
-        self._put(self._commands, Letter(data, self._clock.now, None, None))
+        self._put(self._commands, Letter(data, self._clock.now, None, message))
         if self.flow is not None and len(self._commands) >= self._limit:
             self._paused = True
             self.flow.pause()
 
     def forget_published(self) -> int:
         """Drop the published commands that wait: how many those were."""
-        before = len(self._commands)
-        if before:
-            asked = [letter for letter in self._commands if letter.answer is not None]
-            self._commands = deque(asked)
-        return before - len(self._commands)
+        return self._commands.forget_published()
 
-    def _put(self, queue: deque[Letter], letter: Letter) -> None:
-        if len(queue) >= self._limit:
+    def _put(self, queue: FairQueue, letter: Letter) -> None:
+        if not queue.put(letter):
             self.overflowed += 1
-            return
-        queue.append(letter)
         if len(queue) > self.longest:
             self.longest = len(queue)
         if not self._busy:
@@ -120,7 +174,7 @@ class CommandQueue:
         """Take the next letter; where processing takes no time, all of them."""
         while queue := self._emergencies or self._control or self._commands:
             self._busy = True
-            letter = queue.popleft()
+            letter = queue.pop()
             if self._paused:
                 self._take_more()
             duration = self._service()

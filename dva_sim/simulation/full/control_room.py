@@ -22,12 +22,14 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
-from dva_sim.core.sessions import LOW_BITS, Permissions, Sessions
+from dva_sim.core.sensing import Alarm, Sensing
+from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.stage import DVA, Stage, middle_of
 from dva_sim.simulation.scenario import (
@@ -37,6 +39,8 @@ from dva_sim.simulation.scenario import (
     phone_profile,
     population,
 )
+from dva_sim.worlds.hazards import GASES
+from dva_sim.worlds.hazards.detectors import GAS_ALARM, HEAT_ALARM, SMOKE_ALARM
 from dva_sim.worlds.site import FOOTPRINT
 
 
@@ -59,7 +63,7 @@ def add_dva(
     """
     dispatch, draw = stage.scenario.dispatch, stage.streams["dva/sessions"]
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
-    permissions.own = DVA
+    permissions.own, rate_hz = DVA, stage.scenario.dva.sensor_rate_hz
     policy = load_policy(dispatch.policy, dispatch.options)
     desk = Dva(
         policy,
@@ -70,8 +74,25 @@ def add_dva(
         ground=_ground(stage) if policy.relocates else SiteKnowledge(),
         access=_access(stage.scenario),
         patrols=_patrols(stage),
+        sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
+        supervisors=_supervisors(stage),
     )
     return DvaAgent(stage.device("dva", 1), desk, memory, keep_events)
+
+
+_ALARMS = {
+    "temperature": Alarm("fire", HEAT_ALARM),
+    "smoke": Alarm("fire", SMOKE_ALARM),
+    "gas": Alarm("gas_leak", GAS_ALARM * min(gas.lower for gas in GASES.values())),
+}
+"""From where on a sensor of a robot gives the alarm: where a fixed detector would. It cannot tell
+which gas it is: the one that explodes first counts."""
+
+
+def _supervisors(stage: Stage) -> frozenset[str]:
+    """The ids of those whom the scenario calls supervisors, by label or id: keys are of ids."""
+    ids = {label: id_tag for id_tag, label in stage.labels.items()}
+    return frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors)
 
 
 class _Ways:
@@ -181,6 +202,7 @@ def add_operator(
     setup = OperatorSetup(
         pattern=stage.pattern,
         window=command.window,
+        heeds=command.heeds,
         rate_hz=command.rate_hz,
         timeout=command_timeout_s(scenario),
         attempts=command.attempts,

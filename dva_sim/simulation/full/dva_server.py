@@ -6,6 +6,7 @@ from collections import Counter
 from functools import partial
 
 from dva_sim.agents.device import HEARTBEAT, STATUS, AgentDevice
+from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
@@ -58,6 +59,26 @@ class DvaAgent:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""
         self._carry_out(self.desk.close())
 
+    def revoke(self, robot: str, takes: str | None, holder_told: bool) -> None:
+        """End the permission for a robot while it is in use, as a scenario wants.
+
+        Args:
+            robot: Its id.
+            takes: Who has it from then on, if anybody.
+            holder_told: Whether the word of it reaches who held it.
+        """
+        sessions, entries = self.desk.sessions, self.desk.registry.entries
+        grant = sessions.permissions.grants.get(robot)
+        if grant is None:
+            return
+        sessions.revoke(grant)
+        sends = [s for s in sessions.to_tell() if holder_told or s.to != grant.holder]
+        if takes in entries:
+            wish = m.PermissionRequest(robot, grant.level)
+            granted = sessions.grant(entries[robot].device, entries[takes].device, wish)
+            sends += granted[1] if granted is not None else []
+        self._carry_out(sends)
+
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code == m.OK:
@@ -76,6 +97,9 @@ class DvaAgent:
         topics = [] if device.device_type == DETECTOR else [HEARTBEAT]
         if device.device_type in (ROBOT, GUARD):
             topics.append(STATUS)
+        if device.device_type == ROBOT:
+            me = self.device.id_tag
+            topics += [sensor_topic(name, me) for name in self.desk.sensing.alarms]
         for topic in topics:
             address, earlier = self._heard.get((source, topic), ("", None))
             if address == device.address:
@@ -91,7 +115,9 @@ class DvaAgent:
         message = self.device.read(data, source)
         if message is not None:
             self.beats[source] += isinstance(message.body, m.Heartbeat)
-            self.desk.note(message, self.device.clock.now)
+            sends = self.desk.note(message, self.device.clock.now)
+            if sends or isinstance(message.body, m.SensorValue):
+                self._carry_out(sends)
 
     def _tick(self) -> None:
         self._carry_out(self.desk.tick(self.device.clock.now))
@@ -112,7 +138,10 @@ class DvaAgent:
     def _answered(self, send: Send, reply: m.Reply) -> None:
         # Whoever refuses to hear that something is over knows nothing of it: it is over there.
         if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
-            self._carry_out(self.desk.delivered(send, self.device.clock.now))
+            now = self.device.clock.now
+            self._carry_out(self.desk.delivered(send, now, reply.content))
+        elif isinstance(send.body, m.PermissionGrant):
+            self._carry_out(self.desk.refused_grant(send, reply, self.device.clock.now))
         else:
             self._undelivered(send)
 

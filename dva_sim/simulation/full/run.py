@@ -26,6 +26,7 @@ from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.tcp.parameters import HEADERS, MSS
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.disturbance import Disturbance
 from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import SafetyAudit
@@ -117,6 +118,7 @@ class Run:
             ),
             dva=DVA,
         )
+        Disturbance(self.stage, self.dva, self.field)
         self.dva.start()
         self.clock.every(WATCH_PERIOD, self._watch)
         self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)

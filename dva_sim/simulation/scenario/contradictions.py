@@ -187,6 +187,11 @@ def _of_team(scenario: Scenario) -> Iterator[str]:
             "dispatch.containment waits for a guard, and guard.count is 0: no event will be "
             "contained"
         )
+    given = scenario.robot.sensors
+    carried = [given if given is not None else r.sensors for r in robot_profiles(scenario)]
+    sensors = {sensor.name for each in carried for sensor in each}
+    for name in (name for name in scenario.dva.sensors if name not in sensors):
+        yield f"dva.sensors names {name!r}, which no robot carries"
     robots = {f"robot-{number}" for number in range(1, scenario.robot.count + 1)}
     holders = {f"operator-{number}" for number in range(1, scenario.operator.count + 1)} | {"dva"}
     for number, rule in enumerate(scenario.access):

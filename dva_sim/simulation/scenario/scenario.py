@@ -25,6 +25,7 @@ from dva_sim.kernel.config import (
     validate,
 )
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.patterns import Pattern, load_pattern
@@ -34,6 +35,8 @@ from dva_sim.simulation.scenario.parts import (
     CameraConfig,
     CommandConfig,
     DispatchConfig,
+    DisturbanceConfig,
+    DvaConfig,
     EventConfig,
     GuardConfig,
     OperatorConfig,
@@ -44,6 +47,15 @@ from dva_sim.simulation.scenario.parts import (
     SiteConfig,
 )
 from dva_sim.worlds.site import Site, load_site, map_site
+
+NEWER = (
+    ("pattern_options",),
+    ("dispatch", "depart_within_s", "still_within_s"),
+    ("command", "heeds"),
+    ("disturbance",),
+    ("dva",),
+)
+"""Keys that came after results were published: a part, or some keys of one."""
 
 
 class Scenario(Config):
@@ -83,9 +95,11 @@ class Scenario(Config):
     network_depth: Annotated[Depth, Key("depth of the network model", stated=False)] = "auto"
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()
+    disturbance: DisturbanceConfig = DisturbanceConfig()
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
+    dva: DvaConfig = DvaConfig()
     patrols: tuple[PatrolConfig, ...] = ()
     horizon_s: Annotated[
         float,
@@ -96,10 +110,18 @@ class Scenario(Config):
 
     @model_serializer(mode="wrap")
     def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Options of a pattern are written only where there are any: a hash stays what it was."""
+        """What is newer is written only where it is not as usual: a hash stays what it was."""
         written: dict[str, Any] = usual(self)
-        if not written.get("pattern_options", True):
-            del written["pattern_options"]
+        for part, *keys in NEWER:
+            ours, usually = (
+                getattr(self, part),
+                type(self).model_fields[part].get_default(call_default_factory=True),
+            )
+            if not keys and ours == usually:
+                written.pop(part, None)
+            for key in keys:
+                if part in written and getattr(ours, key) == getattr(usually, key):
+                    written[part].pop(key, None)
         return written
 
     @model_validator(mode="after")
@@ -108,6 +130,10 @@ class Scenario(Config):
             raise ValueError("robots need an operator: operator.count is 0")
         if not self.robot.count and not self.guard.count:
             raise ValueError("nobody can respond: robot.count and guard.count are 0")
+        operators = {f"operator-{number}" for number in range(1, self.operator.count + 1)}
+        for name in self.dva.supervisors:
+            if ":" not in name and name not in operators:
+                raise ValueError(f"dva.supervisors: {unknown('operator', name, operators)}")
         return self
 
 

@@ -1,0 +1,163 @@
+"""Handing a robot over: who has it, who asks for it, and when the next one may have it.
+
+A robot changes hands at a standstill (S2): its holder gives it up, or a supervisor takes it; the
+robot is told that the session is over and says that it has heard; it is seen to stand; only then
+is the next session granted. Meanwhile it is nobody else's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from dva_sim.core.orders import Orders
+from dva_sim.core.sessions import Send, Sessions
+from dva_sim.protocol import messages as m
+
+ANSWER_WITHIN = 30.0  # a holder that has not answered so long after it was asked declines [s]
+STOP_WITHIN = 30.0  # a robot that is not seen to stand by then is not handed over [s]
+FETCH_WITHIN = 30.0  # whoever has not come for it by then wants it no longer [s]
+DECLINED_FOR = 10.0  # a holder that has declined is not asked again for so long [s]
+STANDING = 0.02  # [m/s, rad/s]
+LONGEST = 1e6  # no longer time is told [s]
+
+
+class Step(StrEnum):
+    """How a handover stands, in words for who waits for it."""
+
+    ASKED = "who has been asked for it"
+    DECLINED = "who does not give it up"
+    STOPPING = "it is being stopped for you"
+    READY = "it is kept for you"
+
+
+@dataclass
+class Handover:
+    """One robot on its way to another holder, and how long that step may last [s]."""
+
+    asker: str
+    step: Step
+    until: float
+
+
+@dataclass
+class Handovers:
+    """All handovers of the DVA; at most one of each robot.
+
+    Attributes:
+        orders: Who has to do what.
+        supervisors: Ids of the devices that may take a robot from its holder.
+        under_way: By robot.
+    """
+
+    orders: Orders
+    supervisors: frozenset[str] = frozenset()
+    under_way: dict[str, Handover] = field(default_factory=dict)
+    _since: dict[str, tuple[int, float]] = field(default_factory=dict)
+
+    @property
+    def sessions(self) -> Sessions:
+        """Who may act on what."""
+        return self.orders.sessions
+
+    # --- who has it --------------------------------------------------------------------
+
+    def holder(self, robot: str, asker: str, now: float) -> m.Holder | None:
+        """Who holds a robot, serves an order with it, or waits for it, but for the asker."""
+        known = self.under_way.get(robot)
+        if known is not None and robot in self.sessions.reserved and known.asker != asker:
+            return self._named(known.asker, 0.0)
+        grant = self.sessions.permissions.grants.get(robot)
+        if grant is not None and grant.holder not in (asker, self.sessions.permissions.own):
+            return self._named(grant.holder, now - self._noted(robot, grant.session, now))
+        engaged = self.orders.engaged
+        for event in engaged.all(robot):
+            if not engaged.is_at(asker, event):
+                who = event.operator or robot
+                return self._named(who, now - event.times.get("assigned", now))
+        return None
+
+    def _named(self, device: str, held_for: float) -> m.Holder:
+        entry = self.orders.registry.entries.get(device)
+        label = entry.device.label if entry else device
+        return m.Holder(device, label, max(0.0, min(held_for, LONGEST)))
+
+    def _noted(self, robot: str, session: int, now: float) -> float:
+        """Since when a session is known to hold a robot [s]."""
+        if self._since.get(robot, (0, 0.0))[0] != session:
+            self._since[robot] = session, now
+        return self._since[robot][1]
+
+    def granted(self, robot: str, session: int, now: float) -> None:
+        """Somebody has the robot from now on, or still."""
+        self._noted(robot, session, now)
+        self._over(robot)
+
+    # --- how it changes hands ----------------------------------------------------------
+
+    def wish(
+        self, request: m.PermissionRequest, asker: m.Device, holder: m.Holder, now: float
+    ) -> tuple[str, list[Send]]:
+        """Somebody wants what another holds: how that stands, in words, and what to send."""
+        robot = request.device
+        known = self.under_way.get(robot)
+        if request.takeover == "force":
+            return Step.STOPPING, self._stop(robot, asker.id_tag, now)
+        if request.takeover != "ask":
+            return "", []
+        if known is not None:
+            return known.step if known.asker == asker.id_tag else "another waits for it", []
+        self.under_way[robot] = Handover(asker.id_tag, Step.ASKED, now + ANSWER_WITHIN)
+        ask = m.HandoverRequest(robot, asker.id_tag, asker.label)
+        return Step.ASKED, [Send(holder.holder, ask)]
+
+    def waits(self, robot: str, asker: str) -> str | None:
+        """Why who asks for a robot that is kept for it has to wait, or None."""
+        known = self.under_way.get(robot)
+        if known is None or known.asker != asker or known.step is not Step.STOPPING:
+            return None
+        return Step.STOPPING
+
+    def answered(self, send: Send, gives: bool, now: float) -> list[Send]:
+        """A holder gives its robot up, or does not."""
+        body = send.body
+        assert isinstance(body, m.HandoverRequest)
+        known = self.under_way.get(body.device)
+        if known is None or known.step is not Step.ASKED or known.asker != body.holder:
+            return []
+        holder = self.holder(body.device, known.asker, now)
+        if gives and holder is not None and holder.holder == send.to:
+            return self._stop(body.device, known.asker, now)
+        known.step, known.until = Step.DECLINED, now + DECLINED_FOR
+        return []
+
+    def _stop(self, robot: str, asker: str, now: float) -> list[Send]:
+        """Nobody may drive it any more; what it was to look at is open to others."""
+        self.under_way[robot] = Handover(asker, Step.STOPPING, now + STOP_WITHIN)
+        self.sessions.reserved.add(robot)
+        sends = self.orders.taken_away(robot, now)
+        grant = self.sessions.permissions.grants.get(robot)
+        if grant is not None:
+            self.sessions.revoke(grant)
+        return sends
+
+    def seen(self, robot: str, status: m.RobotStatus, now: float) -> None:
+        """A robot says how it is: it may stand by now, and know that its session is over."""
+        known = self.under_way.get(robot)
+        if known is None or known.step is not Step.STOPPING or self.sessions.is_untold(robot):
+            return
+        still = max(abs(status.speed), abs(status.turn_rate)) <= STANDING
+        if still and status.mode == "Idle":
+            known.step, known.until = Step.READY, now + FETCH_WITHIN
+
+    def lapse(self, now: float) -> None:
+        """End what lasts too long, and what nobody is there for."""
+        entries = self.orders.registry.entries
+        for robot, known in list(self.under_way.items()):
+            asker = entries.get(known.asker)
+            if known.until <= now or asker is None or asker.silent:
+                self._over(robot)
+
+    def _over(self, robot: str) -> None:
+        self.under_way.pop(robot, None)
+        self.sessions.reserved.discard(robot)

@@ -1,0 +1,199 @@
+"""What robots can measure, and what the DVA makes of it.
+
+The DVA asks a robot for its sensors once somebody wants to know. Where it was told to heed some of
+them it reads them as any other subscriber does, by a permission of its own, and looks for values
+that stand above a threshold several times in a row.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from dva_sim.core.events import Event, EventBook, State, apart
+from dva_sim.core.registry import ROBOT, Registry
+from dva_sim.core.sessions import Send, Sessions
+from dva_sim.protocol import messages as m
+
+RENEW = 20.0  # a subscription ends at the robot after 60 s unless it is renewed [s]
+IN_A_ROW = 3  # values above a threshold: one alone may be noise; assumed
+REACH = 20.0  # what a robot feels has its source within so many metres [m]; assumed
+CONFIDENCE = 0.6  # of what a robot's sensor says alone; assumed
+SEVERITY = 0.5  # as of what a person reports who has not seen the source
+NO_NEWS = 600.0  # what was settled there so lately is not reported anew [s]; assumed
+
+LIST_BYTES = 7000  # of a list, the rest of the message apart [B]
+LINE_BYTES, SENSOR_BYTES = 80, 55  # markup of a device and of a sensor, at most [B]
+MOST_LISTED = 64
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """What it means when a sensor shows much.
+
+    Attributes:
+        kind: Of the event that it speaks for: `fire`, `gas_leak` or `flood`.
+        threshold: From here on, in the unit of the sensor.
+    """
+
+    kind: str
+    threshold: float
+
+
+@dataclass
+class Sensing:
+    """What is known of the robots' sensors, and which of their values the DVA heeds.
+
+    Attributes:
+        alarms: What it heeds, by the name of the sensor.
+        rate_hz: How often it wants each value [Hz].
+        known: What robots have said that they have.
+    """
+
+    alarms: Mapping[str, Alarm] = field(default_factory=dict)
+    rate_hz: float = 1.0
+    known: dict[str, m.SensorInfo] = field(default_factory=dict)
+    _asked: set[str] = field(default_factory=set)
+    _mute: set[str] = field(default_factory=set)
+    _due: dict[str, float] = field(default_factory=dict)
+    _above: dict[tuple[str, str], int] = field(default_factory=dict)
+    _wanted: bool = False
+
+    # --- which sensors there are -------------------------------------------------------
+
+    def met(self, robot: str) -> list[Send]:
+        """A robot has registered: it is asked for its sensors if anybody cares."""
+        if not (self._wanted or self.alarms) or robot in self.known or robot in self._asked:
+            return []
+        self._asked.add(robot)
+        return [Send(robot, m.GetSensorInfo())]
+
+    def forget(self, robot: str) -> None:
+        """A robot is gone, or has started anew: it may have other sensors by now."""
+        self.known.pop(robot, None)
+        self._due.pop(robot, None)
+        self._asked.discard(robot)
+        self._mute.discard(robot)
+        for key in [key for key in self._above if key[0] == robot]:
+            del self._above[key]
+
+    def told(self, robot: str, content: object, now: float) -> None:
+        """A robot has answered, or not."""
+        self._asked.discard(robot)
+        if not isinstance(content, m.SensorInfo):
+            self._mute.add(robot)
+            return
+        self._mute.discard(robot)
+        self.known[robot] = content
+        if self._heeded(robot):
+            self._due[robot] = now
+
+    def ask_all(self, registry: Registry, robot: str | None) -> list[Send]:
+        """Somebody asks for sensors, of one robot or of all: from now on everyone is asked."""
+        self._wanted = True
+        self._mute.discard(robot or "")
+        robots = (entry.device.id_tag for entry in registry.of_type(ROBOT))
+        return [send for one in robots if one not in self._mute for send in self.met(one)]
+
+    def listed(self, registry: Registry, robot: str | None) -> m.SensorList | None:
+        """The list, as much of it as fits into a message; None while a robot is being asked."""
+        robots = [entry.device.id_tag for entry in registry.of_type(ROBOT)]
+        wanted = [one for one in robots if robot in (None, one)]
+        if not self._asked.isdisjoint(wanted):
+            return None
+        lines, room = list[m.DeviceSensors](), LIST_BYTES
+        for one in (one for one in wanted if one in self.known):
+            line, taken = _line(one, self.known[one], room)
+            if line is None or len(lines) == MOST_LISTED:
+                break
+            lines.append(line)
+            room -= taken
+        return m.SensorList(tuple(lines))
+
+    # --- reading them ------------------------------------------------------------------
+
+    def renew(self, registry: Registry, sessions: Sessions, now: float) -> list[Send]:
+        """What to tell robots so that their values come, and go on coming."""
+        sends: list[Send] = []
+        for robot in [robot for robot, due in self._due.items() if due <= now]:
+            self._due[robot] = now + RENEW
+            entry = registry.entries.get(robot)
+            if entry is not None and not entry.silent:
+                held = sessions.observes(robot)
+                wishes = self._wishes(robot, held) if held else []
+                sends += wishes or [sessions.observe(robot, self._heeded(robot))]
+        return sends
+
+    def permitted(self, send: Send) -> list[Send]:
+        """A robot has heard that the DVA may read its sensors."""
+        return self._wishes(send.to, send.session) if send.to in self._due else []
+
+    def next_due(self) -> float:
+        """When `renew` has something to do [s]."""
+        return min(self._due.values(), default=math.inf)
+
+    def crossed(self, robot: str, value: m.SensorValue) -> Alarm | None:
+        """The alarm that a value gives: once, until the sensor has shown less again."""
+        alarm = self.alarms.get(value.sensor)
+        if alarm is None:
+            return None
+        key = robot, value.sensor
+        if max(value.values) < alarm.threshold:
+            self._above.pop(key, None)
+            return None
+        self._above[key] = self._above.get(key, 0) + 1
+        return alarm if self._above[key] == IN_A_ROW else None
+
+    def _heeded(self, robot: str) -> tuple[str, ...]:
+        return tuple(s.name for s in self.known[robot].sensors if s.name in self.alarms)
+
+    def _wishes(self, robot: str, session: int) -> list[Send]:
+        names = self._heeded(robot)
+        return [Send(robot, m.DevSub(name, self.rate_hz), session) for name in names]
+
+
+def _line(robot: str, info: m.SensorInfo, room: int) -> tuple[m.DeviceSensors | None, int]:
+    """What a robot has, as far as there is room, and how much of it that takes [B]."""
+    taken = LINE_BYTES + _size(info.camera_url)
+    if taken > room:
+        return None, 0
+    sensors: list[m.Sensor] = []
+    for sensor in info.sensors:
+        taken += SENSOR_BYTES + _size(sensor.name) + _size(sensor.unit)
+        if taken > room:
+            break
+        sensors.append(sensor)
+    return m.DeviceSensors(robot, info.camera_url, tuple(sensors)), taken
+
+
+def _size(text: str) -> int:
+    """Room for a text in XML, where a few signs take four bytes more [B]."""
+    return len(text.encode()) + 4 * sum(text.count(sign) for sign in "&<>")
+
+
+# --- which event it is ---------------------------------------------------------------------
+
+
+def within_reach(events: Iterable[Event], kind: str, place: m.Position) -> Event | None:
+    """The nearest event that can be felt at a place."""
+    near = [(apart(e.position, place), e.number, e) for e in events if e.kind == kind]
+    found = min((entry for entry in near if entry[0] < REACH), default=None)
+    return found[2] if found else None
+
+
+def is_no_news(book: EventBook, kind: str, place: m.Position, now: float) -> bool:
+    """Whether people have found something of the kind near there lately, or were called to it."""
+    lately = (
+        e for e in book.closed.values() if e.state in _FOUND and now - e.times["closed"] < NO_NEWS
+    )
+    return within_reach(lately, kind, place) is not None
+
+
+_FOUND = frozenset({State.CONFIRMED, State.CONTAINED, State.ESCALATED})
+
+
+def only_felt(event: Event, registry: Registry) -> bool:
+    """Whether nobody but sensors of robots speaks for an event: its place is not known well."""
+    types = {e.device.device_type for s in event.sources if (e := registry.entries.get(s))}
+    return types == {ROBOT}
