@@ -160,6 +160,19 @@ def test_a_late_yes_takes_nothing_from_the_next_holder(office: Office) -> None:
     assert office.desk.sessions.permissions.grants[ROBOT].holder == third
 
 
+def test_a_late_yes_takes_nothing_from_who_was_sent_with_it_meanwhile(office: Office) -> None:
+    third = "02:00:00:03:00:03"
+    office.register(third, "TeleOp")
+    over = hold(office)
+    asked = ask(office)[1]
+    office.say(OPERATOR, over)
+    office.busy(GUARD, OPERATOR)
+    office.fire(12, now=1.0)
+    assert office.event().operator == third
+    assert office.ok(asked, 2.0) == []
+    assert office.event().operator == third
+
+
 # --- forced ------------------------------------------------------------------------------------
 
 
