@@ -163,6 +163,7 @@ class Dva:
             self.registry.next_silence(),
             self._access_ends,
             self.sensing.next_due(),
+            self.handovers.next_deadline(),
         )
 
     def go_on(self) -> list[Send]:

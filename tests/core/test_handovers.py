@@ -82,6 +82,7 @@ def test_a_robot_is_handed_over_through_standstill_and_a_confirmed_end(office: O
     assert isinstance(reply.content, m.Permission)
     assert reply.content.session > over.session
     assert [type(send.body) for send in sends] == [m.PermissionGrant]
+    assert office.desk.counters["robot handed over"] == 1
     assert ask(office, OPERATOR, "no", 8.5)[0].content == m.Holder(
         OTHER_OPERATOR, "remote control", 2.0
     )
@@ -136,6 +137,7 @@ def test_a_handover_that_leads_nowhere_ends(office: Office, told: bool, waited: 
     sends = ask(office)[1]
     if told:
         office.ok(sends)
+    assert office.desk.next_deadline() <= waited
     office.tick(waited)
     assert office.desk.handovers.under_way == {}
     assert office.desk.sessions.reserved == set()

@@ -16,13 +16,13 @@ from office import (
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
-from dva_sim.core.sensing import IN_A_ROW, NO_NEWS, REACH, RENEW, Alarm, Sensing
+from dva_sim.core.sensing import IN_A_ROW, NO_NEWS, REACH, RENEW, Sensing, SensorAlarm
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.protocol.schema import MAX_BYTES
 
-ALARMS = {"smoke": Alarm("fire", 0.3), "gas": Alarm("gas_leak", 0.002)}
+ALARMS = {"smoke": SensorAlarm("fire", 0.3), "gas": SensorAlarm("gas_leak", 0.002)}
 CARRIED = m.SensorInfo("http://robot/camera", (m.Sensor("smoke", "1/m"), m.Sensor("water", "m")))
 ASK = Send(ROBOT, m.GetSensorInfo())
 SMOKY = (0.5,) * IN_A_ROW
