@@ -61,6 +61,7 @@ def test_who_has_an_order_with_it_holds_it_before_it_has_the_permission(office: 
 # --- asked for ---------------------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S2")
 def test_a_robot_is_handed_over_through_standstill_and_a_confirmed_end(office: Office) -> None:
     over = hold(office)
     reply, sends = ask(office, now=1.0)
@@ -178,6 +179,7 @@ def test_a_late_yes_takes_nothing_from_who_was_sent_with_it_meanwhile(office: Of
 # --- forced ------------------------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S2")
 def test_a_supervisor_need_not_ask_but_waits_for_standstill_too(office: Office) -> None:
     over = hold(office)
     reply, sends = ask(office, takeover="force")
@@ -189,6 +191,7 @@ def test_a_supervisor_need_not_ask_but_waits_for_standstill_too(office: Office) 
     assert isinstance(ask(office, takeover="force", now=5.0)[0].content, m.Permission)
 
 
+@pytest.mark.invariant("S5")
 def test_who_is_no_supervisor_forces_nothing(office: Office) -> None:
     assert ask(office)[0].code == m.OK
     reply, sends = ask(office, OPERATOR, "force")

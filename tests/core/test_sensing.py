@@ -127,6 +127,17 @@ def test_a_robot_that_no_longer_knows_the_dva_is_told_its_permission_again(offic
     assert sends[0].to == ROBOT
 
 
+def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office: Office) -> None:
+    (grant,) = learn(office)
+    office.ok([grant])
+    office.silence(ROBOT, 11.0)
+    assert office.desk.sessions.permissions.observers == {}
+    assert office.tick(40.0, alive=False) == []
+    assert office.register(ROBOT, "Robot", 10, now=41.0) == [ASK]
+    (again,) = learn(office, now=41.0)
+    assert isinstance(again.body, m.PermissionGrant)
+
+
 def test_a_dva_that_heeds_nothing_reads_nothing() -> None:
     office = Office()
     office.say(OPERATOR, m.GetSensorInfo())
@@ -246,6 +257,7 @@ def test_a_detector_says_better_where_it_is_and_nobody_has_set_out(office: Offic
     assert set(event.sources) == {ROBOT, DETECTOR}
 
 
+@pytest.mark.invariant("S6")
 def test_who_is_on_the_way_to_where_it_was_felt_is_sent_to_where_it_is(office: Office) -> None:
     office.ok(office.shows(ROBOT, "smoke", *SMOKY))
     sends = office.fire(25, now=2.0)

@@ -156,6 +156,7 @@ def is_moving(scene: Scene) -> bool:
     return scene.robot.body.speed > 0.2
 
 
+@pytest.mark.invariant("S2")
 def test_a_supervisor_takes_a_moving_robot_over_and_it_stands_in_between(
     network: Transport,
 ) -> None:
