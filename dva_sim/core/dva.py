@@ -173,6 +173,7 @@ class Dva:
             self.registry.next_silence(),
             self._access_ends,
             self.sensing.next_due(),
+            self.handovers.next_deadline(),
         )
 
     def go_on(self) -> list[Send]:
@@ -239,6 +240,7 @@ class Dva:
         """A device is there no more: what it held is free, what it did is open to others."""
         self.sessions.take_back_all(device)
         self.sensing.forget(device)
+        self.sessions.permissions.forget(self.sessions.permissions.own, device)
         self.dispatcher.situations.forget_move(device)
         return self.orders.abandon(device, now)
 
@@ -394,6 +396,8 @@ class Dva:
 
         The event is moved there, or ends, if somebody is on the way to where it was felt.
         """
+        if not self.sensing.alarms:
+            return None, []
         felt = (e for e in self.book.open.values() if only_felt(e, self.registry))
         event = within_reach(felt, body.kind, body.position)
         if event is None or source in event.sources:

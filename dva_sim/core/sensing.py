@@ -29,7 +29,7 @@ MOST_LISTED = 64
 
 
 @dataclass(frozen=True)
-class Alarm:
+class SensorAlarm:
     """What it means when a sensor shows much.
 
     Attributes:
@@ -51,7 +51,7 @@ class Sensing:
         known: What robots have said that they have.
     """
 
-    alarms: Mapping[str, Alarm] = field(default_factory=dict)
+    alarms: Mapping[str, SensorAlarm] = field(default_factory=dict)
     rate_hz: float = 1.0
     known: dict[str, m.SensorInfo] = field(default_factory=dict)
     _asked: set[str] = field(default_factory=set)
@@ -133,7 +133,7 @@ class Sensing:
         """When `renew` has something to do [s]."""
         return min(self._due.values(), default=math.inf)
 
-    def crossed(self, robot: str, value: m.SensorValue) -> Alarm | None:
+    def crossed(self, robot: str, value: m.SensorValue) -> SensorAlarm | None:
         """The alarm that a value gives: once, until the sensor has shown less again."""
         alarm = self.alarms.get(value.sensor)
         if alarm is None:
