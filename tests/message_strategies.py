@@ -85,7 +85,9 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
         turn_rates,
         ticks,
     ),
-    m.RobotHolder: st.builds(m.RobotHolder, st.none() | ids, st.none() | names, held),
+    m.RobotHolder: st.builds(
+        m.RobotHolder, st.none() | ids, st.none() | names, held, st.none() | st.integers(0, 999)
+    ),
     m.PersonStatus: st.builds(m.PersonStatus, names, positions),
     m.GoTo: st.builds(m.GoTo, st.lists(positions, min_size=1, max_size=40).map(tuple)),
     m.Patrol: st.builds(

@@ -17,6 +17,7 @@ from dva_sim.worlds.geo import GeoFrame
 
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
 STATUS = "status|"
+HOLDER = "holder|"
 HEARTBEAT_PERIOD = 2.0  # [s]
 REGISTER_AGAIN = 2.0  # pause after a registration that was not answered, or refused [s]
 LONGEST_BID = 1e6  # no offer to go somewhere is longer [s]
@@ -133,7 +134,7 @@ class AgentDevice:
         message = self.outbox.message(peer, body, self.clock.now, session)
 
         def answered(data: bytes) -> None:
-            reply = self._reply_to(message, data)
+            reply = self.reply_to(message, data)
             if reply is None:
                 on_failure()  # what was asked may have been done, but nobody can tell
             else:
@@ -142,7 +143,7 @@ class AgentDevice:
 
         requester.request(encode(message), answered, on_failure)
 
-    def _reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
+    def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
         """The reply in `data`, if it is one, from the device asked, to this very request."""
         said = self.read(data, message.destination)
         if said is None or not isinstance(said.body, m.Reply):
@@ -183,7 +184,10 @@ class AgentDevice:
         except ProtocolError as error:
             self.recorder.counters["refused"] += 1
             return self._bad_message(error)
-        body = self._imposture(message, sender) or self._misdirection(message) or handler(message)
+        body = self._imposture(message, sender) or self._misdirection(message)
+        if body is None and isinstance(message.body, m.Reply):
+            body = m.Reply(message.message_id, m.NOT_SUPPORTED, "a reply to nothing")
+        body = body or handler(message)
         if body.code != m.OK:
             self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
         reply = self.reply(message, body)

@@ -5,10 +5,13 @@ A guard or a robot is at one event, an operator at as many as it has robots.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from dva_sim.core.events import Event
+from dva_sim.core.events import Event, apart
+from dva_sim.protocol.messages import Position
 
 
 @dataclass
@@ -75,6 +78,8 @@ class Rules:
         merge_distance: Reports of one kind nearer than this are one event [m]; 0: never.
         max_attempts: Orders given for one event before it is escalated.
         order_limit: Who has not settled an event so long after the order gives it back [s].
+        depart_within: So does who has taken an order up and not set out after this [s].
+        still_within: And who is on the way and has not moved for so long [s].
         bid_within: How long bids are taken [s].
         operator_span: How many robots one operator may have in hand at once.
         declined_pause: Who declines an order, or is not reached, is not asked again for [s].
@@ -86,6 +91,58 @@ class Rules:
     merge_distance: float = 8.0
     max_attempts: int = 4
     order_limit: float = 900.0
+    depart_within: float = math.inf
+    still_within: float = math.inf
     bid_within: float = 2.0
     operator_span: int = 1
     declined_pause: float = 10.0
+
+
+STIRRED = 0.5  # who has moved less has not moved: positions are known that well [m]
+SET_OUT, MOVE = "set out", "move"
+
+
+class Demand(NamedTuple):
+    """What somebody who has taken an order up owes now; `at` is where it is, if that is known."""
+
+    device: str
+    event: Event
+    owes: str
+    at: Position | None
+
+
+@dataclass
+class Progress:
+    """Whether who has said OK to an order gets on with it: sets out, and then moves.
+
+    What counts is what the DVA hears: `departed`, and positions as they are published. Time runs
+    from when something was first owed, or from the last move.
+    """
+
+    rules: Rules
+    _owed: dict[tuple[str, int], tuple[Demand, float]] = field(default_factory=dict)
+
+    def overdue(self, demands: Iterable[Demand], now: float) -> list[Demand]:
+        """All that is owed now; what of it has been so for too long."""
+        before, self._owed = self._owed, {}
+        for demand in demands:
+            key = demand.device, demand.event.number
+            old, since = before.get(key, (demand, now))
+            self._owed[key] = (demand, now) if _gets_on(old, demand) else (old, since)
+        return [owed for owed, since in self._owed.values() if now >= self._ends(owed, since)]
+
+    def next_deadline(self) -> float:
+        """When something will have been owed for too long [s]."""
+        return min((self._ends(*owed) for owed in self._owed.values()), default=math.inf)
+
+    def _ends(self, owed: Demand, since: float) -> float:
+        rules = self.rules
+        return since + (rules.depart_within if owed.owes == SET_OUT else rules.still_within)
+
+
+def _gets_on(old: Demand, new: Demand) -> bool:
+    if old.event is not new.event or old.owes != new.owes:
+        return True
+    if new.owes == SET_OUT or new.at is None:
+        return False
+    return old.at is None or apart(old.at, new.at) >= STIRRED

@@ -120,6 +120,16 @@ class Dva:
             sends += self.sensing.permitted(send) if body.level == "sensors" else []
         return self._and_revocations(sends + self.orders.taken_up(send))
 
+    def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
+        """A robot did not take a grant; it may have said which session would do."""
+        floor = reply.content
+        if reply.code == m.BAD_SESSION and isinstance(floor, m.SessionFloor):
+            again = self.sessions.above(send, floor.session)
+            if again is not None:
+                self.counters["granted again above"] += 1
+                return self._and_revocations([again])
+        return self.undelivered(send, now)
+
     def undelivered(self, send: Send, now: float) -> list[Send]:
         """What was sent did not arrive, or was declined: take it back."""
         body, sends = send.body, list[Send]()
@@ -194,6 +204,8 @@ class Dva:
                 return self._permission(message, entry, body, now)
             case m.PermissionRevocation():
                 return self._give_back(message, body)
+            case m.GetGrant():
+                return self._grant_of(message, entry, body)
             case m.GetDeviceList():
                 return self._ok(message, [], m.DeviceList(self._shown()))
             case m.GetSensorInfo():
@@ -298,6 +310,14 @@ class Dva:
         if body.holder != message.source or not self.sessions.give_back(body):
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
         return self._ok(message, [])
+
+    def _grant_of(self, message: m.Message, asker: DeviceEntry, body: m.GetGrant) -> Reaction:
+        """What a robot is told when it asks whether it was granted to a device."""
+        grant = self.sessions.permissions.grants.get(message.source)
+        if asker.device.device_type != ROBOT or grant is None or grant.holder != body.holder:
+            return self._refuse(message, m.NOT_PERMITTED, f"{body.holder} holds no such robot")
+        told = m.Permission(body.holder, grant.level, grant.session, grant.address, grant.sensors)
+        return self._ok(message, [], told)
 
     def check_access(self, now: float) -> None:
         """Permissions in use end with the rule that allowed them."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from dva_sim.core.assignments import Assignments, Rules
+from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Demand, Progress, Rules
 from dva_sim.core.events import NEXT, Event, EventBook, State
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
@@ -31,6 +32,10 @@ class Orders:
     engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
     _pauses: list[float] = field(default_factory=list)
+    _progress: Progress = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._progress = Progress(self.rules)
 
     # --- given -------------------------------------------------------------------------
 
@@ -229,14 +234,50 @@ class Orders:
     def take_back(self, now: float) -> list[Send]:
         """Orders that were not carried out in time are open to others."""
         self._pauses = [until for until in self._pauses if until > now]
-        if math.isinf(self.rules.order_limit):
-            return []
-        late = [(d, e) for d, e in self.engaged.pairs() if self._order_ends(d, e) <= now]
+        late = [(d.device, d.event, f"did not {d.owes}") for d in self._overdue(now)]
+        if math.isfinite(self.rules.order_limit):
+            every = self.engaged.pairs()
+            late += [
+                (d, e, "order took too long") for d, e in every if self._order_ends(d, e) <= now
+            ]
         sends: list[Send] = []
-        for device, event in late:
+        for device, event, why in late:
             if self.engaged.is_at(device, event):  # a robot is free with its operator
+                self.counters[why] += 1
                 sends += self._take_back(device, event, now)
         return sends
+
+    def _overdue(self, now: float) -> list[Demand]:
+        """Who has said OK and then does not set out, or stands on the way."""
+        if math.isinf(min(self.rules.depart_within, self.rules.still_within)):
+            return []
+        late = self._progress.overdue(self._demands(), now)
+        for demand in late:
+            self._pause(demand.device, now)
+        return late
+
+    def _demands(self) -> Iterator[Demand]:
+        """What everybody owes now; who has several orders begins with the first."""
+        for device in self.engaged:
+            event = self.engaged.all(device)[0]
+            owes = self._owes(device, event)
+            who = device if device == event.actor else event.responder
+            if owes and who is not None:
+                yield Demand(device, event, owes, self.registry.entries[who].position)
+
+    @staticmethod
+    def _owes(device: str, event: Event) -> str:
+        """Nothing if it is there, or stands by, or an order has not been answered yet."""
+        if device == event.actor and event.open:
+            taken_up, step, goes = event.act_taken_up, "act_", event.state is State.CONFIRMED
+        elif device == event.holder and event.state is State.ASSIGNED:
+            taken_up, step, goes = event.taken_up, "", True
+        else:
+            return ""
+        if not taken_up or f"{step}arrived" in event.times:
+            return ""
+        departed = f"{step}departed" in event.times
+        return (MOVE if goes else "") if departed else SET_OUT
 
     def next_deadline(self) -> float:
         """When something will have waited, or taken, too long [s]."""
@@ -246,7 +287,7 @@ class Orders:
             ends += (self._wait_ends(e) for e in waiting.values())
         if math.isfinite(rules.order_limit):
             ends += (self._order_ends(d, e) for d, e in self.engaged.pairs())
-        return min(ends)
+        return min(*ends, self._progress.next_deadline())
 
     def _wait_ends(self, event: Event) -> float:
         return event.waiting_since + self.rules.escalate_after
@@ -266,7 +307,6 @@ class Orders:
         return begun + self.rules.order_limit
 
     def _take_back(self, device: str, event: Event, now: float) -> list[Send]:
-        self.counters["order took too long"] += 1
         over = m.OrderProgress(event.number, OVER)
         if event.open and device == event.actor:
             return [Send(device, over), *self._act_ends(event, device, True, now)]

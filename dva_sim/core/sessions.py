@@ -6,10 +6,11 @@ There is one holder at a time, whose session is a fencing token (`Permissions`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import TypeVar
 
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS, is_absurd
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +131,28 @@ class Sessions:
         elif isinstance(body, m.PermissionRevocation) and send.to == body.device:
             self._unheard.append(send)
 
+    def above(self, send: Send, floor: int) -> Send | None:
+        """A robot has refused a grant, and told the highest session it knows: one above that.
+
+        Its holder hears that the first is over, and asks for the new one. None: that grant holds
+        no longer, or no session can be so high; then it is as if it had not arrived.
+        """
+        body, known = send.body, self.permissions
+        grant = known.grants.get(send.to)
+        if not isinstance(body, m.PermissionGrant) or grant is None:
+            return None
+        if grant.session != body.session or is_absurd(floor, known.count << LOW_BITS):
+            return None
+        known.count = max(known.count, floor >> LOW_BITS)
+        grant = known.renew(grant)
+        over = m.PermissionRevocation(send.to, grant.holder, send.session)
+        if grant.holder != known.own:
+            self._over.append(Send(grant.holder, over))
+        again = m.PermissionGrant(
+            grant.holder, grant.level, grant.session, grant.address, grant.sensors
+        )
+        return Send(send.to, again, grant.session)
+
     def heard(self, send: Send) -> None:
         """A robot knows that a session is over."""
         body = send.body
@@ -165,7 +188,6 @@ class Sessions:
 K = TypeVar("K")
 
 MOST_OBSERVERS = 10_000
-LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +261,12 @@ class Permissions:
         else:
             self.grants[robot] = grant
         return grant, grant != held
+
+    def renew(self, grant: Grant) -> Grant:
+        """The same right with a session above all that were handed out."""
+        self.changes += 1
+        renewed = self.grants[grant.robot] = replace(grant, session=self._new_session(False))
+        return renewed
 
     def _new_session(self, only_sensors: bool) -> int:
         """Only the right to drive is fenced by the height of its session."""

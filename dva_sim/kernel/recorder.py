@@ -129,7 +129,10 @@ class DriveLog:
         ordered: When the operator got the order [s].
         started: When the robot said that teleoperation had started [s].
         ended: When the drive was over [s].
-        outcome: `confirmed`, `refuted`, `gave up`, `lost link` or `timeout`.
+        outcome: `confirmed`, `refuted`, `gave up`, `refused`, `lost link` or `timeout`.
+        refused: How often commands were answered with each code but OK, or would have been.
+        refusal: The code that ended it, if one did.
+        disturbed: When the scenario disturbed it [s].
         round_trips: From each command's request to its reply [s]; none of what is published.
         samples: Of the accelerometer, in all batches that the phone's filter was read after.
         values: How many such batches there were; none with a filter that takes no batches.
@@ -160,6 +163,9 @@ class DriveLog:
     hand_lag: float = 0.0
     timeouts: int = 0
     alerts: int = 0
+    refused: Counter[int] = field(default_factory=Counter)
+    refusal: int | None = None
+    disturbed: float | None = None
     round_trips: Sequence[float] = ()
     samples: int = 0
     values: int = 0

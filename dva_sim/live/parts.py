@@ -17,11 +17,12 @@ from dva_sim.agents.operator.scripted import ScriptedOperator, drill
 from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event
-from dva_sim.core.sessions import LOW_BITS, Permissions
+from dva_sim.core.sessions import Permissions
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.options import PARTS, LiveOptions
+from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.control_room import add_dva, add_operator
 from dva_sim.simulation.full.field import Field
 from dva_sim.simulation.full.stage import Stage

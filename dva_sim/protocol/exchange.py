@@ -9,6 +9,18 @@ from dva_sim.protocol.codec import encode, timestamp
 from dva_sim.protocol.messages import Body, Heartbeat, Message
 
 NOON = 43_200.0  # when a run in virtual time begins [s since midnight]
+LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
+A_DAY = 345_600  # sessions: the DVA hands out at most four a second
+
+
+def is_absurd(session: int, known: int) -> bool:
+    """Whether no honest DVA can have come to a session by now.
+
+    It is more than a day ahead of the highest that is known, or leaves no room for another day.
+    Whoever knows none yet (0) cannot tell the former.
+    """
+    count, newest = session >> LOW_BITS, (1 << LOW_BITS) - 1
+    return count > newest - A_DAY or (bool(known) and count > (known >> LOW_BITS) + A_DAY)
 
 
 class Outbox:

@@ -40,6 +40,8 @@ CODE_NAMES: Final = {
     NOT_SUPPORTED: "not supported",
 }
 """Reply codes in words, for logs and for the text of a reply."""
+OBEYS_NO_MORE: Final = (NOT_PERMITTED, BAD_SESSION, WRONG_MODE)
+"""Answers to a command after which the next would fare no better."""
 
 EventKind = Literal["fire", "gas_leak", "flood"]
 EVENT_KINDS: Final[tuple[str, ...]] = get_args(EventKind)
@@ -134,11 +136,13 @@ class RobotHolder:
         holder: Id of the device that holds it; None: nobody.
         label: What that device calls itself, if the robot knows it.
         held_for: How long that has been so [s], up to 1e6.
+        code: How its newest command fared, or would fare now; None: as it should.
     """
 
     holder: str | None
     label: str | None
     held_for: float
+    code: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

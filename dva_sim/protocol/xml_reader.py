@@ -52,9 +52,11 @@ def _read_status(element: _Element) -> m.RobotStatus:
 
 
 def _read_robot_holder(element: _Element) -> m.RobotHolder:
-    *who, held = _children(element)
-    told = {child.tag: _str(child) for child in who}
-    return m.RobotHolder(told.get("HolderID"), told.get("DeviceLabel"), _float(held))
+    told = {child.tag: _str(child) for child in _children(element)}
+    code = int(told["Code"]) if "Code" in told else None
+    return m.RobotHolder(
+        told.get("HolderID"), told.get("DeviceLabel"), float(told["HeldFor"]), code
+    )
 
 
 def _read_person_status(element: _Element) -> m.PersonStatus:

@@ -154,7 +154,8 @@ def _write_robot_holder(body: m.RobotHolder) -> str:
     holder = "" if body.holder is None else f"<HolderID>{_device_id(body.holder)}</HolderID>"
     label = "" if body.label is None else f"<DeviceLabel>{_name(body.label)}</DeviceLabel>"
     held = f"<HeldFor>{_duration(body.held_for)}</HeldFor>"
-    return f"<RobotHolder>{holder}{label}{held}</RobotHolder>"
+    code = "" if body.code is None else f"<Code>{_code(body.code)}</Code>"
+    return f"<RobotHolder>{holder}{label}{held}{code}</RobotHolder>"
 
 
 def _write_person_status(body: m.PersonStatus) -> str:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from dva_sim.agents.device import command_topic
+from dva_sim.agents.operator.refusals import Refusals
 from dva_sim.agents.robot.command_queue import CommandQueue, Letter
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
@@ -130,7 +131,7 @@ class TriedDrive:
 
     def __post_init__(self) -> None:
         self.clock, self._outbox = self.network.clock, Outbox(self.node)
-        self._says = Outbox(self.robot)
+        self._says, self._refusals = Outbox(self.robot), Refusals(self.node)
         self._of: dict[int, Numbered] = {}
         self._last = 0
         self._on, self._requester = False, None  # type: bool, Requester | None
@@ -212,8 +213,14 @@ class TriedDrive:
     def request(
         self, command: Any, then: Callable[[bytes], object], failed: Callable[[], object]
     ) -> None:
-        """See `Line`."""
-        self._asking().request(self._send(command), then, failed)
+        """See `Line`; the app reads every answer."""
+
+        def answered(reply: bytes) -> None:
+            if why := self._refusals.answered(self.code_of(reply)):
+                self.lost(why)
+            then(reply)
+
+        self._asking().request(self._send(command), answered, failed)
 
     def _asking(self) -> Requester:
         if self._requester is None:
@@ -403,7 +410,10 @@ class _Trial:
     def _refused(self) -> Iterator[Case]:
         """Whatever the robot answers, the app goes on or says that it is over."""
         for code in (m.BAD_SESSION, m.OUT_OF_ORDER, m.BUSY, 999, None):
-            yield from self._run(self._drive(DELAYS[1], refuses=code), 5.0)
+            drive = self._drive(DELAYS[1], refuses=code)
+            yield from self._run(drive, NOTICED)
+            if drive.pattern.answered and code == m.BAD_SESSION and not drive.told:
+                yield "does not find out that it is refused", f"within {NOTICED:g} s"
 
     def _after_the_end(self) -> Iterator[Case]:
         drive = self._drive(DELAYS[1])

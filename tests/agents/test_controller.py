@@ -94,14 +94,14 @@ def test_an_older_command_never_follows_a_newer_one(driven: Bench) -> None:
 
 @pytest.mark.invariant("S2")
 def test_commands_of_others_and_of_old_sessions_never_act(driven: Bench) -> None:
-    assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.NOT_PERMITTED
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), session=6).code == m.BAD_SESSION
 
 
 @pytest.mark.invariant("S2")
 def test_a_new_grant_stops_the_robot_and_fences_the_old_holder(driven: Bench) -> None:
     assert driven.say(DVA, m.PermissionGrant(RUI, "teleoperation", 8)).set_point == STAND
-    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.WRONG_MODE
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.NOT_PERMITTED
     assert driven.say(RUI, m.StartTeleOp(), session=8, moving=True).code == m.BUSY
     assert driven.say(RUI, m.StartTeleOp(), session=8).code == m.OK
 
@@ -291,7 +291,7 @@ CODES = {
 TABLE = """
 mode message           none     sensors  teleoperation missions both
 I    StartTeleOp       perm I   perm I   ok T          perm I   ok T
-I    SetTeleOp         mode I   mode I   mode I        mode I   mode I
+I    SetTeleOp         perm I   perm I   mode I        perm I   mode I
 I    StopTeleOp        perm I   perm I   ok I          perm I   ok I
 I    begins            perm I   perm I   perm I        ok M     ok M
 I    CancelMission     perm I   perm I   perm I        ok I     ok I
@@ -299,7 +299,7 @@ I    GetMissionStatus  ok I     ok I     ok I          ok I     ok I
 I    GetSensorInfo     ok I     ok I     ok I          ok I     ok I
 I    Emergency         ok I     ok I     ok I          ok I     ok I
 M    StartTeleOp       perm M   perm M   -             perm M   busy M
-M    SetTeleOp         mode M   mode M   -             mode M   mode M
+M    SetTeleOp         perm M   perm M   -             perm M   mode M
 M    StopTeleOp        perm M   perm M   -             perm M   ok M
 M    begins            perm M   perm M   -             busy M   busy M
 M    CancelMission     perm M   perm M   -             ok I     ok I
@@ -307,7 +307,7 @@ M    GetMissionStatus  ok M     ok M     -             ok M     ok M
 M    GetSensorInfo     ok M     ok M     -             ok M     ok M
 M    Emergency         ok I     ok I     -             ok I     ok I
 T    StartTeleOp       perm T   perm T   ok T          -        ok T
-T    SetTeleOp         mode T   mode T   ok T          -        ok T
+T    SetTeleOp         perm T   perm T   ok T          -        ok T
 T    StopTeleOp        perm T   perm T   ok I          -        ok I
 T    begins            perm T   perm T   perm T        -        busy T
 T    CancelMission     perm T   perm T   perm T        -        ok T
@@ -432,3 +432,105 @@ def test_what_a_robot_says_of_a_mission_that_is_over_is_no_news(bench: Bench) ->
     bench.say(ANA, m.CancelMission())
     assert not bench.robot.mission_stands("done", 0, "")
     assert told(bench) == ("failed", 1, "cancelled")
+
+
+# --- what is forged, or cannot be ------------------------------------------------------
+
+LAST = 2**64 - 1
+DAY = 345_600 << 32
+
+
+def reply(code: int = m.OK, content: m.Content | None = None) -> m.Reply:
+    return m.Reply(1, code, "", content)
+
+
+def test_a_tick_that_the_robots_clock_has_not_reached_is_refused_and_counted(
+    driven: Bench,
+) -> None:
+    now = driven.robot.tick(1.0)
+    for tick in (2**53 - 1, now + 1):
+        assert driven.say(ANA, m.SetTeleOp(0.4, 0.1, tick), now=1.0).code == m.STALE
+    assert driven.robot.future_ticks == 2
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.1, now), now=1.0).code == m.OK
+
+
+@pytest.mark.invariant("S2")
+@pytest.mark.parametrize("session", [LAST, LAST - DAY + (1 << 32), 7 + DAY + (1 << 32)])
+def test_no_forged_session_is_so_high_that_the_robot_obeys_nobody_any_more(
+    driven: Bench, session: int
+) -> None:
+    for body in (
+        m.PermissionGrant(RUI, "both", session),
+        m.PermissionRevocation(ROBOT, "", session),
+    ):
+        assert driven.say(DVA, body).code == m.BAD_SESSION
+    assert (driven.robot.owner, driven.robot.absurd_sessions) == (ANA, 2)
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", 8)).code == m.OK
+
+
+def test_a_day_of_sessions_is_no_jump(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", DAY)).code == m.OK
+
+
+def test_the_robot_says_which_session_would_do_once_the_dva_knows_such_answers(
+    driven: Bench,
+) -> None:
+    old = m.PermissionGrant(RUI, "both", 5)
+    assert driven.say(DVA, old).content is None
+    driven.say(DVA, reply(m.NOT_PERMITTED))
+    driven.say(DVA, m.PermissionGrant(RUI, "both", 9))
+    assert driven.say(DVA, old).content == m.SessionFloor(9)
+
+
+def test_a_stranger_who_asks_twice_is_asked_about_once_a_second(bench: Bench) -> None:
+    asked = []
+    for now in (0.0, 1.0, 1.5, 2.5):
+        assert bench.say(ANA, m.StartTeleOp(), now=now).code == m.NOT_PERMITTED
+        asked.append(bench.robot.doubts.unasked)
+    assert asked == [None, ANA, None, ANA]
+
+
+def test_a_dva_that_does_not_know_the_question_is_asked_no_more(bench: Bench) -> None:
+    bench.say(ANA, m.StartTeleOp())
+    bench.say(ANA, m.StartTeleOp(), now=1.0)
+    bench.say(DVA, reply(m.BAD_MESSAGE), now=1.0)
+    for now in (3.0, 5.0):
+        bench.say(ANA, m.StartTeleOp(), now=now)
+        assert bench.robot.doubts.unasked is None
+
+
+@pytest.mark.invariant("S2", "S5")
+def test_what_the_dva_answers_about_a_stranger_holds(bench: Bench) -> None:
+    for now in (0.0, 1.0):
+        bench.say(ANA, m.StartTeleOp(), now=now)
+    bench.say(DVA, reply(content=m.Permission(ANA, "teleoperation", 7)), now=1.0)
+    assert bench.say(ANA, m.StartTeleOp(), now=2.0).code == m.OK
+
+
+@pytest.mark.invariant("S2", "S5")
+def test_a_forged_grant_is_found_out_when_the_dva_grants_and_leaves_no_floor_behind(
+    bench: Bench,
+) -> None:
+    forged = m.PermissionGrant(RUI, "both", 10**18)
+    assert bench.say(DVA, forged).code == m.OK  # the first one ever: nobody can tell
+    assert bench.say(DVA, m.PermissionGrant(ANA, "both", 7)).code == m.BAD_SESSION
+    assert bench.robot.doubts.unasked == RUI
+    bench.say(DVA, reply(m.NOT_PERMITTED))
+    assert bench.robot.grant is None
+    assert bench.say(DVA, m.PermissionGrant(ANA, "both", 7)).code == m.OK
+
+
+@pytest.mark.invariant("S2")
+def test_who_takes_a_robot_from_its_driver_is_asked_about(driven: Bench) -> None:
+    assert driven.say(DVA, m.PermissionGrant(RUI, "both", 8)).set_point == STAND
+    assert driven.robot.doubts.unasked == RUI
+    driven.say(DVA, reply(m.NOT_PERMITTED))
+    assert (driven.robot.grant, driven.robot.highest_session) == (None, 7)
+
+
+@pytest.mark.invariant("S2")
+def test_an_answer_that_something_has_overtaken_changes_nothing(driven: Bench) -> None:
+    driven.say(DVA, m.PermissionGrant(RUI, "both", 8))
+    driven.say(DVA, m.PermissionGrant(ANA, "both", 9))
+    driven.say(DVA, reply(m.NOT_PERMITTED))
+    assert driven.robot.grant == m.PermissionGrant(ANA, "both", 9)

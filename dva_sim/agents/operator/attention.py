@@ -164,6 +164,7 @@ class OperatorSetup:
         attempts: Of a request.
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
         guarded: Whether a collision guard may hold a robot back.
+        heeds: Whether the app acts on being refused; see `CommandSender`.
     """
 
     pattern: Callable[[], Pattern]
@@ -173,6 +174,7 @@ class OperatorSetup:
     attempts: int
     truth: Callable[[str], Truth[Observation]] | None = None
     guarded: bool = False
+    heeds: bool = True
 
 
 class DriverSeat:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from dva_sim.agents.device import AgentDevice, command_topic
+from dva_sim.agents.device import HOLDER, AgentDevice, command_topic
+from dva_sim.agents.operator.refusals import Refusals
 from dva_sim.agents.tilt import Phone, TiltCommand
 from dva_sim.kernel.plugins import FAILURES, said
 from dva_sim.kernel.recorder import DriveLog, Issued
-from dva_sim.network.messaging import Requester
+from dva_sim.network.messaging import Requester, Subscription
 from dva_sim.network.patterns import PATTERNS, Pattern
 from dva_sim.protocol.codec import encode
-from dva_sim.protocol.messages import Reply, SetTeleOp
+from dva_sim.protocol.messages import Message, Reply, RobotHolder, SetTeleOp
 
 
 class Made(NamedTuple):
@@ -37,7 +38,9 @@ class CommandSender:
         attempts: Of the same.
         window: How many of those may be unanswered at once.
         seen_tick: The newest robot tick on the screen [ms], if there is any.
-        on_lost: Told why, when nobody obeys any more.
+        on_lost: Told why, when nobody answers any more.
+        on_refused: Told why, when nobody obeys any more.
+        heeds: Whether the app acts on being refused.
 
     Attributes:
         drive: The log of this drive.
@@ -59,6 +62,8 @@ class CommandSender:
         window: int,
         seen_tick: Callable[[], int | None],
         on_lost: Callable[[str], object],
+        on_refused: Callable[[str], object],
+        heeds: bool = True,
     ) -> None:
         self._device, self.clock, self._pattern = device, device.clock, pattern
         self.drive, self._session, self._phone = drive, session, phone
@@ -66,6 +71,9 @@ class CommandSender:
         self._seen_tick, self._on_lost = seen_tick, on_lost
         self._topic = command_topic(drive.robot)
         self._requester: Requester | None = None
+        self._on_refused, self._heeds = on_refused, heeds
+        self.refusals = Refusals(device.id_tag, drive.refused)
+        self._holder: Subscription | None = None
         self._on = False
         self.failures, self.first_failure = 0, ""
 
@@ -74,11 +82,16 @@ class CommandSender:
         self._on = True
         self._let(self._pattern.begin, self)
         self._phone.pick_up(self.clock.now)
+        if self._heeds and not self._pattern.answered:
+            me, robot = self._device.id_tag, self.drive.robot
+            self._holder = self._device.network.subscribe(me, robot, HOLDER, self._on_holder)
         self._look()
 
     def stop(self) -> None:
         """Send nothing more and close the socket."""
         self._on = False
+        if self._holder is not None:
+            self._holder.close()
         if self._requester is not None:
             self.drive.timeouts = self._requester.timeouts
             self._requester.close()
@@ -105,8 +118,8 @@ class CommandSender:
         self.drive.samples, self.drive.values = self._phone.samples, self._phone.values
         return None if command is None else Made(command, now, tick)
 
-    def _encode(self, made: Made) -> bytes:
-        """The bytes of a command that is sent now; its tick is of when it was made."""
+    def _message(self, made: Made) -> Message:
+        """A command that is sent now; its tick is of when it was made."""
         now, command = self.clock.now, made.command
         body = SetTeleOp(command.speed, command.turn_rate, made.seen_tick)
         message = self._device.outbox.message(self.drive.robot, body, now, self._session)
@@ -114,7 +127,26 @@ class CommandSender:
         self._device.recorder.command_issued(message.source, message.message_id, issued)
         self.drive.sent += 1
         self.drive.commands.append((made.time, command.speed, command.turn_rate))
-        return encode(message)
+        return message
+
+    # --- being told no -------------------------------------------------------------------
+
+    def _answered(self, command: Message, data: bytes) -> None:
+        """A reply has come: what it says is heard whatever the pattern makes of it."""
+        reply = self._device.reply_to(command, data)
+        self._heed(self.refusals.answered(None if reply is None else reply.code))
+
+    def _on_holder(self, data: bytes) -> None:
+        """The robot says who holds it, for those whom nobody answers."""
+        message = self._device.read(data, self.drive.robot) if self._on else None
+        if message is not None and isinstance(body := message.body, RobotHolder):
+            self._heed(self.refusals.held(body.holder, body.code))
+
+    def _heed(self, why: str) -> None:
+        if why and self._on and self._heeds:
+            self.drive.alerts += 1
+            self.drive.refusal = self.refusals.last
+            self._on_refused(why)
 
     def _let(self, act: Callable[..., object], *given: Any) -> None:
         """Ask the pattern; what one of a user gets wrong is counted, and the command is gone."""
@@ -153,9 +185,16 @@ class CommandSender:
     ) -> None:
         """See `Line`; once the drive is over nothing goes."""
         requester = self._asking()
-        if self._on:
-            data = self._encode(command)
-            requester.request(data, lambda reply: self._let(then, reply), lambda: self._let(failed))
+        if not self._on:
+            return
+        message = self._message(command)
+
+        def answered(reply: bytes) -> None:
+            self._answered(message, reply)
+            if self._on:
+                self._let(then, reply)
+
+        requester.request(encode(message), answered, lambda: self._let(failed))
 
     def _asking(self) -> Requester:
         if self._requester is None:
@@ -165,7 +204,7 @@ class CommandSender:
     def publish(self, command: Made) -> None:
         """See `Line`; once the drive is over nothing goes."""
         if self._on:
-            data = self._encode(command)
+            data = encode(self._message(command))
             self._device.network.publish(self._device.id_tag, self._topic, data, len(data))
 
     def newest(self, command: Made) -> Made:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from dva_sim.agents.operator.strategies import (
     View,
     gain_at,
 )
-from dva_sim.agents.operator.supervision import Work
+from dva_sim.agents.operator.supervision import REFUSED, Work
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import Route
 from dva_sim.kernel.recorder import DriveLog
@@ -218,6 +219,8 @@ class Teleoperation(Work):
             window=setup.window,
             seen_tick=lambda: self._seen_tick,
             on_lost=self.link_lost,
+            on_refused=partial(self.end, REFUSED),
+            heeds=setup.heeds,
         )
 
     # --- seeing ------------------------------------------------------------------------

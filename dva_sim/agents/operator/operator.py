@@ -11,15 +11,20 @@ from __future__ import annotations
 from dva_sim.agents.observation import CAMERA_SCHEME
 from dva_sim.agents.operator.attention import DriverSeat
 from dva_sim.agents.operator.drive import Teleoperation
-from dva_sim.agents.operator.supervision import Work
+from dva_sim.agents.operator.refusals import ASK_AGAIN
+from dva_sim.agents.operator.supervision import REFUSED, Work
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 
-ASK_AGAIN = 2.0  # when the robot is held by somebody else [s]
+ASK_LATER = 2.0  # when the robot is held by somebody else [s]
+ASK_BEFORE, ASK_AFTER = 3, 1  # how often, for one order: before a drive has begun, and after
 START_TRIES = 20
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
 STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
-TOLD = {"lost link": "takes the link for lost"}  # what a drive's end looks like to the operator
+TOLD = {
+    "lost link": "takes the link for lost",
+    REFUSED: "is refused",
+}  # what a drive's end looks like to the operator
 REDIRECTED, RECALLED = BY_DVA = "redirected", "recalled"  # how a drive ends by the DVA's word
 
 
@@ -39,6 +44,7 @@ class OperatorAgent:
         self.device, self._seat, self._kind, self._span = seat.device, seat, kind, span
         self.works: dict[str, Work] = {}
         self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first
+        self._again: tuple[m.Order | None, int] = (None, 0)  # what was refused, and how often
         self.device.serve(self._on_request)
 
     @property
@@ -74,10 +80,28 @@ class OperatorAgent:
         return m.Reply(message.message_id, m.OK, "")
 
     def _on_revocation(self, body: m.PermissionRevocation) -> None:
-        """The robot is no longer ours to drive; it has been told, too."""
+        """The robot is no longer ours to drive; it has been told, too.
+
+        Before the drive, that session may be over since the robot knows a higher one: ask again.
+        """
         work = self.works.get(body.device)
-        if work is not None and work.session == body.session:
+        if work is None or work.over or work.session != body.session:
+            return
+        if work.log.started is None and self._may_ask_again(work):
+            work.session = 0
+            self.device.clock.call_after(START_AGAIN, self._ask_permission, work)
+        else:
             work.end("gave up", "the permission was revoked")
+
+    def _may_ask_again(self, work: Work) -> bool:
+        """Whether an order that a robot refuses is tried once more: the DVA is asked first."""
+        times = 1 + self._asked_again(work)
+        self._again = work.order, times
+        return times <= (ASK_BEFORE if work.log.started is None else ASK_AFTER)
+
+    def _asked_again(self, work: Work) -> int:
+        order, times = self._again
+        return times if order is work.order else 0
 
     def _gives_up(self, robot: str, asker: str) -> bool:
         """Whether somebody may have a robot: not while it is driven, or watched, to an event."""
@@ -151,11 +175,13 @@ class OperatorAgent:
                 if isinstance(reply.content, m.Permission):
                     self._give_back(drive.robot, reply.content.session)
             elif isinstance(reply.content, m.Permission):
+                known, drive.granted = drive.granted, True
                 drive.session = reply.content.session
-                self._turn_on_picture(drive)
-                self._start(drive)
-            elif reply.code == m.BUSY:
-                self.device.clock.call_after(ASK_AGAIN, self._ask_permission, drive)
+                if not known:
+                    self._turn_on_picture(drive)
+                    self._start(drive)
+            elif reply.code == m.BUSY and not self._asked_again(drive):
+                self.device.clock.call_after(ASK_LATER, self._ask_permission, drive)
             else:
                 drive.end("gave up", reply.text)
 
@@ -209,6 +235,8 @@ class OperatorAgent:
         def give_back(_: object = None) -> None:
             if by_dva:
                 self._give_back(drive.robot, drive.session)
+            elif drive.log.refusal in ASK_AGAIN and self._may_ask_again(drive):
+                self._waiting.insert(0, (device.clock.now, order))
             else:
                 device.progress(order.event_id, "done" if found else "failed")
             self._be_free(drive)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 from dva_sim.agents.device import STATUS, AgentDevice
+from dva_sim.agents.operator.refusals import Refusals
 from dva_sim.protocol import messages as m
 
 
@@ -127,15 +128,13 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
     name = operator.device.label_of(robot)
     operator.watch_status(robot)
     try:
-        if not (yield from _drive(operator, robot, session, commands)):
-            return
-        reply = yield Ask(robot, m.Emergency(), session)
-        operator.tell(f"sends {name} an emergency: {_answer(reply)}")
-        reply = yield Ask(robot, _swaying(0, operator.seen_tick), session)
-        operator.tell(f"sends {name} one more command: {_answer(reply)}")  # the robot is idle
-        yield Pause(STANDSTILL)
-        if not (yield from _drive(operator, robot, session, COMMANDS_AGAIN)):
-            return
+        if (yield from _drive(operator, robot, session, commands)):
+            reply = yield Ask(robot, m.Emergency(), session)
+            operator.tell(f"sends {name} an emergency: {_answer(reply)}")
+            reply = yield Ask(robot, _swaying(0, operator.seen_tick), session)
+            operator.tell(f"sends {name} one more command: {_answer(reply)}")  # the robot is idle
+            yield Pause(STANDSTILL)
+            yield from _drive(operator, robot, session, COMMANDS_AGAIN)
         reply = yield Ask(robot, m.StopTeleOp(), session)
         operator.tell(f"stops {name}: {_answer(reply)}")
     except GeneratorExit:
@@ -147,16 +146,20 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
 def _drive(
     operator: ScriptedOperator, robot: str, session: int, commands: int
 ) -> Generator[Ask | Pause, m.Reply | None, bool]:
-    """Start, and send so many commands; False if the robot cannot be started."""
+    """Start, and send so many commands; False if the robot cannot be started, or obeys no more."""
     name = operator.device.label_of(robot)
     if not (yield from _start(robot, session)):
         operator.tell(f"cannot start {name}")
         return False
     operator.tell(f"starts {name} and sends {commands} commands")
-    obeyed = 0
+    obeyed, refusals = 0, Refusals(operator.device.id_tag)
     for number in range(commands):
         reply = yield Ask(robot, _swaying(number, operator.seen_tick), session)
+        why = refusals.answered(None if reply is None else reply.code)
         obeyed += reply is not None and reply.code == m.OK
+        if why:
+            operator.tell(f"stops driving {name} after {obeyed} of {commands} commands: {why}")
+            return False
     operator.tell(f"has driven {name}: {obeyed} of {commands} commands obeyed")
     return True
 

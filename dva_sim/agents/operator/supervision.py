@@ -18,6 +18,7 @@ from dva_sim.kernel.recorder import DriveLog, Shown
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
+REFUSED = "refused"  # how a drive ends when the robot obeys no more
 BLIND_AFTER = 20.0  # [s]; without a frame for so long the link counts as lost
 
 
@@ -36,6 +37,7 @@ class Work:
         verb: What the person does with the robot, in words.
         wish: What the person shall do with it, in words.
         session: Of the permission; 0 before there is one.
+        granted: Whether there ever was one.
         picture: The robot's camera, once it is watched.
         over: Whether it has ended.
         waits_since: From when on the robot has waited for a judgement [s]; None: it does not.
@@ -55,7 +57,7 @@ class Work:
     ) -> None:
         self._seat, self._device, self._clock = seat, seat.device, seat.device.clock
         self.order, self.log, self.robot, self._on_end = order, log, log.robot, on_end
-        self.session = 0
+        self.session, self.granted = 0, False
         self.picture: Subscription | None = None
         self.over = False
         self.waits_since: float | None = None

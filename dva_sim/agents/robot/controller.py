@@ -5,16 +5,19 @@ Pure: it takes messages with their times and returns what to answer and how to m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import is_absurd
 
 LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
 ENDS = "done", "failed"  # how a mission ends
 MOST_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
+ASK_AGAIN = 1.0  # the DVA is asked about one device at a time, and not more often than this [s]
 
 
 class Mode(StrEnum):
@@ -51,7 +54,7 @@ class Decision(NamedTuple):
     code: int
     text: str = ""
     set_point: TimedSetPoint | None = None
-    content: m.SensorInfo | m.MissionStatus | None = None
+    content: m.SensorInfo | m.MissionStatus | m.SessionFloor | None = None
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,63 @@ class Limits:
 
 
 @dataclass
+class Doubts:
+    """Whose word a robot doubts: anybody can claim to be the DVA where there are no keys.
+
+    The DVA's own answer, over a connection that the robot has opened, is another matter. It is
+    asked about who takes the robot from its driver, about a holder whose session is above that of
+    a new grant, and about a stranger who asks twice: at first, a grant may be on its way.
+
+    Attributes:
+        unasked: Who the DVA has to be asked about now, if anybody.
+        asked: Who it was asked about last.
+        word: How much had been said in the DVA's name by then.
+        dva_knows: Whether it has understood the question, so that it knows 1.4; None: not asked.
+    """
+
+    unasked: str | None = None
+    asked: str = ""
+    word: int = 0
+    dva_knows: bool | None = None
+    _since: float = -math.inf
+    _stranger: str = ""
+
+    def note(
+        self,
+        message: m.Message,
+        decision: Decision,
+        now: float,
+        *,
+        holder: str | None,
+        stopped: str | None,
+        word: int,
+    ) -> None:
+        """A message was decided on.
+
+        Args:
+            message: What it was.
+            decision: What was decided.
+            now: Time [s].
+            holder: Who holds the robot by now.
+            stopped: Who was driving until then, and does not any longer.
+            word: How much was said in the DVA's name so far.
+        """
+        who, before = None, self._stranger
+        match message.body:
+            case m.PermissionGrant() if decision.code == m.BAD_SESSION or stopped:
+                who = holder or message.body.holder
+            case m.StartTeleOp() | m.GoTo() | m.Patrol() | m.Inspect() | m.ReturnToBase():
+                refused = decision.code in (m.NOT_PERMITTED, m.BAD_SESSION)
+                self._stranger = message.source if refused else ""
+                who = before if before == self._stranger else None
+        recently = now < self._since + ASK_AGAIN
+        usual = not who or recently or self.dva_knows is False
+        self.unasked = None if usual else who
+        if self.unasked is not None:
+            self.asked, self.word, self._since = self.unasked, word, now
+
+
+@dataclass
 class RobotController:
     """The decider of one robot.
 
@@ -79,6 +139,10 @@ class RobotController:
         sensors: The sensors it has.
         clock_offset: What the robot's own clock shows at the run's start [s]; no other
             clock agrees with it.
+        without_tick: Commands without `SeenTick` so far.
+        future_ticks: Commands with one that the robot's clock has not reached.
+        absurd_sessions: What came in the DVA's name with a session that no DVA has come to.
+        doubts: Who the DVA has to be asked about.
     """
 
     id_tag: str
@@ -99,6 +163,11 @@ class RobotController:
     last_valid: float = 0.0
     emergency_at: float = -1.0
     without_tick: int = 0
+    future_ticks: int = 0
+    absurd_sessions: int = 0
+    doubts: Doubts = field(default_factory=lambda: Doubts())
+    _before: int = 0  # the highest session before the grant that holds
+    _word: int = 0  # how much the DVA, or who claims to be it, has said
 
     def tick(self, now: float) -> int:
         """The robot's own clock [ms]."""
@@ -113,6 +182,14 @@ class RobotController:
             now: Time [s].
             moving: Whether the robot's wheels still turn.
         """
+        driver = self.owner
+        decision = self._handle(message, arrived, now, moving)
+        holder = self.grant.holder if self.grant is not None else None
+        driver = None if driver in (self.dva, self.owner) else driver
+        self.doubts.note(message, decision, now, holder=holder, stopped=driver, word=self._word)
+        return decision
+
+    def _handle(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
         body = message.body
         match body:
             case m.SetTeleOp():
@@ -139,6 +216,8 @@ class RobotController:
                 return self._auction(message)
             case m.GetSensorInfo(device=None):
                 return Decision(m.OK, content=m.SensorInfo(self.camera_url, self.sensors))
+            case m.Reply():
+                return self._told_by_dva(body)
             case m.GetSensorInfo():
                 return Decision(m.UNKNOWN_DEVICE, "ask the DVA for the sensors of others")
             case _:
@@ -190,13 +269,51 @@ class RobotController:
             self.grant = body  # the same session, told again: the holder may have moved
             return Decision(m.OK)
         if body.session <= self.highest_session:
-            return Decision(m.BAD_SESSION, "that session is over")
-        self.grant, self.highest_session = body, body.session
+            return self._bad_session("that session is over")
+        if self._is_absurd(body.session):
+            return self._bad_session("no session is so far ahead")
+        self._before, self.highest_session = self.highest_session, body.session
+        return self._is_held(body)
+
+    def _is_held(self, grant: m.PermissionGrant | None) -> Decision:
+        """Somebody else may act from now on, or nobody: who drives is stopped."""
+        self.grant = grant
         self.last_order_id = self.last_set_id = 0
-        if self.owner is not None:
-            self._idle("revoked")
-            return Decision(m.OK, set_point=STAND)
-        return Decision(m.OK)
+        self._word += 1
+        if self.owner is None:
+            return Decision(m.OK)
+        self._idle("revoked")
+        return Decision(m.OK, set_point=STAND)
+
+    def _is_absurd(self, session: int) -> bool:
+        absurd = is_absurd(session, self.highest_session)
+        self.absurd_sessions += absurd
+        return absurd
+
+    def _bad_session(self, why: str) -> Decision:
+        """With the highest session that is known, if the DVA understands that."""
+        known = self.doubts.dva_knows and self.highest_session
+        floor = m.SessionFloor(self.highest_session) if known else None
+        return Decision(m.BAD_SESSION, why, content=floor)
+
+    def _told_by_dva(self, body: m.Reply) -> Decision:
+        """What the DVA has answered when it was asked who holds the robot."""
+        who, held = self.doubts.asked, self.grant
+        knows = self.doubts.dva_knows = body.code not in (m.BAD_MESSAGE, m.NOT_SUPPORTED)
+        mine = held is not None and held.holder == who
+        if not knows or self.doubts.word != self._word:
+            return Decision(m.OK)  # something was said meanwhile
+        if isinstance(told := body.content, m.Permission) and told.level != "sensors":
+            if mine and held is not None and held.session == told.session:
+                return Decision(m.OK)
+            self.highest_session = told.session
+            return self._is_held(
+                m.PermissionGrant(who, told.level, told.session, told.address, told.sensors)
+            )
+        if not (mine and body.code == m.NOT_PERMITTED):
+            return Decision(m.OK)
+        self.highest_session = self._before  # the DVA never said what put it up
+        return self._is_held(None)
 
     def _observer(self, body: m.PermissionGrant) -> Decision:
         """Somebody may subscribe to sensors; the one who drives goes on driving."""
@@ -213,15 +330,14 @@ class RobotController:
         if observer is not None and observer.session == body.session:
             del self.observers[body.holder]
             return Decision(m.OK)
+        if self._is_absurd(body.session):
+            return self._bad_session("no session is so far ahead")
         # Its grant may still be on the way, and must find that it is over.
+        self._word += 1
         self.highest_session = max(self.highest_session, body.session)
         if self.grant is None or self.grant.session != body.session:
             return Decision(m.OK)
-        self.grant = None
-        if self.owner is None:
-            return Decision(m.OK)
-        self._idle("revoked")
-        return Decision(m.OK, set_point=STAND)
+        return self._is_held(None)
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Whether somebody may subscribe to a sensor: each one is permitted by name (S5)."""
@@ -307,17 +423,20 @@ class RobotController:
         return Decision(m.OK, set_point=STAND)
 
     def _set(self, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Decision:
-        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
-            return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
+        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
+            return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
         if message.message_id <= self.last_set_id:
             return Decision(m.OUT_OF_ORDER, "a newer command was received before")
         self.last_set_id = message.message_id
         until = arrived + self.limits.watchdog
         if body.seen_tick is None:
             self.without_tick += 1
+        elif body.seen_tick > self.tick(now):
+            self.future_ticks += 1
+            return Decision(m.STALE, "no picture of that tick was taken yet")
         else:
             seen_at = body.seen_tick / 1000 - self.clock_offset
             until = min(until, seen_at + self.limits.max_age)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, command_topic
+from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
 from dva_sim.agents.observation import CameraFrame, Observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
@@ -154,6 +154,8 @@ class MissionLoop:
 
 
 FRAME = "frame|"  # topic of the camera
+LONGEST_HELD = 1e6  # [s]
+WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
 STATUS_PERIOD = 1.0  # [s]
 EXPECTED_SPEED = 0.35  # of a teleoperated robot, by which it bids, as the DVA expects it [m/s]
@@ -212,6 +214,7 @@ class RobotAgent:
         picture_age: How old the picture behind the last command was when it took effect [s],
             by the robot's own clock.
         trace: Told each decision, if there is one.
+        refuses: Made to refuse every command with this code: a fault that is planted.
     """
 
     def __init__(
@@ -231,6 +234,12 @@ class RobotAgent:
         self.applied = self.refused = 0
         self.picture_age: float | None = None
         self.trace: DecisionLog | None = None
+        self.refuses: int | None = None
+        self._fared, self._held_since = m.OK, 0.0
+        self._told: tuple[str | None, int] = (
+            None,
+            m.WRONG_MODE,
+        )  # who holds it, and how that fares
         self.inbox = CommandQueue(
             device.clock,
             setup.service,
@@ -301,8 +310,12 @@ class RobotAgent:
         before, mission = self.controller.mode, self.controller.mission_status
         moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
         decision = self.controller.handle(message, arrived, now, moving)
+        if self.refuses is not None and isinstance(message.body, m.SetTeleOp):
+            decision = Decision(self.refuses, "refuses all commands")
         if self.trace is not None:
             self.trace.decided(message, arrived, now, moving, decision)
+        if self.controller.doubts.unasked is not None:
+            self._ask_about(self.controller.doubts.unasked)
         if decision.set_point is not None:
             self._move(decision.set_point)
         if decision.code == m.OK:
@@ -317,7 +330,43 @@ class RobotAgent:
             self._mode_changed(message.source)
         if self.controller.mission_status is not mission:
             self._publish_mission()
+        self._note_holder(message, decision.code)
         return decision
+
+    def _note_holder(self, message: m.Message, code: int) -> None:
+        """How the holder's commands fare; who listens hears at once when that changes."""
+        if isinstance(message.body, m.StartTeleOp | m.SetTeleOp) and message.source == self._holder:
+            self._fared = code
+        if self._holder != self._told[0]:
+            self._held_since = self.device.clock.now
+        if (self._holder, self._fares if self._fares in m.OBEYS_NO_MORE else m.OK) != self._told:
+            self._publish_holder()
+
+    @property
+    def _holder(self) -> str | None:
+        return None if self.controller.grant is None else self.controller.grant.holder
+
+    @property
+    def _fares(self) -> int:
+        return self._fared if self.controller.mode is Mode.TELEOPERATION else m.WRONG_MODE
+
+    def _publish_holder(self) -> None:
+        """Say who holds the robot, to those who listen: who publishes commands gets no answer."""
+        network, me, fares = self.device.network, self.device.id_tag, self._fares
+        self._told = self._holder, fares if fares in m.OBEYS_NO_MORE else m.OK
+        held = min(self.device.clock.now - self._held_since, LONGEST_HELD)
+        if network.ready(me, HOLDER, WHATEVER_WAITS):
+            self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
+
+    def _ask_about(self, device: str) -> None:
+        """Ask the DVA whether it has granted this robot to a device; its answer decides."""
+        me, dva = self.device.id_tag, self.device.dva
+        self.device.recorder.counters["asked the DVA who holds a robot"] += 1
+
+        def answered(reply: m.Reply) -> None:
+            self._decide(m.Message(me, 1, dva, "00:00:00", 0, reply), self.device.clock.now)
+
+        self.device.ask(dva, m.GetGrant(device), answered)
 
     def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
         """What a decision means to others than the motors."""
@@ -414,6 +463,8 @@ class RobotAgent:
             self.controller.tick(now),
         )
         self.device.publish(STATUS, body)
+        if self._holder is not None:
+            self._publish_holder()
 
     def _publish_mission(self) -> None:
         self.device.publish(MISSION, self.controller.mission_status)

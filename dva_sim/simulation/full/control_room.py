@@ -23,12 +23,13 @@ from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
 from dva_sim.core.sensing import Sensing, SensorAlarm
-from dva_sim.core.sessions import LOW_BITS, Permissions, Sessions
+from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
 from dva_sim.simulation.full.stage import DVA, Stage, middle_of
 from dva_sim.simulation.scenario import (
@@ -201,6 +202,7 @@ def add_operator(
     setup = OperatorSetup(
         pattern=stage.pattern,
         window=command.window,
+        heeds=command.heeds,
         rate_hz=command.rate_hz,
         timeout=command_timeout_s(scenario),
         attempts=command.attempts,

@@ -58,6 +58,26 @@ class DvaAgent:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""
         self._carry_out(self.desk.close())
 
+    def revoke(self, robot: str, takes: str | None, holder_told: bool) -> None:
+        """End the permission for a robot while it is in use, as a scenario wants.
+
+        Args:
+            robot: Its id.
+            takes: Who has it from then on, if anybody.
+            holder_told: Whether the word of it reaches who held it.
+        """
+        sessions, entries = self.desk.sessions, self.desk.registry.entries
+        grant = sessions.permissions.grants.get(robot)
+        if grant is None:
+            return
+        sessions.revoke(grant)
+        sends = [s for s in sessions.to_tell() if holder_told or s.to != grant.holder]
+        if takes in entries:
+            wish = m.PermissionRequest(robot, grant.level)
+            granted = sessions.grant(entries[robot].device, entries[takes].device, wish)
+            sends += granted[1] if granted is not None else []
+        self._carry_out(sends)
+
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
         if isinstance(message.body, m.Registration) and reply.code == m.OK:
@@ -118,6 +138,8 @@ class DvaAgent:
         if reply.code == m.OK or isinstance(send.body, m.PermissionRevocation | m.OrderProgress):
             now = self.device.clock.now
             self._carry_out(self.desk.delivered(send, now, reply.content))
+        elif isinstance(send.body, m.PermissionGrant):
+            self._carry_out(self.desk.refused_grant(send, reply, self.device.clock.now))
         else:
             self._undelivered(send)
 

@@ -87,8 +87,19 @@ _OF_BYSTANDERS = (
         title="time until the last one is out",
     ),
 )
+_OF_DISTURBANCES = (
+    Measure(
+        "driven_on_s",
+        "from the disturbance of the first drive until its operator knows; to the end if never",
+        title="time driven on in vain",
+    ),
+    Measure("commands_in_vain", "commands sent in that time", title="commands sent in vain"),
+    Measure("alerted", "whether the app alerted", low=0, high=1, better="large"),
+    text("drive_outcome", "how the disturbed drive ended"),
+)
 RUN_COLUMNS = (
     *_OF_DRIVES,
+    *_OF_DISTURBANCES,
     Measure(
         "response_mean_s",
         "first report to somebody on scene, mean; the horizon where never",
@@ -177,6 +188,7 @@ def measures_of(scenario: Scenario) -> tuple[str, ...]:
     """The measures that a run of a scenario may hold: without robots nobody drives one."""
     bystanders, guards = scenario.bystander.count, scenario.guard.count
     there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
+    there[_OF_DISTURBANCES] = scenario.disturbance.kind != "none"
     there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
     gone = {column for columns, count in there.items() if not count for column in columns}
     return names_of(column for column in RUN_COLUMNS if column not in gone)
@@ -191,6 +203,7 @@ def run_row(recording: Recording) -> Row:
     row |= (
         _event_measures(recording) | _people_measures(recording) | workload.run_measures(recording)
     )
+    row |= _disturbance_measures(recording)
     row["replans"] = recording.recorder.counters["replans"]
     row["messages"] = recording.recorder.counters["messages"]
     row["traffic_bytes"] = recording.recorder.counters["bytes"]
@@ -200,6 +213,22 @@ def run_row(recording: Recording) -> Row:
     row["simulated_s"] = recording.duration
     row["network_depth"] = recording.depth
     return row
+
+
+def _disturbance_measures(recording: Recording) -> Row:
+    """Of the first drive, if it was disturbed before it ended."""
+    if recording.scenario.disturbance.kind == "none" or not recording.recorder.drives:
+        return {}
+    drive = recording.recorder.drives[0]
+    if (since := drive.disturbed) is None:
+        return {}
+    until = drive.ended if drive.ended is not None else recording.duration
+    return {
+        "driven_on_s": until - since,
+        "commands_in_vain": sum(made >= since for made, _, _ in drive.commands),
+        "alerted": drive.alerts > 0,
+        "drive_outcome": drive.outcome,
+    }
 
 
 def _event_measures(recording: Recording) -> Row:

@@ -26,6 +26,7 @@ from dva_sim.network.radio import Reception, make_link
 from dva_sim.network.stream import HEADERS, MSS
 from dva_sim.network.virtual import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.disturbance import Disturbance
 from dva_sim.simulation.full.field import Danger, Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import broken_event_rules, broken_rules
@@ -106,6 +107,7 @@ class Run:
         for number in range(1, scenario.operator.count + 1):
             add_operator(self.stage, number, self.field.truth)
         self.field.schedule_incidents()
+        Disturbance(self.stage, self.dva, self.field)
         self.dva.start()
         self._last_mission: dict[str, float] = {}
         self.clock.every(WATCH_PERIOD, self._watch)

@@ -10,6 +10,7 @@ References:
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.measure import Measure, names_of, text
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
+from dva_sim.protocol.messages import CODE_NAMES
 from dva_sim.simulation.full import Recording
 from dva_sim.simulation.full.stage import id_of
 
@@ -78,6 +80,9 @@ OPERATOR_COLUMNS = (
     *_WRONG,
     Measure("gave_up", "drives that it gave up"),
     Measure("lost_links", "drives that ended by a lost link"),
+    Measure("refused_drives", "drives that ended since the robot obeyed no more"),
+    Measure("alerts", "alerts of the phone: the link may be lost, or the robot obeys no more"),
+    text("refusals", "how often commands were refused, as the app was told, by reply code"),
 )
 
 
@@ -315,7 +320,16 @@ def operator_row(recording: Recording, operator: str) -> Row:
         "false_confirmations": judged.count("false"),
         "gave_up": sum(log.outcome == "gave up" for log in logs),
         "lost_links": sum(log.outcome == "lost link" for log in logs),
+        "refused_drives": sum(log.outcome == "refused" for log in logs),
+        "alerts": sum(log.alerts for log in logs),
+        "refusals": _by_code(sum((log.refused for log in logs), Counter[int]())),
     }
+
+
+def _by_code(refused: Counter[int]) -> str:
+    return ", ".join(
+        f"{CODE_NAMES.get(code, code)} {count}" for code, count in sorted(refused.items())
+    )
 
 
 _OF_A_RUN = ("utilisation", "attending_share", "queue_mean", "turns_per_min")

@@ -168,6 +168,7 @@ class CommandConfig(Config):
             link's round trip needs.
         attempts: How often it is sent before the link counts as lost.
         window: How many requests may be unanswered at once under `pipelined`.
+        heeds: Whether the app acts on being refused. As the document has it, it does not.
     """
 
     rate_hz: Annotated[
@@ -180,6 +181,7 @@ class CommandConfig(Config):
         int, Field(ge=1, le=10), Key("attempts of a request", stated="attempts")
     ] = 3
     window: Annotated[int, Field(ge=2, le=1000)] = 8
+    heeds: Annotated[bool, Key("whether the app heeds refusals", stated=False)] = True
 
 
 class RequestConfig(Config):
@@ -195,6 +197,23 @@ class RequestConfig(Config):
 
     timeout_s: Annotated[float, Field(gt=0, le=120)] | None = None
     attempts: Annotated[int, Field(ge=1, le=10)] = 3
+
+
+class DisturbanceConfig(Config):
+    """What goes wrong with the first drive, to see how soon its operator knows.
+
+    Attributes:
+        kind: `revoke`: the DVA ends the permission. `take_over`: and gives the robot to another.
+            `refuse`: from then on the robot answers every command with NOT_PERMITTED.
+        after_s: So long after the drive began.
+        holder_told: Whether the word of the DVA reaches who held the robot.
+    """
+
+    kind: Annotated[
+        Literal["none", "revoke", "take_over", "refuse"], Key("disturbance of the drive")
+    ] = "none"
+    after_s: Positive = 10.0
+    holder_told: bool = True
 
 
 class CameraConfig(Config):
@@ -270,6 +289,8 @@ class DispatchConfig(Config):
         most_waiting: More events than that do not wait: the newest is escalated at once.
         merge_distance_m: Reports of one kind nearer than this are one event; 0: never.
         order_limit_s: Who has not settled an event so long after the order gives it back.
+        depart_within_s: So does who has taken an order up and not set out after this; null: never.
+        still_within_s: And who is on the way and has not moved for so long; null: never.
         bid_within_s: How long an auction takes bids.
     """
 
@@ -283,6 +304,8 @@ class DispatchConfig(Config):
     merge_distance_m: NonNegative = 8.0
     max_attempts: Annotated[int, Field(ge=1)] = 4
     order_limit_s: Positive = 900.0
+    depart_within_s: Positive | None = 300.0
+    still_within_s: Positive | None = 60.0
     bid_within_s: Positive = 2.0
 
     def rules(self) -> Rules:
@@ -295,6 +318,8 @@ class DispatchConfig(Config):
             merge_distance=self.merge_distance_m,
             max_attempts=self.max_attempts,
             order_limit=self.order_limit_s,
+            depart_within=never if self.depart_within_s is None else self.depart_within_s,
+            still_within=never if self.still_within_s is None else self.still_within_s,
             bid_within=self.bid_within_s,
         )
 

@@ -35,6 +35,7 @@ from dva_sim.simulation.scenario.parts import (
     CameraConfig,
     CommandConfig,
     DispatchConfig,
+    DisturbanceConfig,
     DvaConfig,
     EventConfig,
     GuardConfig,
@@ -47,6 +48,15 @@ from dva_sim.simulation.scenario.parts import (
 )
 from dva_sim.worlds.layout import Site
 from dva_sim.worlds.site import load_site, map_site
+
+NEWER = (
+    ("pattern_options",),
+    ("dispatch", "depart_within_s", "still_within_s"),
+    ("command", "heeds"),
+    ("disturbance",),
+    ("dva",),
+)
+"""Keys that came after results were published: a part, or some keys of one."""
 
 
 class Scenario(Config):
@@ -86,6 +96,7 @@ class Scenario(Config):
     network_depth: Annotated[Depth, Key("depth of the network model", stated=False)] = "auto"
     link: LinkConfig = LinkConfig()
     camera: CameraConfig = CameraConfig()
+    disturbance: DisturbanceConfig = DisturbanceConfig()
     events: Annotated[tuple[EventConfig, ...], Field(min_length=1)] = (EventConfig(kind="fire"),)
     dispatch: DispatchConfig = DispatchConfig()
     access: tuple[AccessConfig, ...] = ()
@@ -100,12 +111,18 @@ class Scenario(Config):
 
     @model_serializer(mode="wrap")
     def _as_before(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """What came later is written only where it is used: a hash stays what it was."""
+        """What is newer is written only where it is not as usual: a hash stays what it was."""
         written: dict[str, Any] = usual(self)
-        if self.dva == DvaConfig():
-            written.pop("dva", None)
-        if not written.get("pattern_options", True):
-            del written["pattern_options"]
+        for part, *keys in NEWER:
+            ours, usually = (
+                getattr(self, part),
+                type(self).model_fields[part].get_default(call_default_factory=True),
+            )
+            if not keys and ours == usually:
+                written.pop(part, None)
+            for key in keys:
+                if part in written and getattr(ours, key) == getattr(usually, key):
+                    written[part].pop(key, None)
         return written
 
     @model_validator(mode="after")

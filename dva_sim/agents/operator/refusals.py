@@ -1,0 +1,78 @@
+"""What an app makes of being told no: pure, the same for every pattern and whoever drives.
+
+A command that was requested is answered. Of one that was published nothing comes back, but the
+robot says on its topic who holds it, and how the newest command of that device fared.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from dva_sim.protocol import messages as m
+
+ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # whether the permission holds is for the DVA to say
+PASSES = (m.STALE, m.OUT_OF_ORDER)  # such a command came late: the next may not
+ENOUGH = 3  # answers in a row of any other kind, as of sends without an answer
+TAKEN = "somebody else holds the robot"
+
+
+@dataclass
+class Refusals:
+    """Counts refusals, and says when nobody obeys any more.
+
+    Attributes:
+        me: Id of the device that drives.
+        codes: How often commands were answered with each code but OK.
+        last: The code that ended it.
+    """
+
+    me: str
+    codes: Counter[int] = field(default_factory=Counter)
+    last: int | None = None
+    _in_vain: int = 0
+    _confirmed: bool = False
+    _doubtful: int = 0
+
+    def answered(self, code: int | None) -> str:
+        """A command was answered: why nobody obeys any more, or nothing.
+
+        Args:
+            code: Of the reply; None if it cannot be read, or answers something else.
+        """
+        if code == m.OK:
+            self._in_vain = 0
+            return ""
+        self.codes[m.BAD_MESSAGE if code is None else code] += 1
+        if code in PASSES:
+            return ""
+        self._in_vain += 1
+        if code not in m.OBEYS_NO_MORE and self._in_vain < ENOUGH:
+            return ""
+        return self._over(code)
+
+    def held(self, holder: str | None, code: int | None) -> str:
+        """The robot says who holds it: why nobody obeys any more, or nothing.
+
+        What it said before the drive began may come late: it counts once it has said that it is
+        ours, or when it is said again and again.
+
+        Args:
+            holder: Id of the device that may act; None: nobody.
+            code: How its newest command fared, or would; None: as it should.
+        """
+        code = m.OK if code is None else code
+        ours = holder == self.me
+        if ours and (code == m.OK or code in PASSES):
+            self._confirmed, self._doubtful = True, 0
+            return ""
+        self._doubtful += 1
+        if not self._confirmed and self._doubtful < ENOUGH:
+            return ""
+        self.codes[code if ours else m.NOT_PERMITTED] += 1
+        return self._over(code) if ours else self._over(m.NOT_PERMITTED, TAKEN if holder else "")
+
+    def _over(self, code: int | None, why: str = "") -> str:
+        self.last = code
+        name = "no answer that can be read" if code is None else m.CODE_NAMES.get(code, str(code))
+        return f"the robot obeys no more: {why or name}"

@@ -1,0 +1,52 @@
+"""What goes wrong with the first drive where a scenario says so: told no, at a stated moment."""
+
+from __future__ import annotations
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.dva_server import DvaAgent
+from dva_sim.simulation.full.field import Field
+from dva_sim.simulation.full.stage import Stage
+
+LOOK = 0.05  # how often it is looked whether the drive has begun [s]
+
+
+class Disturbance:
+    """Waits for the first drive, and then ends its permission, or what else the scenario says.
+
+    Args:
+        stage: Where.
+        dva: Who grants and revokes.
+        field: The robots.
+    """
+
+    def __init__(self, stage: Stage, dva: DvaAgent, field: Field) -> None:
+        self._stage, self._dva, self._field = stage, dva, field
+        self._config = stage.scenario.disturbance
+        if self._config.kind == "take_over":
+            self._other: AgentDevice = stage.device("operator", stage.scenario.operator.count + 1)
+            self._other.label = stage.labels[self._other.id_tag] = "supervisor"
+            self._other.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
+            self._other.register()
+        if self._config.kind != "none":
+            stage.clock.every(LOOK, self._look)
+
+    def _look(self) -> bool:
+        drives = self._stage.recorder.drives
+        begun = bool(drives) and drives[0].started is not None
+        if begun:
+            self._stage.clock.call_after(self._config.after_s, self._disturb, drives[0])
+        return not begun
+
+    def _disturb(self, drive: DriveLog) -> None:
+        if drive.ended is not None:
+            return
+        clock, recorder = self._stage.clock, self._stage.recorder
+        drive.disturbed = clock.now
+        recorder.tell(clock.now, "scenario", f"disturbs the drive: {self._config.kind}", "drive")
+        if self._config.kind == "refuse":
+            self._field.robots[drive.robot].refuses = m.NOT_PERMITTED
+            return
+        takes = self._other.id_tag if self._config.kind == "take_over" else None
+        self._dva.revoke(drive.robot, takes, self._config.holder_told)

@@ -1,0 +1,157 @@
+"""Being told no: by whatever pattern commands travel, the app finds out, and says so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+
+from dva_sim.agents.operator.refusals import ENOUGH, Refusals
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.stage import id_of
+
+EAST = (30.0, 12.0)  # the end of the main corridor [m]
+EXAMPLE = "acknowledged_pub_sub.py:AcknowledgedPubSub"
+PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins", EXAMPLE)
+ME, OTHER = id_of("operator", 1), id_of("operator", 2)
+
+# --- the decider -------------------------------------------------------------------------
+
+
+@pytest.fixture
+def refusals() -> Refusals:
+    return Refusals(ME)
+
+
+@pytest.mark.parametrize("code", m.OBEYS_NO_MORE)
+def test_a_refusal_that_will_last_ends_it_at_once(refusals: Refusals, code: int) -> None:
+    assert refusals.answered(m.OK) == ""
+    assert refusals.answered(code) == f"the robot obeys no more: {m.CODE_NAMES[code]}"
+    assert (refusals.last, refusals.codes) == (code, {code: 1})
+
+
+def test_commands_that_come_late_are_counted_and_no_more(refusals: Refusals) -> None:
+    for _ in range(100):
+        assert not refusals.answered(m.STALE)
+        assert not refusals.answered(m.OUT_OF_ORDER)
+    assert refusals.codes == {m.STALE: 100, m.OUT_OF_ORDER: 100}
+
+
+@pytest.mark.parametrize("code", [None, m.BUSY, m.BAD_MESSAGE, 999])
+def test_any_other_answer_ends_it_when_it_comes_three_times_in_a_row(
+    refusals: Refusals, code: int | None
+) -> None:
+    answers = [code, code, m.OK, code, m.STALE, code, code]
+    assert [bool(refusals.answered(a)) for a in answers] == [False] * 6 + [True]
+    assert ENOUGH == 3
+
+
+def test_word_of_a_holder_counts_once_the_robot_was_ours(refusals: Refusals) -> None:
+    assert not refusals.held(None, m.WRONG_MODE)  # from before the start
+    assert not refusals.held(ME, None)
+    assert not refusals.held(ME, m.STALE)
+    assert refusals.held(OTHER, None) == "the robot obeys no more: somebody else holds the robot"
+
+
+def test_word_that_never_says_it_is_ours_counts_the_third_time(refusals: Refusals) -> None:
+    assert [bool(refusals.held(ME, m.WRONG_MODE)) for _ in range(3)] == [False, False, True]
+
+
+# --- a drive -----------------------------------------------------------------------------
+
+
+def driving(pattern: str, **changes: Any) -> tuple[PretendedDva, DriveLog]:
+    dva = PretendedDva(robots=1, pattern=pattern, **changes)
+    dva.operator()
+    dva.order(1, EAST, robot=ROBOT)
+    dva.run_until(lambda: "departed" in dva.progress(1))
+    dva.run_until(lambda: abs(dva.field.robots[ROBOT].body.speed) > 0.1)
+    (log,) = dva.stage.recorder.drives
+    assert log.ended is None
+    return dva, log
+
+
+def ends(dva: PretendedDva, log: DriveLog, within: float) -> None:
+    before, sent = dva.now, log.sent
+    dva.run_until(lambda: log.ended is not None, limit=within)
+    assert log.ended is not None
+    assert log.ended - before <= within
+    assert log.sent - sent <= 10 * within + 1
+    assert (log.outcome, log.alerts) == ("refused", 1)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_a_robot_that_refuses_every_command_is_given_up_with_an_alert(pattern: str) -> None:
+    dva, log = driving(pattern)
+    dva.field.robots[ROBOT].refuses = m.NOT_PERMITTED
+    ends(dva, log, within=1.3)
+    assert log.refused[m.NOT_PERMITTED] >= 1
+    told = [moment.what for moment in dva.stage.recorder.timeline]
+    assert "is refused: the robot obeys no more: not permitted" in told
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_a_permission_that_is_over_is_noticed_though_the_dvas_word_is_lost(pattern: str) -> None:
+    dva, log = driving(pattern)
+    session = dva.sessions.pop(ROBOT).session
+    dva.say(ROBOT, m.PermissionRevocation(ROBOT, OPERATOR, session))
+    ends(dva, log, within=1.3)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_who_finds_the_robot_taken_stops_nobody_elses_drive(pattern: str) -> None:
+    dva, log = driving(pattern)
+    other = dva.stage.device("operator", 2)
+    other.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
+    grant = m.PermissionGrant(OTHER, "teleoperation", 1 << 33)
+    dva.sessions[ROBOT] = grant
+    assert dva.say(ROBOT, grant) == m.OK
+    dva.run_for(0.5)
+    codes: list[int] = []
+    for _ in range(4):
+        other.ask(ROBOT, m.StartTeleOp(), lambda r: codes.append(r.code), session=grant.session)
+        dva.run_for(1.0)
+    assert codes[-1] == m.OK
+    dva.run_for(10.0)
+    assert log.outcome == "refused"
+    assert dva.field.robots[ROBOT].controller.owner == OTHER
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_after_somebody_elses_emergency_nobody_starts_again_by_himself(pattern: str) -> None:
+    dva, log = driving(pattern)
+    dva.say(ROBOT, m.Emergency())
+    ends(dva, log, within=1.3)
+    dva.run_for(20.0)
+    assert dva.progress(1)[-1] == "failed"
+    assert len(dva.stage.recorder.drives) == 1
+    assert dva.field.robots[ROBOT].controller.mode is Mode.IDLE
+
+
+@pytest.mark.parametrize("pattern", ["req-rep", "latest-wins"])
+def test_who_is_refused_for_its_session_asks_the_dva_and_drives_on(pattern: str) -> None:
+    dva, _ = driving(pattern)
+    session = dva.sessions.pop(ROBOT).session
+    dva.say(ROBOT, m.PermissionRevocation(ROBOT, OPERATOR, session))
+    dva.run_until(lambda: "arrived" in dva.progress(1))
+    first, again = dva.stage.recorder.drives
+    assert (first.outcome, again.event) == ("refused", 1)
+    assert "failed" not in dva.progress(1)
+
+
+def test_who_is_refused_again_and_again_tells_the_dva_in_the_end() -> None:
+    dva, _ = driving("req-rep")
+    dva.field.robots[ROBOT].refuses = m.NOT_PERMITTED
+    dva.run_until(lambda: "failed" in dva.progress(1))
+    assert [log.outcome for log in dva.stage.recorder.drives] == ["refused"] * 2
+    assert dva.stage.recorder.drives[1].sent <= 3
+
+
+def test_nobody_listens_to_who_holds_the_robot_where_commands_are_answered() -> None:
+    for pattern, heard in (("req-rep", False), ("latest-wins", True)):
+        dva, _ = driving(pattern)
+        assert dva.network.ready(ROBOT, "holder|", 1) is heard
+        assert dva.network.ready(OTHER_ROBOT, "holder|", 1) is False

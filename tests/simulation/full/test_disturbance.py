@@ -1,0 +1,116 @@
+"""A drive that is disturbed at a stated moment, and when its operator knows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dva_sim.protocol import messages as m
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.measures import measures_of, run_row
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.workload import operator_rows
+
+KINDS = ("revoke", "take_over", "refuse")
+PATTERNS = ("req-rep", "latest-wins")
+
+
+def disturbed(pattern: str, kind: str, heeds: bool = True, **changes: Any) -> Run:
+    """A run until a little after the robot has been told."""
+    of_it = {"disturbance.kind": kind, "disturbance.holder_told": False, "command.heeds": heeds}
+    base = {"pattern": pattern, "link.delay_s": 0.1, "horizon_s": 40} | of_it | changes
+    return Run(scenarios.build(scenarios.load("drive-to-event"), base), 1)
+
+
+@pytest.mark.invariant("S2", "S5")
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_who_heeds_refusals_knows_within_two_seconds(pattern: str, kind: str) -> None:
+    recording = disturbed(pattern, kind).run()
+    row = run_row(recording)
+    assert row["driven_on_s"] < 2.0
+    assert row["commands_in_vain"] <= 20
+    assert (row["alerted"], row["drive_outcome"], row["violations"]) == (True, "refused", 0)
+    (of_operator,) = operator_rows(recording)
+    assert of_operator["refused_drives"] >= 1
+    assert "not permitted" in of_operator["refusals"]
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_as_the_document_has_it_nobody_knows_for_long(pattern: str) -> None:
+    row = run_row(disturbed(pattern, "revoke", heeds=False).run())
+    assert row["driven_on_s"] > 10.0
+    assert not row["alerted"]
+
+
+def test_what_is_told_by_the_dva_is_known_at_once_by_every_pattern() -> None:
+    row = run_row(disturbed("pub-sub", "revoke", **{"disturbance.holder_told": True}).run())
+    assert row["driven_on_s"] < 0.1
+    assert row["drive_outcome"] == "gave up"
+
+
+def test_of_a_run_without_disturbance_nothing_is_measured_of_one() -> None:
+    scenario = scenarios.load("drive-to-event")
+    assert "driven_on_s" not in measures_of(scenarios.build(scenario, {}))
+    assert "disturbance" not in scenarios.build(scenario, {}).model_dump()
+    assert "driven_on_s" in measures_of(scenarios.build(scenario, {"disturbance.kind": "revoke"}))
+
+
+# --- forged in the DVA's name, where there are no keys -------------------------------------
+
+
+def forged(run: Run, body: m.Body) -> list[int]:
+    """Somebody says something to the robot in the name of the DVA."""
+    (robot,) = run.field.robots.values()
+    forger, codes = run.stage.device("operator", 9), list[int]()
+    forger.outbox.source = run.stage.device("dva", 1).id_tag
+    forger.ask(robot.device.id_tag, body, lambda reply: codes.append(reply.code))
+    run.clock.run(run.clock.now + 2.0)
+    return codes
+
+
+def until(run: Run, condition: Any, limit: float) -> None:
+    end = run.clock.now + limit
+    while not condition():
+        assert run.clock.now < end
+        run.clock.run(run.clock.now + 0.5)
+
+
+STRANGER = "02:00:00:03:00:09"
+
+
+@pytest.mark.invariant("S2", "S8")
+@pytest.mark.parametrize(
+    ("session", "code"),
+    [(2**64 - 1, m.OK), (1 << 62, m.OK), (1 << 33, m.OK)],
+)
+def test_a_grant_forged_before_the_first_takes_the_robot_out_for_seconds(
+    session: int, code: int
+) -> None:
+    """The first grant ever that a robot hears: nobody can tell, but the DVA is asked."""
+    run = disturbed("latest-wins", "none")
+    run.clock.run(0.2)
+    code = m.BAD_SESSION if session == 2**64 - 1 else code
+    assert forged(run, m.PermissionGrant(STRANGER, "both", session)) == [code]
+    drives = run.recorder.drives
+    until(run, lambda: drives and drives[0].started is not None, 30.0)
+    until(run, lambda: drives[0].applied, 5.0)
+    (robot,) = run.field.robots.values()
+    assert robot.controller.owner == drives[0].operator
+
+
+@pytest.mark.invariant("S2", "S8")
+@pytest.mark.parametrize("body", ["grant", "revocation"])
+def test_a_robot_forged_away_in_a_drive_is_driven_again_soon(body: str) -> None:
+    run = disturbed("req-rep", "none", horizon_s=300)
+    drives = run.recorder.drives
+    until(run, lambda: drives and drives[0].started is not None, 30.0)
+    (robot,) = run.field.robots.values()
+    higher = robot.controller.highest_session + (5 << 32)
+    said = m.PermissionGrant(STRANGER, "both", higher)
+    over = m.PermissionRevocation(robot.device.id_tag, STRANGER, higher)
+    assert forged(run, said if body == "grant" else over) == [m.OK]
+    until(run, lambda: len(drives) > 1 or body == "revocation", 60.0)
+    until(run, lambda: drives[-1].started is not None and drives[-1].applied, 60.0)
+    assert robot.controller.owner == drives[-1].operator
