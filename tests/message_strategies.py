@@ -50,12 +50,24 @@ mission_statuses = st.builds(
     characters(0, 256),
 )
 devices = st.builds(m.Device, ids, names, names, addresses)
+held = real(0, 1e6)
 contents = st.one_of(
     st.none(),
     st.builds(m.DeviceList, st.lists(devices, max_size=6).map(tuple)),
     st.builds(m.SensorInfo, urls, st.lists(sensors, max_size=4).map(tuple)),
     st.builds(m.Permission, ids, *granted),
     mission_statuses,
+    st.builds(m.Holder, ids, names, held),
+    st.builds(m.SessionFloor, sessions),
+    st.builds(
+        m.SensorList,
+        st.lists(
+            st.builds(
+                m.DeviceSensors, ids, st.none() | urls, st.lists(sensors, max_size=3).map(tuple)
+            ),
+            max_size=3,
+        ).map(tuple),
+    ),
 )
 BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     m.Emergency: st.builds(m.Emergency),
@@ -73,6 +85,7 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
         turn_rates,
         ticks,
     ),
+    m.RobotHolder: st.builds(m.RobotHolder, st.none() | ids, st.none() | names, held),
     m.PersonStatus: st.builds(m.PersonStatus, names, positions),
     m.GoTo: st.builds(m.GoTo, st.lists(positions, min_size=1, max_size=40).map(tuple)),
     m.Patrol: st.builds(
@@ -83,11 +96,19 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     m.CancelMission: st.builds(m.CancelMission),
     m.GetMissionStatus: st.builds(m.GetMissionStatus),
     m.MissionStatus: mission_statuses,
-    m.GetSensorInfo: st.builds(m.GetSensorInfo),
+    m.GetSensorInfo: st.builds(m.GetSensorInfo, st.none() | ids),
     m.SensorValue: st.builds(m.SensorValue, names, measured, names, ticks),
     m.GetDeviceList: st.builds(m.GetDeviceList),
     m.DevSub: st.builds(m.DevSub, names, real(0, 1000)),
-    m.PermissionRequest: st.builds(m.PermissionRequest, ids, levels, sensor_names),
+    m.PermissionRequest: st.builds(
+        m.PermissionRequest,
+        ids,
+        levels,
+        sensor_names,
+        st.none() | st.sampled_from(["no", "ask", "force"]),
+    ),
+    m.HandoverRequest: st.builds(m.HandoverRequest, ids, ids, names),
+    m.GetGrant: st.builds(m.GetGrant, ids),
     m.PermissionGrant: st.builds(m.PermissionGrant, ids, *granted),
     m.PermissionRevocation: st.builds(m.PermissionRevocation, ids, ids, sessions),
     m.EventReport: st.builds(

@@ -127,6 +127,21 @@ class RobotStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class RobotHolder:
+    """Who may act on a robot now, published by it.
+
+    Attributes:
+        holder: Id of the device that holds it; None: nobody.
+        label: What that device calls itself, if the robot knows it.
+        held_for: How long that has been so [s], up to 1e6.
+    """
+
+    holder: str | None
+    label: str | None
+    held_for: float
+
+
+@dataclass(frozen=True, slots=True)
 class PersonStatus:
     """What a guard's terminal publishes: what the guard is doing, in words, and where."""
 
@@ -203,7 +218,13 @@ class MissionStatus:
 
 @dataclass(frozen=True, slots=True)
 class GetSensorInfo:
-    """Ask a robot for its sensors; answered with `SensorInfo`."""
+    """Ask for sensors: a robot for its own, answered with `SensorInfo`; the DVA with `SensorList`.
+
+    Attributes:
+        device: Id of the robot that the DVA is asked about; None: all.
+    """
+
+    device: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,11 +270,36 @@ class PermissionRequest:
         device: Id of the device.
         level: `teleoperation`, `missions`, `both`, or `sensors` for nothing but these.
         sensors: Names of the sensors to subscribe to; at most 16.
+        takeover: If somebody holds it: `no`, be told who; `ask` the holder to give it up; `force`
+            it. None: `no`, from a device that may not know these words.
     """
 
     device: str
     level: str
     sensors: tuple[str, ...] = ()
+    takeover: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class HandoverRequest:
+    """The DVA asks the holder of a robot to give it up; `OK`: it does, `BUSY`: it does not.
+
+    Attributes:
+        device: Id of the robot.
+        holder: Id of the device that wants it.
+        label: What that device calls itself.
+    """
+
+    device: str
+    holder: str
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class GetGrant:
+    """A robot asks the DVA for the grant of a device that it does not know as its holder."""
+
+    holder: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -424,6 +470,38 @@ class SensorInfo:
 
 
 @dataclass(frozen=True, slots=True)
+class DeviceSensors:
+    """One line of the sensor list: what a device can show, its camera if it has one."""
+
+    device: str
+    camera_url: str | None
+    sensors: tuple[Sensor, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SensorList:
+    """What the devices can show; at most 64 of them, and no more than fit into one message."""
+
+    devices: tuple[DeviceSensors, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """Who holds what was asked for: its id, its label, and for how long it has [s], up to 1e6."""
+
+    holder: str
+    label: str
+    held_for: float
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFloor:
+    """The highest session that a robot knows; a grant must be above it."""
+
+    session: int
+
+
+@dataclass(frozen=True, slots=True)
 class Permission:
     """What was granted: act on `device` with `session` in the header.
 
@@ -442,6 +520,9 @@ class Permission:
     sensors: tuple[str, ...] = ()
 
 
+Content = DeviceList | SensorInfo | Permission | MissionStatus | Holder | SessionFloor | SensorList
+
+
 @dataclass(frozen=True, slots=True)
 class Reply:
     """The answer to one request.
@@ -456,7 +537,7 @@ class Reply:
     answers: int
     code: int
     text: str
-    content: DeviceList | SensorInfo | Permission | MissionStatus | None = None
+    content: Content | None = None
 
 
 Body = (
@@ -467,6 +548,7 @@ Body = (
     | SetTeleOp
     | StopTeleOp
     | RobotStatus
+    | RobotHolder
     | PersonStatus
     | GoTo
     | Patrol
@@ -482,6 +564,8 @@ Body = (
     | PermissionRequest
     | PermissionGrant
     | PermissionRevocation
+    | HandoverRequest
+    | GetGrant
     | EventReport
     | Order
     | OrderProgress

@@ -51,9 +51,19 @@ def _read_status(element: _Element) -> m.RobotStatus:
     )
 
 
+def _read_robot_holder(element: _Element) -> m.RobotHolder:
+    *who, held = _children(element)
+    told = {child.tag: _str(child) for child in who}
+    return m.RobotHolder(told.get("HolderID"), told.get("DeviceLabel"), _float(held))
+
+
 def _read_person_status(element: _Element) -> m.PersonStatus:
     activity, position = _children(element)
     return m.PersonStatus(_str(activity), _read_position(position))
+
+
+def _read_get_sensor_info(element: _Element) -> m.GetSensorInfo:
+    return m.GetSensorInfo(*map(_str, element))
 
 
 def _read_sensor_value(element: _Element) -> m.SensorValue:
@@ -86,8 +96,9 @@ def _read_dev_sub(element: _Element) -> m.DevSub:
 
 
 def _read_permission_request(element: _Element) -> m.PermissionRequest:
-    device, level, *sensors = _children(element)
-    return m.PermissionRequest(_str(device), _str(level), tuple(map(_str, sensors)))
+    device, level, *rest = _children(element)
+    takeover = _str(rest.pop()) if rest and rest[-1].tag == "Takeover" else None
+    return m.PermissionRequest(_str(device), _str(level), tuple(map(_str, rest)), takeover)
 
 
 def _read_permission_grant(element: _Element) -> m.PermissionGrant:
@@ -158,7 +169,26 @@ def _read_device_list(element: _Element) -> m.DeviceList:
 
 def _read_sensor_info(element: _Element) -> m.SensorInfo:
     url, *sensors = _children(element)
-    return m.SensorInfo(_str(url), tuple(m.Sensor(*map(_str, sensor)) for sensor in sensors))
+    return m.SensorInfo(_str(url), _read_sensors(sensors))
+
+
+def _read_sensors(elements: list[_Element]) -> tuple[m.Sensor, ...]:
+    return tuple(m.Sensor(*map(_str, element)) for element in elements)
+
+
+def _read_sensor_list(element: _Element) -> m.SensorList:
+    return m.SensorList(tuple(map(_read_device_sensors, element)))
+
+
+def _read_device_sensors(element: _Element) -> m.DeviceSensors:
+    device, *rest = _children(element)
+    url = _str(rest.pop(0)) if rest and rest[0].tag == "CameraUrl" else None
+    return m.DeviceSensors(_str(device), url, _read_sensors(rest))
+
+
+def _read_holder(element: _Element) -> m.Holder:
+    holder, label, held = _children(element)
+    return m.Holder(_str(holder), _str(label), _float(held))
 
 
 def _read_permission(element: _Element) -> m.Permission:
@@ -170,6 +200,9 @@ _CONTENT_READERS: Final[dict[str, Callable[[_Element], Any]]] = {
     "SensorInfo": _read_sensor_info,
     "Permission": _read_permission,
     "MissionStatus": _read_mission_status,
+    "Holder": _read_holder,
+    "SessionFloor": lambda element: m.SessionFloor(_int(element[0])),
+    "SensorList": _read_sensor_list,
 }
 _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "StartTeleOp": lambda element: m.StartTeleOp(),
@@ -182,12 +215,14 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "CancelMission": lambda element: m.CancelMission(),
     "GetMissionStatus": lambda element: m.GetMissionStatus(),
     "MissionStatus": _read_mission_status,
-    "GetSensorInfo": lambda element: m.GetSensorInfo(),
+    "GetSensorInfo": _read_get_sensor_info,
     "SensorValue": _read_sensor_value,
     "GetDeviceList": lambda element: m.GetDeviceList(),
     "PermissionRequest": _read_permission_request,
     "PermissionGrant": _read_permission_grant,
     "PermissionRevocation": _read_permission_revocation,
+    "HandoverRequest": lambda element: m.HandoverRequest(*map(_str, element)),
+    "GetGrant": lambda element: m.GetGrant(_str(element[0])),
     "EventReport": _read_event_report,
     "Order": _read_order,
     "OrderProgress": _read_order_progress,
@@ -198,6 +233,7 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
 }
 _PAYLOAD_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "RobotStatus": _read_status,
+    "RobotHolder": _read_robot_holder,
     "PersonStatus": _read_person_status,
     "DevSub": _read_dev_sub,
     "reply": _read_reply,

@@ -86,6 +86,7 @@ _finding = _choice("Finding", "Finding")
 _task = _choice("Task", "Task")
 _mission_state = _choice("MissionState", "MissionState")
 _state = _choice("State", "OrderState")
+_takeover = _choice("Takeover", "Takeover")
 
 _message_id = _integer("MessageID", "Positive")
 _answers = _integer("Answers", "Natural")
@@ -113,6 +114,7 @@ _WAYPOINTS = most("GoTo", "Waypoint")
 _SENSORS = most("SensorInfo", "Sensor")
 _NAMES = most("PermissionRequest", "SensorName")
 _DEVICES = most("DeviceList", "Device")
+_LISTED = most("SensorList", "Device")
 
 
 def _write_position(at: m.Position, tag: str = "Position") -> str:
@@ -148,11 +150,23 @@ def _write_status(body: m.RobotStatus) -> str:
     )
 
 
+def _write_robot_holder(body: m.RobotHolder) -> str:
+    holder = "" if body.holder is None else f"<HolderID>{_device_id(body.holder)}</HolderID>"
+    label = "" if body.label is None else f"<DeviceLabel>{_name(body.label)}</DeviceLabel>"
+    held = f"<HeldFor>{_duration(body.held_for)}</HeldFor>"
+    return f"<RobotHolder>{holder}{label}{held}</RobotHolder>"
+
+
 def _write_person_status(body: m.PersonStatus) -> str:
     return (
         f"<PersonStatus><Activity>{_name(body.activity)}</Activity>"
         f"{_write_position(body.position)}</PersonStatus>"
     )
+
+
+def _write_get_sensor_info(body: m.GetSensorInfo) -> str:
+    device = "" if body.device is None else f"<DeviceID>{_device_id(body.device)}</DeviceID>"
+    return f"<Sensor><GetSensorInfo>{device}</GetSensorInfo></Sensor>"
 
 
 def _write_sensor_value(body: m.SensorValue) -> str:
@@ -209,10 +223,11 @@ def _write_dev_sub(body: m.DevSub) -> str:
 
 
 def _write_permission_request(body: m.PermissionRequest) -> str:
+    takeover = "" if body.takeover is None else f"<Takeover>{_takeover(body.takeover)}</Takeover>"
     return (
         f"<Access><PermissionRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
         f"<Level>{_level(body.level)}</Level>{_write_sensor_names(body.sensors)}"
-        "</PermissionRequest></Access>"
+        f"{takeover}</PermissionRequest></Access>"
     )
 
 
@@ -244,6 +259,19 @@ def _write_permission_revocation(body: m.PermissionRevocation) -> str:
         f"<HolderID>{_device_id(body.holder)}</HolderID>"
         f"<Session>{_session(body.session)}</Session></PermissionRevocation></Access>"
     )
+
+
+def _write_handover_request(body: m.HandoverRequest) -> str:
+    return (
+        f"<Access><HandoverRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
+        f"<HolderID>{_device_id(body.holder)}</HolderID>"
+        f"<DeviceLabel>{_name(body.label)}</DeviceLabel></HandoverRequest></Access>"
+    )
+
+
+def _write_get_grant(body: m.GetGrant) -> str:
+    holder = _device_id(body.holder)
+    return f"<Access><GetGrant><HolderID>{holder}</HolderID></GetGrant></Access>"
 
 
 def _write_event_report(body: m.EventReport) -> str:
@@ -318,15 +346,45 @@ def _write_device_list(content: m.DeviceList) -> str:
 
 
 def _write_sensor_info(content: m.SensorInfo) -> str:
-    if len(content.sensors) > _SENSORS:
-        raise _bad(f"SensorInfo must have at most {_SENSORS} sensors, not {len(content.sensors)}")
-    sensors = "".join(
+    url = _url(content.camera_url)
+    return f"<SensorInfo><CameraUrl>{url}</CameraUrl>{_write_sensors(content.sensors)}</SensorInfo>"
+
+
+def _write_sensors(sensors: tuple[m.Sensor, ...]) -> str:
+    if len(sensors) > _SENSORS:
+        raise _bad(f"a device must have at most {_SENSORS} sensors, not {len(sensors)}")
+    return "".join(
         f"<Sensor><SensorName>{_name(sensor.name)}</SensorName>"
         f"<Unit>{_name(sensor.unit)}</Unit></Sensor>"
-        for sensor in content.sensors
+        for sensor in sensors
     )
-    url = _url(content.camera_url)
-    return f"<SensorInfo><CameraUrl>{url}</CameraUrl>{sensors}</SensorInfo>"
+
+
+def _write_sensor_list(content: m.SensorList) -> str:
+    if len(content.devices) > _LISTED:
+        raise _bad(f"SensorList must have at most {_LISTED} devices, not {len(content.devices)}")
+    return f"<SensorList>{''.join(map(_write_device_sensors, content.devices))}</SensorList>"
+
+
+def _write_device_sensors(device: m.DeviceSensors) -> str:
+    url = device.camera_url
+    camera = "" if url is None else f"<CameraUrl>{_url(url)}</CameraUrl>"
+    return (
+        f"<Device><DeviceID>{_device_id(device.device)}</DeviceID>"
+        f"{camera}{_write_sensors(device.sensors)}</Device>"
+    )
+
+
+def _write_holder(content: m.Holder) -> str:
+    return (
+        f"<Holder><HolderID>{_device_id(content.holder)}</HolderID>"
+        f"<DeviceLabel>{_name(content.label)}</DeviceLabel>"
+        f"<HeldFor>{_duration(content.held_for)}</HeldFor></Holder>"
+    )
+
+
+def _write_session_floor(content: m.SessionFloor) -> str:
+    return f"<SessionFloor><Session>{_session(content.session)}</Session></SessionFloor>"
 
 
 def _write_permission(content: m.Permission) -> str:
@@ -345,6 +403,9 @@ _CONTENT_WRITERS: Final[dict[type, Callable[[Any], str]]] = {
     m.SensorInfo: _write_sensor_info,
     m.Permission: _write_permission,
     m.MissionStatus: _write_mission_status,
+    m.Holder: _write_holder,
+    m.SessionFloor: _write_session_floor,
+    m.SensorList: _write_sensor_list,
 }
 _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.Emergency: ("EmergencyMsg", _always("")),
@@ -354,6 +415,7 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.SetTeleOp: ("SimpleMsg", _write_set_teleop),
     m.StopTeleOp: ("SimpleMsg", _always("<TeleOp><StopTeleOp></StopTeleOp></TeleOp>")),
     m.RobotStatus: ("SimpleMsg", _write_status),
+    m.RobotHolder: ("SimpleMsg", _write_robot_holder),
     m.PersonStatus: ("SimpleMsg", _write_person_status),
     m.GoTo: ("SimpleMsg", _write_go_to),
     m.Patrol: ("SimpleMsg", _write_patrol),
@@ -365,13 +427,15 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
         _always("<Mission><GetMissionStatus></GetMissionStatus></Mission>"),
     ),
     m.MissionStatus: ("SimpleMsg", _write_mission),
-    m.GetSensorInfo: ("SimpleMsg", _always("<Sensor><GetSensorInfo></GetSensorInfo></Sensor>")),
+    m.GetSensorInfo: ("SimpleMsg", _write_get_sensor_info),
     m.SensorValue: ("SimpleMsg", _write_sensor_value),
     m.GetDeviceList: ("SimpleMsg", _always("<Access><GetDeviceList></GetDeviceList></Access>")),
     m.DevSub: ("SimpleMsg", _write_dev_sub),
     m.PermissionRequest: ("SimpleMsg", _write_permission_request),
     m.PermissionGrant: ("SimpleMsg", _write_permission_grant),
     m.PermissionRevocation: ("SimpleMsg", _write_permission_revocation),
+    m.HandoverRequest: ("SimpleMsg", _write_handover_request),
+    m.GetGrant: ("SimpleMsg", _write_get_grant),
     m.EventReport: ("SimpleMsg", _write_event_report),
     m.Order: ("SimpleMsg", _write_order),
     m.OrderProgress: ("SimpleMsg", _write_order_progress),

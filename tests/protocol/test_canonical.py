@@ -1,6 +1,7 @@
 """The quick way through decode takes only what the schema allows, and reads it the same."""
 
 import re
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -26,6 +27,7 @@ KNOWN = [
     message(m.PersonStatus("walking", m.Position(38.66, -9.2))),
 ]
 SEEDS = [encode(one) for one in KNOWN]
+SAMPLES = sorted((Path(__file__).parents[2] / "protocol" / "samples" / "valid").glob("*.xml"))
 known_bodies = st.one_of(
     *(BODIES[kind] for kind in (m.SetTeleOp, m.Heartbeat, m.RobotStatus, m.PersonStatus, m.Reply))
 )
@@ -81,6 +83,15 @@ def test_both_ways_read_the_same(sent):
 @given(known_bodies.flatmap(with_header), st.integers(0, 2**32))
 def test_a_damaged_message_is_read_the_same_or_left_to_the_parser(sent, seed):
     agrees(mutated(encode(sent), Random(seed)))
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
+def test_a_damaged_sample_is_read_the_same_or_left_to_the_parser(path):
+    data, rng = encode(decode(path.read_bytes())), Random(20140901)
+    for _ in range(60):
+        agrees(mutated(data, rng))
+    for number in range(len(data)):
+        agrees(data[:number] + data[number + 1 :])
 
 
 @pytest.mark.parametrize("data", SEEDS, ids=map(name, KNOWN))

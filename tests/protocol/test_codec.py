@@ -68,6 +68,7 @@ def test_codec_and_schema_agree_on_the_bounds_of_numbers(element, low, high, bod
         ("SeenTick", 0, 2**53 - 1, lambda n: message(m.SetTeleOp(0.0, 0.0, n))),
         ("Laps", 0, 1000, lambda n: message(m.Patrol((HERE,), n))),
         ("MissionID", 0, 2**32 - 1, lambda n: message(m.MissionStatus(n, "done", 0, ""))),
+        ("Session", 1, 2**64 - 1, lambda n: message(m.Reply(1, 4, "", m.SessionFloor(n)))),
         ("WaypointsLeft", 0, 64, lambda n: message(m.MissionStatus(7, "under_way", n, ""))),
     ],
 )
@@ -81,6 +82,7 @@ def test_codec_and_schema_agree_on_the_bounds_of_integers(element, low, high, bu
 
 
 STOP = m.StopTeleOp()
+SENSOR = m.Sensor("smoke", "1/m")
 HERE = m.Position(38.661254, -9.204932)
 
 
@@ -140,6 +142,15 @@ def test_a_speed_that_is_no_bounded_number_is_not_encoded(speed):
         m.SensorValue("lidar", (1.0,) * 361, "m", 0),
         m.PermissionRequest(ROBOT.lower(), "both"),
         m.PermissionRequest(ROBOT, "everything"),
+        m.PermissionRequest(ROBOT, "both", (), "now"),
+        m.RobotHolder(ROBOT, None, -1.0),
+        m.RobotHolder(None, "", 1.0),
+        m.HandoverRequest(ROBOT, TABLET, None),
+        m.GetGrant(None),
+        m.GetSensorInfo(ROBOT.lower()),
+        m.Reply(1, m.BUSY, "", m.Holder(TABLET, "tablet", 1e6 + 1)),
+        m.Reply(1, m.OK, "", m.SensorList((m.DeviceSensors(ROBOT, None, (SENSOR,) * 17),))),
+        m.Reply(1, m.OK, "", m.SensorList((m.DeviceSensors(ROBOT, None),) * 65)),
         m.OrderProgress(7.5, "done"),
         m.Order(7, "fire", m.Position(0, 0), None, "run"),
         m.Order(7, "fire", m.Position(0, 0), None, None),

@@ -30,6 +30,29 @@ def stem(path):
     return path.stem
 
 
+NEW_IN_1_4 = {
+    *("get-grant", "get-sensor-info-device", "handover-request"),
+    *("permission-request-ask", "permission-request-force", "permission-request-no"),
+    *("reply-holder", "reply-sensor-list", "reply-session-floor"),
+    *("robot-holder", "robot-holder-nobody"),
+}
+OLD = etree.XMLSchema(file=str(Path(__file__).parents[1] / "data" / "dva-1.3.xsd"))
+
+
+def test_a_peer_of_1_3_understands_all_samples_but_those_of_what_1_4_adds():
+    refused = {path.stem for path in VALID if not OLD.validate(etree.parse(path))}
+    assert refused == NEW_IN_1_4
+
+
+@pytest.mark.parametrize("path", INVALID, ids=stem)
+def test_1_4_accepts_nothing_that_is_marked_invalid_of_1_3(path):
+    try:
+        tree = etree.parse(path)
+    except etree.XMLSyntaxError:
+        return
+    assert OLD.validate(tree) == SCHEMA.validate(tree)
+
+
 @pytest.mark.parametrize("path", VALID, ids=stem)
 def test_a_valid_sample_is_accepted_and_survives_a_round_trip(path):
     data = path.read_bytes()
@@ -41,7 +64,7 @@ def test_there_is_a_valid_sample_of_every_body_and_content():
     bodies = [decode(path.read_bytes()).body for path in VALID]
     contents = {type(body.content) for body in bodies if isinstance(body, m.Reply)}
     assert {type(body) for body in bodies} == set(get_args(m.Body))
-    assert contents == {type(None), m.DeviceList, m.SensorInfo, m.Permission, m.MissionStatus}
+    assert contents == {type(None), *get_args(m.Content)}
 
 
 def test_every_invalid_sample_is_explained():
