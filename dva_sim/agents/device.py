@@ -142,6 +142,14 @@ class AgentDevice:
 
         requester.request(encode(message), answered, on_failure)
 
+    def forget(self, peer: str) -> None:
+        """A peer is there no more: what it was asked has failed."""
+        for key in [(peer, False), (peer, True)]:
+            requester = self._requesters.pop(key, None)
+            if requester is not None:
+                requester.give_up()
+        self.network.forget(peer)
+
     def _reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
         """The reply in `data`, if it is one, from the device asked, to this very request."""
         said = self.read(data, message.destination)

@@ -45,7 +45,7 @@ class Poller:
 
     def register(self, source: Any) -> None:
         """Wait for a socket of ZeroMQ, or for a file descriptor, too."""
-        file = source.getsockopt(zmq.FD) if isinstance(source, zmq.Socket) else source
+        file = int(source.getsockopt(zmq.FD)) if isinstance(source, zmq.Socket) else source
         self._selector.register(file, selectors.EVENT_READ, source)
         self._files[source] = file
         self.look(source)

@@ -268,7 +268,11 @@ class _Driver(_Device):
                 self.all.trips["drive"].append(time.monotonic() - began)
                 self.all.codes["drive " + code] = self.all.codes.get("drive " + code, 0) + 1
             going = code == "0"
-            content = "<SetTeleOp><Speed>0.1</Speed><TurnRate>0.4</TurnRate></SetTeleOp>" if going else "<StartTeleOp/>"
+            content = (
+                "<SetTeleOp><Speed>0.1</Speed><TurnRate>0.4</TurnRate></SetTeleOp>"
+                if going
+                else "<StartTeleOp/>"
+            )
             time.sleep(0.1 if going else 0.5)
 
 
@@ -411,9 +415,10 @@ class Scene:
 
 def measured(args: argparse.Namespace) -> Iterator[Figures]:
     """The figures of each wave, as they come."""
-    with tempfile.TemporaryDirectory() as folder, closing(
-        Scene(args.python, Path(folder), args.honest)
-    ) as scene:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        closing(Scene(args.python, Path(folder), args.honest)) as scene,
+    ):
         yield scene.rest(args.quiet, "nobody else")
         for _ in range(args.waves):
             yield scene.wave(args.size, args.period)
