@@ -93,8 +93,6 @@ class AgentDevice:
         self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
 
     def _register(self, then: Callable[[], object]) -> None:
-        body = m.Registration(self.label, self.device_type, self.address)
-
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 then()
@@ -106,7 +104,11 @@ class AgentDevice:
         def failed() -> None:
             self.clock.call_after(REGISTER_AGAIN, self._register, then)
 
-        self.ask(self.dva, body, answered, failed)
+        self.ask(self.dva, self._registration, answered, failed)
+
+    @property
+    def _registration(self) -> m.Registration:
+        return m.Registration(self.label, self.device_type, self.address)
 
     def ask(
         self,
@@ -139,6 +141,8 @@ class AgentDevice:
             else:
                 self._meet(peer, reply)
                 on_reply(reply)
+            if reply is not None and reply.code == m.NOT_REGISTERED and peer == self.dva:
+                self.ask(peer, self._registration)  # the next request will be heard
 
         requester.request(encode(message), answered, on_failure)
 
