@@ -7,7 +7,7 @@ them with REQ or DEALER, and with SUB. `protocol/README.md` says the same for ot
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
@@ -163,12 +163,13 @@ class SocketSubscription:
         self._network, self._peer, self._handler = network, publisher, handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
-        self._paused = False
+        self._paused = self._over = False
         network.clock.watch(self._socket, self._hear)
 
     def close(self) -> None:
         """See `Subscription`."""
-        self._network.close_client(self._socket, self._peer)
+        self._paused = self._over = True
+        self._network.close_client(self._socket, self._peer, soon=True)
 
     def pause(self) -> None:
         """See `Subscription`: what is not read waits in the socket."""
@@ -177,7 +178,7 @@ class SocketSubscription:
 
     def resume(self) -> None:
         """See `Subscription`."""
-        if self._paused and not self._socket.closed:
+        if self._paused and not self._over:
             self._paused = False
             self._network.clock.watch(self._socket, self._hear)
 
@@ -198,6 +199,7 @@ LARGEST_TOPIC: Final = 512  # the same of a subscriber [B]
 LARGEST_PICTURE: Final = 2_000_000  # the same of a publisher [B]
 LINGER: Final = 200  # for last words when a node leaves [ms]
 LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
+CLOSED_AT_ONCE: Final = 10  # sockets, at each such look
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
@@ -251,6 +253,7 @@ class SocketNetwork:
         self._routers: dict[str, Socket] = {}
         self._publishers: dict[str, PublisherSocket] = {}
         self._clients: dict[str, dict[Socket, str]] = {}  # by peer: whose
+        self._leaving: deque[Socket] = deque()
 
     # --- who is where ------------------------------------------------------------------
 
@@ -327,6 +330,8 @@ class SocketNetwork:
             self._security.handle(socket)
         for publisher in self._publishers.values():
             publisher.hear()
+        for _ in range(min(CLOSED_AT_ONCE, len(self._leaving))):
+            self._close(self._leaving.popleft())
         return True
 
     def close(self) -> None:
@@ -335,7 +340,10 @@ class SocketNetwork:
             self.leave(node)
         for peer, sockets in list(self._clients.items()):
             for socket in list(sockets):
-                self.close_client(socket, peer, linger=LINGER)
+                socket.linger = LINGER
+                self.close_client(socket, peer)
+        while self._leaving:
+            self._close(self._leaving.popleft())
         self._security.close()
         self._aside.close()
         self._context.term()
@@ -460,21 +468,32 @@ class SocketNetwork:
         socket.connect(endpoint)
         self.clock.look(socket)
 
-    def close_client(self, socket: Socket, peer: str, linger: int = 0) -> None:
-        """Close a socket made by `client`."""
+    def close_client(self, socket: Socket, peer: str, soon: bool = False) -> None:
+        """Close a socket made by `client`.
+
+        Args:
+            socket: Nothing more is read from it.
+            peer: Whom it connects to.
+            soon: A few at a time: when many devices vanish together, the others are not to wait.
+        """
         sockets = self._clients.get(peer, {})
         if sockets.pop(socket, None) is not None:
             if not sockets:
                 del self._clients[peer]
             self.clock.unwatch(socket)
-            self._security.release(socket)
-            socket.close(linger)
+            if soon:
+                self._leaving.append(socket)
+            else:
+                self._close(socket)
+
+    def _close(self, socket: Socket) -> None:
+        self._security.release(socket)
+        socket.close()
 
     def _discard(self, *sockets: Socket) -> None:
         for socket in sockets:
             self.clock.unwatch(socket)
-            self._security.release(socket)
-            socket.close()
+            self._close(socket)
 
     def _refused(self, refusal: Refusal) -> None:
         """A connection could not be made: say so, and try again where ZeroMQ does not."""

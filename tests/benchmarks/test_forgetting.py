@@ -388,10 +388,10 @@ class Scene:
     def _report(self, number: int) -> None:
         """A detector reports one event for each wave: none may be lost."""
         content = (
-            "<Event><EventReport><Kind>fire</Kind><Position><Latitude>{}</Latitude>"
+            f"<Event><EventReport><Kind>fire</Kind><Position><Latitude>{38.6612 + number / 100}</Latitude>"
             "<Longitude>-9.2058</Longitude></Position><Severity>0.5</Severity>"
             "<Confidence>0.9</Confidence><Finding>detected</Finding></EventReport></Event>"
-        ).format(38.6612 + number / 100)
+        )
         voice = Voice(DETECTOR)
         with zmq.Context() as context, context.socket(zmq.REQ) as socket:
             socket.linger = 0
