@@ -157,8 +157,10 @@ class Walk:
         return self.say(device, body)
 
     def _impostor(self) -> list[Send]:
-        body = m.Registration("x", self.luck.choice(list(KINDS)), "10.0.0.66")
-        return self.say(self._any(), body)
+        body, device = m.Registration("x", self.luck.choice(list(KINDS)), "10.0.0.66"), self._any()
+        if device not in self.desk.registry.entries:
+            return []  # who is forgotten may be anybody
+        return self.say(device, body)
 
     def _restart(self) -> list[Send]:
         device = self._any()

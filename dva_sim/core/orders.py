@@ -362,9 +362,10 @@ class Orders:
 
     def _pause(self, device: str, now: float) -> None:
         """Who did not take an order up is not asked again for a while."""
-        until = now + self.rules.declined_pause
-        self.registry.entries[device].free_from = until
-        self._pauses.append(until)
+        entry, until = self.registry.entries.get(device), now + self.rules.declined_pause
+        if entry is not None:
+            entry.free_from = until
+            self._pauses.append(until)
 
     def _release(self, event: Event) -> None:
         """The order to confirm is over, and with it the right to drive there."""

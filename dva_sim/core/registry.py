@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 from dva_sim.protocol.messages import Device, Position, Registration
 
@@ -14,6 +15,7 @@ REMOTE = "Remote Control"  # may drive robots, and is sent no orders
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, *SAME_AS})
 MAX_DEVICES = 20_000
+FORGET_AFTER = 60.0  # without a word of it [s]
 
 
 @dataclass(slots=True)
@@ -61,12 +63,15 @@ class Registry:
 
     Attributes:
         silent_after: How long a device may be quiet before it counts as gone [s].
+        forget_after: How long before it is forgotten, unless something of it is open [s].
         most: How many devices there may be.
         entries: In order of registration.
-        version: Grows whenever somebody comes, goes silent, returns, or is called otherwise.
+        version: Grows whenever somebody comes, goes silent, returns, is forgotten, or is called
+            otherwise.
     """
 
     silent_after: float = 10.0
+    forget_after: float = FORGET_AFTER
     most: int = MAX_DEVICES
     entries: dict[str, DeviceEntry] = field(default_factory=dict)
     version: int = 0
@@ -75,35 +80,47 @@ class Registry:
     _heard: OrderedDict[str, DeviceEntry] = field(
         default_factory=OrderedDict
     )  # longest quiet first
-    _changed: dict[str, DeviceEntry] = field(default_factory=dict)
+    _silent: OrderedDict[str, DeviceEntry] = field(default_factory=OrderedDict)  # likewise
+    _changed: dict[str, DeviceEntry | None] = field(default_factory=dict)
+    _moved: dict[str, DeviceEntry | None] = field(default_factory=dict)
+    _places: int = 0
+
+    @property
+    def is_full(self) -> bool:
+        """Whether nobody else fits."""
+        return len(self.entries) >= self.most
 
     def register(self, id_tag: str, request: Registration, now: float) -> DeviceEntry | None:
         """Enter a device, or renew its entry; None if the registry is full."""
         device = Device(id_tag, request.label, request.device_type, request.address)
         entry = self.entries.get(id_tag)
         if entry is None:
-            return self.add(DeviceEntry(device, now)) if len(self.entries) < self.most else None
+            return None if self.is_full else self.add(DeviceEntry(device, now))
         if entry.device != device:
             entry.device = device
+            self._note(id_tag, entry)
             self._changed[id_tag] = entry
-            self.version += 1
         self.heard(id_tag, now)
         return entry
 
     def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
-        device, entry.place = entry.device, len(self.entries)
+        device, entry.place = entry.device, self._places
+        self._places += 1
         self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry
         self._heard[device.id_tag] = self._changed[device.id_tag] = entry
-        self.version += 1
+        self._note(device.id_tag, entry)
         return entry
 
     def heard(self, id_tag: str, now: float) -> DeviceEntry | None:
         """Note a sign of life; None if the device is not registered."""
         entry = self.entries.get(id_tag)
         if entry is not None:
-            self.version += entry.silent
-            entry.last_heard, entry.silent = now, False
+            if entry.silent:
+                entry.silent = False
+                del self._silent[id_tag]
+                self._note(id_tag, entry)
+            entry.last_heard = now
             self._heard[id_tag] = entry
             self._heard.move_to_end(id_tag)
         return entry
@@ -120,10 +137,31 @@ class Registry:
         while self.next_silence() <= now:
             id_tag, entry = next(iter(self._heard.items()))
             entry.silent = True
-            self.version += 1
+            self._silent[id_tag] = entry
+            self._note(id_tag, entry)
             gone.append(entry)
             del self._heard[id_tag]
         return gone
+
+    def forget(self, id_tag: str) -> None:
+        """A device was never registered."""
+        entry = self.entries.pop(id_tag)
+        for known in (self._of_type, self._located):
+            known[entry.kind].pop(id_tag, None)
+        self._heard.pop(id_tag, None)
+        self._silent.pop(id_tag, None)
+        self._changed[id_tag] = None
+        self._note(id_tag, None)
+
+    def long_silent(self, now: float) -> Iterator[str]:
+        """Devices that could be forgotten by now, the longest silent first."""
+        until = now - self.forget_after
+        return (i for i, _ in takewhile(lambda e: e[1].last_heard < until, self._silent.items()))
+
+    @property
+    def silent(self) -> Iterable[str]:
+        """All that are silent, the longest silent first."""
+        return self._silent
 
     def next_silence(self) -> float:
         """When the device that was heard longest ago will have been quiet for too long [s]."""
@@ -140,7 +178,16 @@ class Registry:
         """Devices of a type of which is known where they are, in any order, silent ones too."""
         return self._located[device_type].values()
 
-    def changes(self) -> list[DeviceEntry]:
-        """The devices that registered, or moved to another address, since this was last asked."""
+    def changes(self) -> dict[str, DeviceEntry | None]:
+        """Who registered, moved to another address or was forgotten since this was last asked."""
         changed, self._changed = self._changed, {}
-        return list(changed.values())
+        return changed
+
+    def moves(self) -> dict[str, DeviceEntry | None]:
+        """Whoever else fell silent or was heard again, too."""
+        moved, self._moved = self._moved, {}
+        return moved
+
+    def _note(self, id_tag: str, entry: DeviceEntry | None) -> None:
+        self._moved[id_tag] = entry
+        self.version += 1

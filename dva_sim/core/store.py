@@ -59,7 +59,7 @@ class Store:
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
         self._session_changes = 0
         self._events: dict[int, Event] = {}
-        self._devices: dict[str, DeviceEntry] = {}
+        self._devices: dict[str, DeviceEntry | None] = {}
         self._path = file
         try:
             self._file = sqlite3.connect(file, isolation_level=None, timeout=OPEN_WITHIN)
@@ -107,7 +107,7 @@ class Store:
         What cannot be written, to a full disk for example, is tried again with the next change.
         """
         self._events |= {event.number: event for event in changed}
-        self._devices |= {entry.device.id_tag: entry for entry in dva.registry.changes()}
+        self._devices |= dva.registry.changes()
         changes = _session_changes(dva)
         if not (self._events or self._devices or changes != self._session_changes):
             return None
@@ -131,8 +131,10 @@ class Store:
             for e in self._events.values()
         )
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
-        devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
-        put(_PUT_DEVICE, devices)
+        known = {i: e for i, e in self._devices.items() if e is not None}
+        put(_PUT_DEVICE, ((i, json.dumps(_of_entry(e))) for i, e in known.items()))
+        gone = self._devices.keys() - known.keys()
+        put("DELETE FROM devices WHERE id = ?", ((i,) for i in gone))
         for table, now in sessions.items():
             before = self._sessions[table]
             put(
