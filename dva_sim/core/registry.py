@@ -40,6 +40,11 @@ class DeviceEntry:
     free_from: float = 0.0
     place: int = 0
 
+    @property
+    def kind(self) -> str:
+        """Its type, by the name that the DVA uses."""
+        return SAME_AS.get(self.device.device_type, self.device.device_type)
+
     def is_new_life(self, message_id: int, timestamp: str) -> bool:
         """Whether a registration says that the device has started anew: MessageIDs go back.
 
@@ -88,8 +93,7 @@ class Registry:
     def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
         device, entry.place = entry.device, len(self.entries)
-        kind = SAME_AS.get(device.device_type, device.device_type)
-        self.entries[device.id_tag] = self._of_type[kind][device.id_tag] = entry
+        self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry
         self._heard[device.id_tag] = self._changed[device.id_tag] = entry
         self.version += 1
         return entry
@@ -107,7 +111,7 @@ class Registry:
     def locate(self, entry: DeviceEntry, position: Position) -> None:
         """Note where a device is."""
         if entry.position is None:
-            self._located[entry.device.device_type][entry.device.id_tag] = entry
+            self._located[entry.kind][entry.device.id_tag] = entry
         entry.position = position
 
     def fallen_silent(self, now: float) -> list[DeviceEntry]:

@@ -79,8 +79,10 @@ class Sensing:
             del self._above[key]
 
     def told(self, robot: str, content: object, now: float) -> None:
-        """A robot has answered, or not."""
-        self._asked.discard(robot)
+        """A robot has answered, or not; of one that is gone meanwhile nothing is kept."""
+        if robot not in self._asked:
+            return
+        self._asked.remove(robot)
         if not isinstance(content, m.SensorInfo):
             self._mute.add(robot)
             return

@@ -138,6 +138,15 @@ def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office: Office) -> No
     assert isinstance(again.body, m.PermissionGrant)
 
 
+@pytest.mark.invariant("S10")
+def test_of_a_robot_that_is_gone_nothing_is_kept(office: Office) -> None:
+    office.silence(ROBOT, 11.0)
+    office.no([ASK], 27.0)
+    learn(office, now=28.0)
+    fresh = Sensing(ALARMS, 2.0)
+    assert office.desk.sensing == fresh
+
+
 def test_a_dva_that_heeds_nothing_reads_nothing() -> None:
     office = Office()
     office.say(OPERATOR, m.GetSensorInfo())

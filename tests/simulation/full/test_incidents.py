@@ -184,3 +184,20 @@ def test_an_event_that_only_a_robot_felt_is_about_what_is_farther_off() -> None:
     seen = Event(2, incident.kind, place, 0.5, sources={id_of("detector", 1): 0.9})
     assert event_about(incident, [felt], site, {robot}) is felt
     assert event_about(incident, [seen], site, {robot}) is None
+
+
+@pytest.mark.parametrize("heeded", [(), ("gas",)])
+def test_a_leak_that_no_detector_notices_is_smelt_by_a_robot_on_its_round(
+    heeded: tuple[str, ...],
+) -> None:
+    changes: dict[str, Any] = {
+        "events": [{"kind": "gas_leak", "room": "Canteen", "at_s": 20}],
+        "patrols": [{"robot": "robot-1", "places": ["Canteen", "Main corridor"]}],
+        "dva.sensors": heeded,
+    }
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), changes), 1)
+    run.clock.run(140.0)
+    events = list(run.dva.events.values())
+    assert [e.kind for e in events] == ["gas_leak"] * len(heeded)
+    assert [set(e.sources) for e in events] == [{id_of("robot", 1)}] * len(heeded)
+    assert run.recorder.violations == {}
