@@ -257,10 +257,15 @@ class Orders:
         return late
 
     def _demands(self) -> Iterator[Demand]:
-        """What everybody owes now; who has several orders begins with the first."""
+        """What everybody owes now; who has several orders begins with the first.
+
+        And may be at any of them: then a robot may stand until it is its turn.
+        """
         for device in self.engaged:
-            event = self.engaged.all(device)[0]
+            event, *others = self.engaged.all(device)
             owes = self._owes(device, event)
+            if owes == MOVE and others:
+                continue
             who = device if device == event.actor else event.responder
             if owes and who is not None:
                 yield Demand(device, event, owes, self.registry.entries[who].position)
