@@ -410,6 +410,7 @@ def _watch(desk: Dva) -> None:
 def snapshot(desk: Dva) -> dict[str, Any]:
     """All that a desk must know again after it was killed."""
     book, permissions = desk.book, desk.sessions.permissions
+    lasts = desk.sessions.with_something_open()
     return {
         "open": {n: repr(_with_sets_in_order(e)) for n, e in book.open.items()},
         "closed": {n: repr(_with_sets_in_order(e)) for n, e in sorted(book.closed.items())},
@@ -417,7 +418,9 @@ def snapshot(desk: Dva) -> dict[str, Any]:
         "counts": book.counts,
         "total": book.total,
         "engaged": sorted((device, event.number) for device, event in desk.orders.engaged.pairs()),
-        "devices": [entry.device for entry in desk.registry.entries.values()],
+        "devices": [
+            e.device for i, e in desk.registry.entries.items() if not e.silent or i in lasts
+        ],
         "grants": permissions.grants,
         "observers": permissions.observers,
         "sessions": permissions.count,

@@ -99,7 +99,6 @@ class Registry:
         if entry.device != device:
             entry.device = device
             self._note(id_tag, entry)
-            self._changed[id_tag] = entry
         self.heard(id_tag, now)
         return entry
 
@@ -108,7 +107,7 @@ class Registry:
         device, entry.place = entry.device, self._places
         self._places += 1
         self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry
-        self._heard[device.id_tag] = self._changed[device.id_tag] = entry
+        self._heard[device.id_tag] = entry
         self._note(device.id_tag, entry)
         return entry
 
@@ -150,7 +149,6 @@ class Registry:
             known[entry.kind].pop(id_tag, None)
         self._heard.pop(id_tag, None)
         self._silent.pop(id_tag, None)
-        self._changed[id_tag] = None
         self._note(id_tag, None)
 
     def long_silent(self, now: float) -> Iterator[str]:
@@ -179,15 +177,15 @@ class Registry:
         return self._located[device_type].values()
 
     def changes(self) -> dict[str, DeviceEntry | None]:
-        """Who registered, moved to another address or was forgotten since this was last asked."""
+        """Who came, moved, fell silent, was heard again or is forgotten: for the memory."""
         changed, self._changed = self._changed, {}
         return changed
 
     def moves(self) -> dict[str, DeviceEntry | None]:
-        """Whoever else fell silent or was heard again, too."""
+        """The same for whoever listens to the devices; each is told once to either."""
         moved, self._moved = self._moved, {}
         return moved
 
     def _note(self, id_tag: str, entry: DeviceEntry | None) -> None:
-        self._moved[id_tag] = entry
+        self._moved[id_tag] = self._changed[id_tag] = entry
         self.version += 1

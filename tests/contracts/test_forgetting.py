@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -20,17 +21,25 @@ SILENT, FORGOTTEN, BEAT = 0.4, 0.8, 0.05  # [s]
 
 
 class Site:
-    """A DVA that is quick to forget, and devices whose heartbeats can be stopped."""
+    """A DVA that can be made quick to forget, and devices whose heartbeats can be stopped."""
 
     def __init__(self, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(dva_server, "TICK", BEAT)
         self.world = world
         desk = Office().new_desk()
-        desk.registry.silent_after, desk.registry.forget_after = SILENT, FORGOTTEN
+        self.registry = desk.registry
+        self.be_patient()
         self.dva = DvaAgent(small_device(world, DVA), desk)
         self.dva.start()
         self.entries = desk.registry.entries
         self.beating: set[str] = set()
+
+    def be_patient(self) -> None:
+        """Nobody falls silent, however slow this machine is."""
+        self.registry.silent_after = self.registry.forget_after = math.inf
+
+    def be_quick(self) -> None:
+        self.registry.silent_after, self.registry.forget_after = SILENT, FORGOTTEN
 
     def device(self, id_tag: str) -> AgentDevice:
         device = small_device(self.world, id_tag)
@@ -66,12 +75,14 @@ def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
     site.beating.add(PHONE)
     site.hears(PHONE)
     site.beating.clear()
+    site.be_quick()
     site.world.run_until(lambda: site.is_silent(PHONE))
     heard = site.dva.beats[PHONE]
     site.beating.add(PHONE)
     world.run_for(4 * BEAT)
     assert site.is_silent(PHONE)
     assert site.dva.beats[PHONE] == heard  # nobody listens
+    site.be_patient()
     phone.ask(DVA, m.GetDeviceList())
     site.hears(PHONE)
     assert not site.is_silent(PHONE)
@@ -84,7 +95,9 @@ def test_who_is_forgotten_learns_that_and_registers_again(
     phone = site.device(PHONE)
     phone.ask(DVA, registration(phone))
     world.run_until(lambda: PHONE in site.entries)
+    site.be_quick()
     world.run_until(lambda: PHONE not in site.entries)
+    site.be_patient()
     codes: list[int] = []
     phone.ask(DVA, m.GetDeviceList(), lambda reply: codes.append(reply.code))
     world.run_until(lambda: PHONE in site.entries)
@@ -103,6 +116,7 @@ def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(
     world.leave(ROBOT)
     failed: list[bool] = []
     site.dva.device.ask(ROBOT, m.GetSensorInfo(), on_failure=lambda: failed.append(True))
+    site.be_quick()
     world.run_until(lambda: ROBOT not in site.entries)
     assert failed == [True]
     assert not site.dva.device._requesters
@@ -130,6 +144,7 @@ def files() -> int:
 def _after_a_wave(site: Site, wave: int, count: int = 25) -> int:
     """How many files are open when all of a wave are forgotten."""
     world = site.world
+    site.be_patient()
     with zmq.Context() as outside, outside.socket(zmq.DEALER) as asker:
         asker.linger = 0
         asker.connect(f"tcp://{world.network.address(DVA)}")  # type: ignore[attr-defined]
@@ -149,9 +164,11 @@ def _after_a_wave(site: Site, wave: int, count: int = 25) -> int:
         assert files() > before + 4 * count
         for publisher, _ in voices:
             publisher.close()
+    site.be_quick()
     world.run_until(lambda: not site.entries)
     assert not site.dva.beats
-    world.run_for(0.2)  # ZeroMQ closes in the background
+    world.run_for(0.2)  # sockets are closed in the background
+    world.run_until(lambda: files() <= before)
     return files()
 
 
