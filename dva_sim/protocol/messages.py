@@ -221,11 +221,7 @@ class MissionStatus:
 
 @dataclass(frozen=True, slots=True)
 class GetSensorInfo:
-    """Ask for sensors: a robot for its own, answered with `SensorInfo`; the DVA with `SensorList`.
-
-    Attributes:
-        device: Id of the robot that the DVA is asked about; None: all.
-    """
+    """Ask a robot for its sensors (`SensorInfo`), or the DVA for those of one or all robots."""
 
     device: str | None = None
 
@@ -285,13 +281,7 @@ class PermissionRequest:
 
 @dataclass(frozen=True, slots=True)
 class HandoverRequest:
-    """The DVA asks the holder of a robot to give it up; `OK`: it does, `BUSY`: it does not.
-
-    Attributes:
-        device: Id of the robot.
-        holder: Id of the device that wants it.
-        label: What that device calls itself.
-    """
+    """The DVA asks who holds the robot `device` to give it up to `holder`: `OK`, or `BUSY`."""
 
     device: str
     holder: str

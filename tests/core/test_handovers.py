@@ -7,6 +7,7 @@ from office import ADDRESS, DVA, GUARD, OPERATOR, OTHER_OPERATOR, ROBOT, TEAM, O
 
 from dva_sim.core.events import State
 from dva_sim.core.handovers import ANSWER_WITHIN, DECLINED_FOR, FETCH_WITHIN, STOP_WITHIN
+from dva_sim.core.permissions import Access, AccessRule
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
@@ -205,6 +206,16 @@ def test_a_supervisor_does_not_wait_for_who_is_being_asked(office: Office) -> No
     ask(office, takeover="force", now=1.0)
     assert office.no(asked, 2.0) == []  # the answer comes too late to matter
     assert ask(office, now=3.0)[0].text == "it is being stopped for you"
+
+
+def test_who_may_not_have_the_level_takes_nothing_over_supervisor_or_not() -> None:
+    rules = Access([AccessRule(holders=frozenset({"teleop"}))])
+    office = Office(access=rules, supervisors=frozenset({OTHER_OPERATOR}))
+    office.register(OTHER_OPERATOR, "Remote Control")
+    hold(office)
+    for takeover in ("no", "ask", "force"):
+        reply, sends = ask(office, takeover=takeover)
+        assert (reply.code, sends) == (m.NOT_PERMITTED, [])
 
 
 # --- types of devices --------------------------------------------------------------------------
