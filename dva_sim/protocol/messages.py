@@ -40,8 +40,7 @@ CODE_NAMES: Final = {
     NOT_SUPPORTED: "not supported",
 }
 """Reply codes in words, for logs and for the text of a reply."""
-OBEYS_NO_MORE: Final = (NOT_PERMITTED, BAD_SESSION, WRONG_MODE)
-"""Answers to a command after which the next would fare no better."""
+OBEYS_NO_MORE: Final = (NOT_PERMITTED, BAD_SESSION, WRONG_MODE)  # the next fares no better
 
 EventKind = Literal["fire", "gas_leak", "flood"]
 EVENT_KINDS: Final[tuple[str, ...]] = get_args(EventKind)
