@@ -5,7 +5,7 @@ one in twenty is an operator who takes a robot of that wave along. Meanwhile hon
 for the device list once a second, and one operator drives a robot. Then the DVA is killed and
 started again with what it kept. Run by hand it shows more, and another version too:
 
-    python tests/benchmarks/test_forgetting.py --waves 10 --size 1000 --python OTHER/.venv/bin/python
+    python tests/benchmarks/test_forgetting.py --waves 10 --size 1000 --python OTHER/bin/python
 """
 
 from __future__ import annotations
@@ -62,7 +62,10 @@ class Voice:
         ).encode()
 
     def registers(self, what: str, address: str) -> bytes:
-        content = f"<DeviceLabel>{what}</DeviceLabel><DeviceType>{what}</DeviceType><IpAddr>{address}</IpAddr>"
+        content = (
+            f"<DeviceLabel>{what}</DeviceLabel><DeviceType>{what}</DeviceType>"
+            f"<IpAddr>{address}</IpAddr>"
+        )
         return self.says(content, kind="RegMsg")
 
     def beats(self) -> bytes:
@@ -294,15 +297,17 @@ class Figures:
     kept: tuple[int, int]
 
     HEAD = (
-        "                  open   memory  DVA CPU   honest [ms]      drive [ms]     without   devices  events"
-        "\n                 files     [MB]      [s]   p50     p99      p50     p99   answer    in file  in file"
+        "                  open   memory  DVA CPU   honest [ms]      drive [ms]     without"
+        "   devices  events\n                 files     [MB]      [s]   p50     p99      p50"
+        "     p99   answer    in file  in file"
     )
 
     def __str__(self) -> str:
         ways = "  ".join(f"{_part(t, 50):6.1f}  {_part(t, 99):6.1f}" for t in self.trips.values())
         return (
-            f"{self.name:14}  {self.files:6d}  {self.memory_mb:7.1f}  {self.cpu_s:7.1f}  {ways}  {self.lost:6d}"
-            f"  {self.kept[0]:9d}  {self.kept[1]:7d}   told {self.vanished} / {self.codes}"
+            f"{self.name:14}  {self.files:6d}  {self.memory_mb:7.1f}  {self.cpu_s:7.1f}  {ways}"
+            f"  {self.lost:6d}  {self.kept[0]:9d}  {self.kept[1]:7d}"
+            f"   told {self.vanished} / {self.codes}"
         )
 
 
@@ -388,9 +393,9 @@ class Scene:
     def _report(self, number: int) -> None:
         """A detector reports one event for each wave: none may be lost."""
         content = (
-            f"<Event><EventReport><Kind>fire</Kind><Position><Latitude>{38.6612 + number / 100}</Latitude>"
-            "<Longitude>-9.2058</Longitude></Position><Severity>0.5</Severity>"
-            "<Confidence>0.9</Confidence><Finding>detected</Finding></EventReport></Event>"
+            f"<Event><EventReport><Kind>fire</Kind><Position>"
+            f"<Latitude>{38.6612 + number / 100}</Latitude><Longitude>-9.2058</Longitude>"
+            "</Position><Severity>0.5</Severity><Confidence>0.9</Confidence><Finding>detected</Finding></EventReport></Event>"
         )
         voice = Voice(DETECTOR)
         with zmq.Context() as context, context.socket(zmq.REQ) as socket:
@@ -455,6 +460,21 @@ def main(words: list[str] | None = None) -> list[Figures]:
         print(figures, flush=True)
         found.append(figures)
     return found
+
+
+def test_waves_of_devices_that_vanish(benchmark):
+    from benchmarks.goals import goal  # which is not there for the waves, programs of their own
+
+    words = ["--waves=4", "--waves-after=1", "--size=250", "--period=15", "--quiet=10"]
+    found = benchmark.pedantic(main, args=(words,), rounds=1)
+    quiet, first, *later, _, after = found
+    goal("files after the last wave over the first", later[-1].files / first.files, most=1.2)
+    goal(
+        "memory after the last wave over the first", later[-1].memory_mb / first.memory_mb, most=1.2
+    )
+    goal("files after kill -9 and a wave over the first", after.files / first.files, most=1.2)
+    slower = _part(later[-1].trips["honest"], 99) / _part(quiet.trips["honest"], 99)
+    goal("p99 of honest requests in the last wave over that without", slower, most=5.0)
 
 
 if __name__ == "__main__":
