@@ -86,6 +86,22 @@ def one_by_one(operator: ScriptedOperator, _: Witness) -> Script:
     return drill(operator)
 
 
+STRANGER = id_of("operator", 9)
+
+
+def forged(operator: ScriptedOperator, _: Witness) -> Script:
+    """The drill, but somebody has told the robot in the DVA's name that another holds it."""
+    device, steps, reply = operator.device, drill(operator), None
+    said = False
+    while (step := _next(steps, reply)) is not None:
+        if isinstance(step, Ask) and isinstance(step.body, m.StartTeleOp) and not said:
+            said, me = True, device.outbox.source
+            device.outbox.source = device.dva
+            yield Ask(step.to, m.PermissionGrant(STRANGER, "both", step.session + (9 << 32)))
+            device.outbox.source = me
+        reply = yield step
+
+
 def pipelined(operator: ScriptedOperator, _: Witness) -> Script:
     """The drill with eight commands under way at once; anything else waits for their replies."""
     device, steps, reply = operator.device, drill(operator), None

@@ -157,8 +157,10 @@ class Walk:
         return self.say(device, body)
 
     def _impostor(self) -> list[Send]:
-        body = m.Registration("x", self.luck.choice(list(KINDS)), "10.0.0.66")
-        return self.say(self._any(), body)
+        body, device = m.Registration("x", self.luck.choice(list(KINDS)), "10.0.0.66"), self._any()
+        if device not in self.desk.registry.entries:
+            return []  # who is forgotten may be anybody
+        return self.say(device, body)
 
     def _restart(self) -> list[Send]:
         device = self._any()
@@ -408,6 +410,7 @@ def _watch(desk: Dva) -> None:
 def snapshot(desk: Dva) -> dict[str, Any]:
     """All that a desk must know again after it was killed."""
     book, permissions = desk.book, desk.sessions.permissions
+    lasts = desk.sessions.with_something_open()
     return {
         "open": {n: repr(_with_sets_in_order(e)) for n, e in book.open.items()},
         "closed": {n: repr(_with_sets_in_order(e)) for n, e in sorted(book.closed.items())},
@@ -415,7 +418,9 @@ def snapshot(desk: Dva) -> dict[str, Any]:
         "counts": book.counts,
         "total": book.total,
         "engaged": sorted((device, event.number) for device, event in desk.orders.engaged.pairs()),
-        "devices": [entry.device for entry in desk.registry.entries.values()],
+        "devices": [
+            e.device for i, e in desk.registry.entries.items() if not e.silent or i in lasts
+        ],
         "grants": permissions.grants,
         "observers": permissions.observers,
         "sessions": permissions.count,

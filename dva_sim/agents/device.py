@@ -95,8 +95,6 @@ class AgentDevice:
         self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
 
     def _register(self, then: Callable[[], object]) -> None:
-        body = m.Registration(self.label, self.device_type, self.address)
-
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 then()
@@ -108,7 +106,11 @@ class AgentDevice:
         def failed() -> None:
             self.clock.call_after(REGISTER_AGAIN, self._register, then)
 
-        self.ask(self.dva, body, answered, failed)
+        self.ask(self.dva, self._registration, answered, failed)
+
+    @property
+    def _registration(self) -> m.Registration:
+        return m.Registration(self.label, self.device_type, self.address)
 
     def ask(
         self,
@@ -141,8 +143,18 @@ class AgentDevice:
             else:
                 self._meet(peer, reply)
                 on_reply(reply)
+            if reply is not None and reply.code == m.NOT_REGISTERED and peer == self.dva:
+                self.ask(peer, self._registration)  # the next request will be heard
 
         requester.request(encode(message), answered, on_failure)
+
+    def forget(self, peer: str) -> None:
+        """A peer is there no more: what it was asked has failed."""
+        for key in [(peer, False), (peer, True)]:
+            requester = self._requesters.pop(key, None)
+            if requester is not None:
+                requester.give_up()
+        self.network.forget(peer)
 
     def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
         """The reply in `data`, if it is one, from the device asked, to this very request."""

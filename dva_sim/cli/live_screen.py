@@ -52,6 +52,7 @@ class Board:
         self.events: list[dict[str, Any]] = []
         self.story: list[list[Any]] = []
         self.time = 0.0
+        self._registered: set[str] = set()
 
     def hear(self, report: Report) -> list[list[Any]]:
         """Take a report; the new lines of the story."""
@@ -60,6 +61,10 @@ class Board:
             self.devices.setdefault(row["label"], {}).update(row)
         if report.part == "dva":
             self.events = report.events
+            registered = {row["label"] for row in report.rows}
+            for label in self._registered - registered:
+                del self.devices[label]
+            self._registered = registered
         self.story = sorted(self.story + report.story)[-1000:]
         return sorted(report.story)
 

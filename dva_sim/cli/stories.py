@@ -41,7 +41,11 @@ from dva_sim.simulation.transport import TransportScenario
 Row = Mapping[str, Any]
 
 STYLES = {"safety": "bold red", "mode": "dim", "order": "cyan", "drive": "cyan", "link": "yellow"}
-DRIVES = {"lost link": "given up, the link was taken for lost", "gave up": "given up"}
+DRIVES = {
+    "lost link": "given up, the link was taken for lost",
+    "gave up": "given up",
+    "refused": "ended, the robot obeyed no more",
+}
 EVENTS = 30  # of a shift in its table; the lines below it count them all
 TRIALS = 20  # of a task in its table; likewise
 EVENT_HEADS = ("detected", "kind", "where", "outcome", "looked", "after", "acted")

@@ -102,7 +102,7 @@ STIRRED = 0.5  # who has moved less has not moved: positions are known that well
 SET_OUT, MOVE = "set out", "move"
 
 
-class Demand(NamedTuple):
+class Promise(NamedTuple):
     """What somebody who has taken an order up owes now; `at` is where it is, if that is known."""
 
     device: str
@@ -112,7 +112,7 @@ class Demand(NamedTuple):
 
 
 @dataclass
-class Progress:
+class Promises:
     """Whether who has said OK to an order gets on with it: sets out, and then moves.
 
     What counts is what the DVA hears: `departed`, and positions as they are published. Time runs
@@ -120,27 +120,27 @@ class Progress:
     """
 
     rules: Rules
-    _owed: dict[tuple[str, int], tuple[Demand, float]] = field(default_factory=dict)
+    _owed: dict[tuple[str, int], tuple[Promise, float]] = field(default_factory=dict)
 
-    def overdue(self, demands: Iterable[Demand], now: float) -> list[Demand]:
+    def overdue(self, promises: Iterable[Promise], now: float) -> list[Promise]:
         """All that is owed now; what of it has been so for too long."""
         before, self._owed = self._owed, {}
-        for demand in demands:
-            key = demand.device, demand.event.number
-            old, since = before.get(key, (demand, now))
-            self._owed[key] = (demand, now) if _gets_on(old, demand) else (old, since)
+        for promise in promises:
+            key = promise.device, promise.event.number
+            old, since = before.get(key, (promise, now))
+            self._owed[key] = (promise, now) if _gets_on(old, promise) else (old, since)
         return [owed for owed, since in self._owed.values() if now >= self._ends(owed, since)]
 
     def next_deadline(self) -> float:
         """When something will have been owed for too long [s]."""
         return min((self._ends(*owed) for owed in self._owed.values()), default=math.inf)
 
-    def _ends(self, owed: Demand, since: float) -> float:
+    def _ends(self, owed: Promise, since: float) -> float:
         rules = self.rules
         return since + (rules.depart_within if owed.owes == SET_OUT else rules.still_within)
 
 
-def _gets_on(old: Demand, new: Demand) -> bool:
+def _gets_on(old: Promise, new: Promise) -> bool:
     if old.event is not new.event or old.owes != new.owes:
         return True
     if new.owes == SET_OUT or new.at is None:

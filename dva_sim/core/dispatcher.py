@@ -251,6 +251,11 @@ class Patrols:
             return []
         return [self._round(entry, body.session)]
 
+    def forget(self, robot: str) -> None:
+        """A robot is not known any longer."""
+        self._idle_since.pop(robot, None)
+        self._on_round.discard(robot)
+
     def _with_a_beat(self, registry: Registry) -> Iterator[DeviceEntry]:
         if self.beats:
             yield from (e for e in registry.of_type(ROBOT) if e.device.label in self.beats)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -158,7 +159,8 @@ class Dva:
         if now >= self._access_ends:
             self.check_access(now)
         sends += self.orders.take_back(now)
-        self.sessions.remind()
+        self._forget_the_long_silent(now)
+        self.sessions.remind(self._is_there)
         self.handovers.lapse(now)
         sends += self.sensing.renew(self.registry, self.sessions, now)
         sends += self.dispatcher.decide(now)
@@ -166,13 +168,17 @@ class Dva:
         return self._and_revocations(sends)
 
     def next_deadline(self) -> float:
-        """When `tick` has something to do at the latest, if nothing else happens [s]."""
+        """When `tick` has something to do at the latest, if nothing else happens [s].
+
+        Forgetting can wait.
+        """
         return min(
             self.orders.next_deadline(),
             self.dispatcher.auctions.next_deadline(),
             self.registry.next_silence(),
             self._access_ends,
             self.sensing.next_due(),
+            self.handovers.next_deadline(),
         )
 
     def go_on(self) -> list[Send]:
@@ -227,6 +233,8 @@ class Dva:
             return self._refuse(message, m.NOT_PERMITTED, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
+        if known is None and self.registry.is_full:
+            sends = self._make_room(now)
         entry = self.registry.register(message.source, body, now)
         if entry is None:
             return self._refuse(message, m.BUSY, "the registry is full")
@@ -239,8 +247,39 @@ class Dva:
         """A device is there no more: what it held is free, what it did is open to others."""
         self.sessions.take_back_all(device)
         self.sensing.forget(device)
+        self.sessions.permissions.forget(self.sessions.permissions.own, device)
         self.dispatcher.situations.forget_move(device)
         return self.orders.abandon(device, now)
+
+    def _is_there(self, device: str) -> bool:
+        entry = self.registry.entries.get(device)
+        return entry is not None and not entry.silent
+
+    def _forget_the_long_silent(self, now: float) -> None:
+        """Those of whom nothing is open; the others last."""
+        late = list(self.registry.long_silent(now))
+        for device in self._with_nothing_open(late) if late else ():
+            self._forget(device)
+
+    def _make_room(self, now: float) -> list[Send]:
+        """Forget the longest silent: one of whom nothing is open, if there is such."""
+        silent = self.registry.silent
+        device = next(chain(self._with_nothing_open(silent), silent), None)
+        if device is None:
+            return []
+        self.counters["forgotten for want of room"] += 1
+        sends = self._gone(device, now)
+        self._forget(device)
+        return sends
+
+    def _with_nothing_open(self, devices: Iterable[str]) -> Iterator[str]:
+        kept, engaged = self.sessions.with_something_open(), self.orders.engaged
+        return (d for d in devices if d not in kept and d not in engaged)
+
+    def _forget(self, device: str) -> None:
+        self.sessions.forget(device)
+        self._patrols.forget(device)
+        self.registry.forget(device)
 
     # --- who may do what ---------------------------------------------------------------
 
@@ -394,6 +433,8 @@ class Dva:
 
         The event is moved there, or ends, if somebody is on the way to where it was felt.
         """
+        if not self.sensing.alarms:
+            return None, []
         felt = (e for e in self.book.open.values() if only_felt(e, self.registry))
         event = within_reach(felt, body.kind, body.position)
         if event is None or source in event.sources:

@@ -7,6 +7,7 @@ is the next session granted. Meanwhile it is nobody else's.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -85,11 +86,16 @@ class Handovers:
     def _noted(self, robot: str, session: int, now: float) -> float:
         """Since when a session is known to hold a robot [s]."""
         if self._since.get(robot, (0, 0.0))[0] != session:
+            grants = self.sessions.permissions.grants
+            if len(self._since) > 2 * len(grants) + 64:
+                self._since = {r: since for r, since in self._since.items() if r in grants}
             self._since[robot] = session, now
         return self._since[robot][1]
 
     def granted(self, robot: str, session: int, now: float) -> None:
         """Somebody has the robot from now on, or still."""
+        if robot in self.sessions.reserved:
+            self.orders.counters["robot handed over"] += 1
         self._noted(robot, session, now)
         self._over(robot)
 
@@ -149,6 +155,10 @@ class Handovers:
         still = max(abs(status.speed), abs(status.turn_rate)) <= STANDING
         if still and status.mode == "Idle":
             known.step, known.until = Step.READY, now + FETCH_WITHIN
+
+    def next_deadline(self) -> float:
+        """When a handover has lasted too long [s]."""
+        return min((known.until for known in self.under_way.values()), default=math.inf)
 
     def lapse(self, now: float) -> None:
         """End what lasts too long, and what nobody is there for."""

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Demand, Progress, Rules
+from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
 from dva_sim.core.events import NEXT, Event, EventBook, State
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
@@ -32,10 +32,10 @@ class Orders:
     engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
     _pauses: list[float] = field(default_factory=list)
-    _progress: Progress = field(init=False)
+    _promises: Promises = field(init=False)
 
     def __post_init__(self) -> None:
-        self._progress = Progress(self.rules)
+        self._promises = Promises(self.rules)
 
     # --- given -------------------------------------------------------------------------
 
@@ -247,23 +247,28 @@ class Orders:
                 sends += self._take_back(device, event, now)
         return sends
 
-    def _overdue(self, now: float) -> list[Demand]:
+    def _overdue(self, now: float) -> list[Promise]:
         """Who has said OK and then does not set out, or stands on the way."""
         if math.isinf(min(self.rules.depart_within, self.rules.still_within)):
             return []
-        late = self._progress.overdue(self._demands(), now)
-        for demand in late:
-            self._pause(demand.device, now)
+        late = self._promises.overdue(self._owed(), now)
+        for promise in late:
+            self._pause(promise.device, now)
         return late
 
-    def _demands(self) -> Iterator[Demand]:
-        """What everybody owes now; who has several orders begins with the first."""
+    def _owed(self) -> Iterator[Promise]:
+        """What everybody owes now; who has several orders begins with the first.
+
+        And may be at any of them: then a robot may stand until it is its turn.
+        """
         for device in self.engaged:
-            event = self.engaged.all(device)[0]
+            event, *others = self.engaged.all(device)
             owes = self._owes(device, event)
+            if owes == MOVE and others:
+                continue
             who = device if device == event.actor else event.responder
             if owes and who is not None:
-                yield Demand(device, event, owes, self.registry.entries[who].position)
+                yield Promise(device, event, owes, self.registry.entries[who].position)
 
     @staticmethod
     def _owes(device: str, event: Event) -> str:
@@ -287,7 +292,7 @@ class Orders:
             ends += (self._wait_ends(e) for e in waiting.values())
         if math.isfinite(rules.order_limit):
             ends += (self._order_ends(d, e) for d, e in self.engaged.pairs())
-        return min(*ends, self._progress.next_deadline())
+        return min(*ends, self._promises.next_deadline())
 
     def _wait_ends(self, event: Event) -> float:
         return event.waiting_since + self.rules.escalate_after
@@ -362,9 +367,10 @@ class Orders:
 
     def _pause(self, device: str, now: float) -> None:
         """Who did not take an order up is not asked again for a while."""
-        until = now + self.rules.declined_pause
-        self.registry.entries[device].free_from = until
-        self._pauses.append(until)
+        entry, until = self.registry.entries.get(device), now + self.rules.declined_pause
+        if entry is not None:
+            entry.free_from = until
+            self._pauses.append(until)
 
     def _release(self, event: Event) -> None:
         """The order to confirm is over, and with it the right to drive there."""

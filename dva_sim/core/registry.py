@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict, defaultdict, deque
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 from dva_sim.protocol.messages import Device, Position, Registration
 
@@ -14,6 +15,7 @@ REMOTE = "Remote Control"  # may drive robots, and is sent no orders
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
 DRIVERS = frozenset({OPERATOR, REMOTE, *SAME_AS})
 MAX_DEVICES = 20_000
+FORGET_AFTER = 60.0  # without a word of it [s]
 
 
 @dataclass(slots=True)
@@ -40,6 +42,11 @@ class DeviceEntry:
     free_from: float = 0.0
     place: int = 0
 
+    @property
+    def kind(self) -> str:
+        """Its type, by the name that the DVA uses."""
+        return SAME_AS.get(self.device.device_type, self.device.device_type)
+
     def is_new_life(self, message_id: int, timestamp: str) -> bool:
         """Whether a registration says that the device has started anew: MessageIDs go back.
 
@@ -56,12 +63,15 @@ class Registry:
 
     Attributes:
         silent_after: How long a device may be quiet before it counts as gone [s].
+        forget_after: How long before it is forgotten, unless something of it is open [s].
         most: How many devices there may be.
         entries: In order of registration.
-        version: Grows whenever somebody comes, goes silent, returns, or is called otherwise.
+        version: Grows whenever somebody comes, goes silent, returns, is forgotten, or is called
+            otherwise.
     """
 
     silent_after: float = 10.0
+    forget_after: float = FORGET_AFTER
     most: int = MAX_DEVICES
     entries: dict[str, DeviceEntry] = field(default_factory=dict)
     version: int = 0
@@ -70,36 +80,46 @@ class Registry:
     _heard: OrderedDict[str, DeviceEntry] = field(
         default_factory=OrderedDict
     )  # longest quiet first
-    _changed: dict[str, DeviceEntry] = field(default_factory=dict)
+    _silent: OrderedDict[str, DeviceEntry] = field(default_factory=OrderedDict)  # likewise
+    _changed: dict[str, DeviceEntry | None] = field(default_factory=dict)
+    _moved: dict[str, DeviceEntry | None] = field(default_factory=dict)
+    _places: int = 0
+
+    @property
+    def is_full(self) -> bool:
+        """Whether nobody else fits."""
+        return len(self.entries) >= self.most
 
     def register(self, id_tag: str, request: Registration, now: float) -> DeviceEntry | None:
         """Enter a device, or renew its entry; None if the registry is full."""
         device = Device(id_tag, request.label, request.device_type, request.address)
         entry = self.entries.get(id_tag)
         if entry is None:
-            return self.add(DeviceEntry(device, now)) if len(self.entries) < self.most else None
+            return None if self.is_full else self.add(DeviceEntry(device, now))
         if entry.device != device:
             entry.device = device
-            self._changed[id_tag] = entry
-            self.version += 1
+            self._note(id_tag, entry)
         self.heard(id_tag, now)
         return entry
 
     def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
-        device, entry.place = entry.device, len(self.entries)
-        kind = SAME_AS.get(device.device_type, device.device_type)
-        self.entries[device.id_tag] = self._of_type[kind][device.id_tag] = entry
-        self._heard[device.id_tag] = self._changed[device.id_tag] = entry
-        self.version += 1
+        device, entry.place = entry.device, self._places
+        self._places += 1
+        self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry
+        self._heard[device.id_tag] = entry
+        self._note(device.id_tag, entry)
         return entry
 
     def heard(self, id_tag: str, now: float) -> DeviceEntry | None:
         """Note a sign of life; None if the device is not registered."""
         entry = self.entries.get(id_tag)
         if entry is not None:
-            self.version += entry.silent
-            entry.last_heard, entry.silent = now, False
+            if entry.silent:
+                entry.silent = False
+                del self._silent[id_tag]
+                self._note(id_tag, entry)
+            entry.last_heard = now
             self._heard[id_tag] = entry
             self._heard.move_to_end(id_tag)
         return entry
@@ -107,7 +127,7 @@ class Registry:
     def locate(self, entry: DeviceEntry, position: Position) -> None:
         """Note where a device is."""
         if entry.position is None:
-            self._located[entry.device.device_type][entry.device.id_tag] = entry
+            self._located[entry.kind][entry.device.id_tag] = entry
         entry.position = position
 
     def fallen_silent(self, now: float) -> list[DeviceEntry]:
@@ -116,10 +136,30 @@ class Registry:
         while self.next_silence() <= now:
             id_tag, entry = next(iter(self._heard.items()))
             entry.silent = True
-            self.version += 1
+            self._silent[id_tag] = entry
+            self._note(id_tag, entry)
             gone.append(entry)
             del self._heard[id_tag]
         return gone
+
+    def forget(self, id_tag: str) -> None:
+        """A device was never registered."""
+        entry = self.entries.pop(id_tag)
+        for known in (self._of_type, self._located):
+            known[entry.kind].pop(id_tag, None)
+        self._heard.pop(id_tag, None)
+        self._silent.pop(id_tag, None)
+        self._note(id_tag, None)
+
+    def long_silent(self, now: float) -> Iterator[str]:
+        """Devices that could be forgotten by now, the longest silent first."""
+        until = now - self.forget_after
+        return (i for i, _ in takewhile(lambda e: e[1].last_heard < until, self._silent.items()))
+
+    @property
+    def silent(self) -> Iterable[str]:
+        """All that are silent, the longest silent first."""
+        return self._silent
 
     def next_silence(self) -> float:
         """When the device that was heard longest ago will have been quiet for too long [s]."""
@@ -136,7 +176,16 @@ class Registry:
         """Devices of a type of which is known where they are, in any order, silent ones too."""
         return self._located[device_type].values()
 
-    def changes(self) -> list[DeviceEntry]:
-        """The devices that registered, or moved to another address, since this was last asked."""
+    def changes(self) -> dict[str, DeviceEntry | None]:
+        """Who came, moved, fell silent, was heard again or is forgotten: for the memory."""
         changed, self._changed = self._changed, {}
-        return list(changed.values())
+        return changed
+
+    def moves(self) -> dict[str, DeviceEntry | None]:
+        """The same for whoever listens to the devices; each is told once to either."""
+        moved, self._moved = self._moved, {}
+        return moved
+
+    def _note(self, id_tag: str, entry: DeviceEntry | None) -> None:
+        self._moved[id_tag] = self._changed[id_tag] = entry
+        self.version += 1

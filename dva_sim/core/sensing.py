@@ -29,7 +29,7 @@ MOST_LISTED = 64
 
 
 @dataclass(frozen=True)
-class Alarm:
+class SensorAlarm:
     """What it means when a sensor shows much.
 
     Attributes:
@@ -51,7 +51,7 @@ class Sensing:
         known: What robots have said that they have.
     """
 
-    alarms: Mapping[str, Alarm] = field(default_factory=dict)
+    alarms: Mapping[str, SensorAlarm] = field(default_factory=dict)
     rate_hz: float = 1.0
     known: dict[str, m.SensorInfo] = field(default_factory=dict)
     _asked: set[str] = field(default_factory=set)
@@ -79,8 +79,10 @@ class Sensing:
             del self._above[key]
 
     def told(self, robot: str, content: object, now: float) -> None:
-        """A robot has answered, or not."""
-        self._asked.discard(robot)
+        """A robot has answered, or not; of one that is gone meanwhile nothing is kept."""
+        if robot not in self._asked:
+            return
+        self._asked.remove(robot)
         if not isinstance(content, m.SensorInfo):
             self._mute.add(robot)
             return
@@ -133,7 +135,7 @@ class Sensing:
         """When `renew` has something to do [s]."""
         return min(self._due.values(), default=math.inf)
 
-    def crossed(self, robot: str, value: m.SensorValue) -> Alarm | None:
+    def crossed(self, robot: str, value: m.SensorValue) -> SensorAlarm | None:
         """The alarm that a value gives: once, until the sensor has shown less again."""
         alarm = self.alarms.get(value.sensor)
         if alarm is None:

@@ -42,7 +42,7 @@ class Sessions:
     changes: int = 0
     reserved: set[str] = field(default_factory=set)
     _over: list[Send] = field(default_factory=list)
-    _unheard: list[Send] = field(default_factory=list)
+    _unheard: dict[int, Send] = field(default_factory=dict)
 
     def grant(
         self, robot: m.Device, holder: m.Device, wish: m.PermissionRequest
@@ -129,7 +129,7 @@ class Sessions:
             self.permissions.end(body.session)
             self._tell(Grant(send.to, body.holder, body.level, body.session), holder_too=True)
         elif isinstance(body, m.PermissionRevocation) and send.to == body.device:
-            self._unheard.append(send)
+            self._unheard[body.session] = send
 
     def above(self, send: Send, floor: int) -> Send | None:
         """A robot has refused a grant, and told the highest session it knows: one above that.
@@ -159,11 +159,21 @@ class Sessions:
         if isinstance(body, m.PermissionRevocation) and send.to == body.device:
             self.changes += self.untold.pop(body.session, None) is not None
 
-    def remind(self) -> None:
-        """Tell the robots again that have not heard."""
-        known = self.untold.values()
-        self._over += [send for send in dict.fromkeys(self._unheard) if send in known]
-        self._unheard.clear()
+    def remind(self, is_there: Callable[[str], bool]) -> None:
+        """Tell the robots again that have not heard, as soon as they are there."""
+        self._unheard = {s: send for s, send in self._unheard.items() if s in self.untold}
+        there = [s for s, send in self._unheard.items() if is_there(send.to)]
+        self._over += [self._unheard.pop(session) for session in there]
+
+    def with_something_open(self) -> set[str]:
+        """The robots that somebody holds, or that still have to hear that a session is over."""
+        held = {g.robot for g in self.permissions.all() if g.holder != self.permissions.own}
+        return held.union(send.to for send in self.untold.values())
+
+    def forget(self, robot: str) -> None:
+        """A robot is not known any longer: its holders hear that, and it, if it comes back."""
+        for grant in [g for g in self.permissions.all() if g.robot == robot]:
+            self.revoke(grant)
 
     def tell_robot(self, body: m.PermissionRevocation) -> None:
         """A robot has to hear that a session is over, and is told until it has."""

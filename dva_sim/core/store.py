@@ -59,7 +59,8 @@ class Store:
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
         self._session_changes = 0
         self._events: dict[int, Event] = {}
-        self._devices: dict[str, DeviceEntry] = {}
+        self._devices: dict[str, DeviceEntry | None] = {}
+        self._lasting: set[str] = set()
         self._path = file
         try:
             self._file = sqlite3.connect(file, isolation_level=None, timeout=OPEN_WITHIN)
@@ -107,32 +108,38 @@ class Store:
         What cannot be written, to a full disk for example, is tried again with the next change.
         """
         self._events |= {event.number: event for event in changed}
-        self._devices |= {entry.device.id_tag: entry for entry in dva.registry.changes()}
+        self._devices |= dva.registry.changes()
         changes = _session_changes(dva)
         if not (self._events or self._devices or changes != self._session_changes):
             return None
         sessions = self._sessions if changes == self._session_changes else _of_sessions(dva)
+        lasting = dva.sessions.with_something_open()
+        entries = dva.registry.entries
+        self._devices |= {i: entries[i] for i in lasting ^ self._lasting if i in entries}
         try:
             self._file.execute("BEGIN IMMEDIATE")
-            self._write(dva, sessions)
+            self._write(dva, sessions, lasting)
             self._file.execute("COMMIT")
         except sqlite3.Error as error:
             if self._file.in_transaction:
                 self._file.execute("ROLLBACK")
             return f"cannot keep its memory: {error}"
         self._events, self._devices, self._sessions = {}, {}, sessions
-        self._session_changes = changes
+        self._session_changes, self._lasting = changes, lasting
         return None
 
-    def _write(self, dva: Dva, sessions: dict[str, dict[str, str]]) -> None:
+    def _write(self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str]) -> None:
         put = self._file.executemany
         events = (
             (e.number, e.open, json.dumps(_of_event(e, dva, self.epoch)))
             for e in self._events.values()
         )
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
-        devices = ((i, json.dumps(_of_entry(e))) for i, e in self._devices.items())
+        known = {i: e for i, e in self._devices.items() if e is not None}
+        devices = ((i, json.dumps(_of_entry(e, i in lasting))) for i, e in known.items())
         put(_PUT_DEVICE, devices)
+        gone = self._devices.keys() - known.keys()
+        put("DELETE FROM devices WHERE id = ?", ((i,) for i in gone))
         for table, now in sessions.items():
             before = self._sessions[table]
             put(
@@ -148,7 +155,8 @@ class Store:
     def recall(self, dva: Dva, now: float) -> bool:
         """Tell a new DVA what an earlier one knew; whether there was anything.
 
-        Devices count as heard just now: each has its time-out to show that it is there.
+        Devices count as heard just now: each has its time-out to show that it is there. Who was
+        silent, with nothing of it open, is forgotten: it would only hold a place until then.
 
         Raises:
             ConfigError: what the file holds makes no sense.
@@ -161,6 +169,7 @@ class Store:
         return found
 
     def _recall(self, dva: Dva, now: float) -> bool:
+        self._file.execute("DELETE FROM devices WHERE json_extract(data, '$.silent')")
         for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
             dva.registry.add(_entry(json.loads(data), now))
         found = bool(dva.registry.entries)
@@ -194,6 +203,7 @@ class Store:
         for data in self._sessions["untold"].values():
             dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
         self._session_changes = _session_changes(dva)
+        self._lasting = dva.sessions.with_something_open()
         permissions.count = max(permissions.count, self._about("sessions"))
 
     def _about(self, name: str) -> int:
@@ -266,8 +276,9 @@ def _grant(kept: list[Any]) -> Grant:
     return Grant(robot, holder, level, session, sensors=tuple(sensors), address=address)
 
 
-def _of_entry(entry: DeviceEntry) -> dict[str, Any]:
-    return {"device": _plain(entry.device), "registrations": list(entry.registrations)}
+def _of_entry(entry: DeviceEntry, lasts: bool) -> dict[str, Any]:
+    said, silent = list(entry.registrations), entry.silent and not lasts
+    return {"device": _plain(entry.device), "registrations": said, "silent": silent}
 
 
 def _entry(kept: dict[str, Any], now: float) -> DeviceEntry:

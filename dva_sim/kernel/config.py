@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.comments import CommentedMap, CommentedSeq, TaggedScalar
+from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from dva_sim.kernel.errors import ConfigError
@@ -437,7 +438,7 @@ def load_yaml(path: str | Path) -> Document:
     text = read_text(path)
     places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
     try:
-        tree = YAML(typ="rt", pure=True).load(text)
+        tree = _reader().load(text)
         if not isinstance(tree, CommentedMap):
             raise ConfigError("should be a mapping of keys to values", path, 1, 1)
         return Document(_plain(tree, (), places), path, places)
@@ -456,6 +457,35 @@ def load_yaml(path: str | Path) -> Document:
         raise ConfigError(f"has a value that cannot be read: {error}", path) from error
 
 
+_OWN = "tag:yaml.org,2002:"
+_VALUES = frozenset(
+    f"{_OWN}{kind}"
+    for kind in ("str", "int", "float", "bool", "null", "map", "seq", "timestamp", "merge")
+)
+
+
+class _PlainKinds(RoundTripConstructor):
+    """Makes nothing but text, numbers, yes and no, lists and mappings.
+
+    Else a tag such as `!!python/object` makes something that nobody expects further on.
+    """
+
+    def construct_object(self, node: Any, deep: bool = False) -> Any:
+        """The value of a node."""
+        if str(node.tag) not in _VALUES:
+            tag = str(node.tag).replace(_OWN, "!!")[:64]
+            problem = f"{tag} makes no value that is known here; write the value without it"
+            raise ConstructorError(problem=problem, problem_mark=node.start_mark)
+        return super().construct_object(node, deep)
+
+
+def _reader() -> YAML:
+    """Reads YAML with its places."""
+    reader = YAML(typ="rt", pure=True)
+    reader.Constructor = _PlainKinds
+    return reader
+
+
 class _TooMuchError(ValueError):
     """A few aliases of aliases can stand for more values than any memory holds."""
 
@@ -467,7 +497,7 @@ def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> 
     if isinstance(node, CommentedMap):
         out = {}
         for key, value in node.items():
-            line, column = node.lc.key(key)
+            line, column, *_ = (node.lc.data or {}).get(key, (node.lc.line, node.lc.col))
             places[(*path, str(key))] = (line + 1, column + 1)
             out[str(key)] = _plain(value, (*path, str(key)), places)
         return out
@@ -478,6 +508,8 @@ def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> 
         return [_plain(value, (*path, index), places) for index, value in enumerate(node)]
     if isinstance(node, bool) or node is None:
         return node
+    if isinstance(node, TaggedScalar):
+        return str(node.value)
     for kind in (int, float, str):
         if isinstance(node, kind):
             return kind(node)

@@ -9,6 +9,7 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,6 +18,7 @@ from dva_sim.agents.operator.scripted import ScriptedOperator, drill
 from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event
+from dva_sim.core.registry import MAX_DEVICES, DeviceEntry
 from dva_sim.core.sessions import Permissions
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
@@ -30,6 +32,7 @@ from dva_sim.simulation.full.stage import Stage
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
 SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years
 FILES_PER_DEVICE, FILES_APART = 16, 200  # open at the DVA
+MOST_ROWS = 200  # of the table; more are read by nobody
 RATE_OVER = 5.0  # rates are of so many last seconds [s]
 
 Row = dict[str, Any]
@@ -89,23 +92,23 @@ class DvaPart:
         self._beats: dict[str, Rate] = {}
 
     def rows(self) -> list[Row]:
-        """See `LivePart`: what everybody told the DVA."""
-        now, desk = self._stage.clock.now, self._agent.desk
-        rows, engaged = [], desk.orders.engaged
-        for id_tag, entry in desk.registry.entries.items():
-            beats = self._beats.setdefault(id_tag, Rate()).of(self._agent.beats[id_tag], now)
-            rows.append(
-                {
-                    "label": entry.device.label,
-                    "type": entry.device.device_type,
-                    "address": entry.device.address,
-                    "heard_s": now - entry.last_heard,
-                    "beats_hz": beats,
-                    "silent": entry.silent,
-                    "order": next((event.number for event in engaged.all(id_tag)), None),
-                }
-            )
-        return rows
+        """See `LivePart`: what the first so many told the DVA, who is there before who is not."""
+        known = self._agent.desk.registry.entries
+        first = islice(sorted(known, key=lambda i: known[i].silent), MOST_ROWS)
+        self._beats = {i: self._beats.get(i) or Rate() for i in first}
+        return [self._row(i, known[i], rate) for i, rate in self._beats.items()]
+
+    def _row(self, id_tag: str, entry: DeviceEntry, beats: Rate) -> Row:
+        now, engaged = self._stage.clock.now, self._agent.desk.orders.engaged
+        return {
+            "label": entry.device.label,
+            "type": entry.device.device_type,
+            "address": entry.device.address,
+            "heard_s": now - entry.last_heard,
+            "beats_hz": beats.of(self._agent.beats[id_tag], now),
+            "silent": entry.silent,
+            "order": next((event.number for event in engaged.all(id_tag)), None),
+        }
 
     def events(self) -> list[Row]:
         """The events, as the DVA knows them."""
@@ -135,7 +138,7 @@ def _devices_that_fit() -> int:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     usable = soft if hard == resource.RLIM_INFINITY else hard
-    return max(1, (usable - FILES_APART) // FILES_PER_DEVICE)
+    return max(1, min(MAX_DEVICES, (usable - FILES_APART) // FILES_PER_DEVICE))
 
 
 class WorldPart:

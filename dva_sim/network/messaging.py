@@ -75,6 +75,9 @@ class Transport(Protocol):
     def introduce(self, node: str, address: str) -> None:
         """Say where a node is found, as in its registration."""
 
+    def forget(self, node: str) -> None:
+        """A node is not needed any longer: nobody is connected to it, or will be."""
+
     def serve(self, node: str, service: Service) -> None:
         """Let `service` take the requests to `node`."""
 
@@ -171,6 +174,13 @@ class Requester:
         self._last_tag += 1
         self._queue.append(_Asked(self._last_tag, data, on_reply, on_failure))
         self._fill()
+
+    def give_up(self) -> None:
+        """The peer is gone for good: whatever waits has failed."""
+        waiting = [*self._open.values(), *self._queue]
+        self.close()
+        for asked in waiting:
+            asked.on_failure()
 
     def close(self) -> None:
         """Forget everything, without a word to those who wait."""

@@ -7,16 +7,75 @@ soon as it arrives. One thread does everything.
 from __future__ import annotations
 
 import math
+import selectors
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import zmq
 
 from dva_sim.kernel.clock import US, Clock
 
 AT_ONCE = 500  # events that are late, before messages have their turn
-LONGEST_WAIT = 60_000  # of one poll [ms]
+LONGEST_WAIT = 60.0  # of one poll [s]
+
+# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
+EVENTS: Final = int(zmq.EVENTS)
+POLLIN: Final = int(zmq.POLLIN)
+
+
+def has_more(socket: zmq.Socket[bytes]) -> bool:
+    """Whether something can be read: asking costs a third of trying in vain."""
+    return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
+
+
+class Poller:
+    """Waits for sockets, at a cost that does not grow with those that have nothing to say.
+
+    `zmq.Poller` asks every socket each time, so that a message among a thousand sockets costs a
+    thousand questions. The file descriptor of a ZeroMQ socket says only that it should be asked:
+    once asked it is quiet, whatever is left to read. So a socket is asked again for as long as
+    it had something, and after everything else that may have asked it, as sending does (`look`).
+    """
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._files: dict[Any, int] = {}
+        self._ask: dict[zmq.Socket[bytes], None] = {}
+
+    def register(self, source: Any) -> None:
+        """Wait for a socket of ZeroMQ, or for a file descriptor, too."""
+        file = int(source.getsockopt(zmq.FD)) if isinstance(source, zmq.Socket) else source
+        self._selector.register(file, selectors.EVENT_READ, source)
+        self._files[source] = file
+        self.look(source)
+
+    def unregister(self, source: Any) -> None:
+        """Wait for it no more; to be called before it is closed."""
+        self._selector.unregister(self._files.pop(source))
+        self._ask.pop(source, None)
+
+    def look(self, source: Any) -> None:
+        """Ask a socket again, if it is one of these: it was used by others."""
+        if source in self._files and isinstance(source, zmq.Socket):
+            self._ask[source] = None
+
+    def poll(self, wait: float) -> list[Any]:
+        """Those that have something to read, after so long at most [s]; there may be none."""
+        asked, self._ask = self._ask, {}
+        self._ask = ready = {socket: None for socket in asked if has_more(socket)}
+        found: list[Any] = []
+        for key, _ in self._selector.select(0.0 if ready else wait):
+            source = key.data
+            if not isinstance(source, zmq.Socket):
+                found.append(source)
+            elif source not in ready and has_more(source):
+                ready[source] = None
+        return [*ready, *found]
+
+    def close(self) -> None:
+        """Wait for nothing more."""
+        self._selector.close()
 
 
 class LiveClock(Clock):
@@ -36,7 +95,7 @@ class LiveClock(Clock):
         super().__init__()
         elapsed = 0.0 if epoch is None else time.monotonic() - epoch
         self._origin = time.monotonic_ns() // 1000 - round(elapsed * US)
-        self._poller = zmq.Poller()
+        self._poller = Poller()
         self._handlers: dict[Any, Callable[[], object]] = {}
         self._running = False
         self.lateness = 0.0
@@ -44,13 +103,18 @@ class LiveClock(Clock):
 
     def watch(self, source: Any, handler: Callable[[], object]) -> None:
         """Call `handler()` whenever a socket or file descriptor has something to read."""
+        if source not in self._handlers:
+            self._poller.register(source)
         self._handlers[source] = handler
-        self._poller.register(source, zmq.POLLIN)
 
     def unwatch(self, source: Any) -> None:
         """Look at it no more."""
         if self._handlers.pop(source, None) is not None:
             self._poller.unregister(source)
+
+    def look(self, source: Any) -> None:
+        """A socket was used: what it has to read may be told by nothing else."""
+        self._poller.look(source)
 
     def stop(self) -> None:
         """Let `run` return after what is being done now."""
@@ -68,10 +132,9 @@ class LiveClock(Clock):
     def _wait(self, end: float) -> None:
         """Wait for the next event or message; events that are due by then go first."""
         wait = min(self.env.peek(), end) - self._real()
-        # Rounded up: an event may be a millisecond late, but the processor is not kept spinning.
-        ready = self._poller.poll(0 if wait <= 0 else min(LONGEST_WAIT, int(wait) // 1000 + 1))
+        ready = self._poller.poll(max(0.0, min(LONGEST_WAIT, wait / US)))
         self._catch_up(end)
-        for source, _ in ready:
+        for source in ready:
             handler = self._handlers.get(source)
             if handler is not None:  # nobody unwatched it since
                 handler()

@@ -27,6 +27,7 @@ import zmq
 from zmq.utils import z85
 
 from dva_sim.network.keys import KeyRing
+from dva_sim.network.realtime import Poller
 
 _SIGNATURE = b"\xff" + bytes(7) + b"\x01\x7f"
 _VERSION = b"\x03\x00"
@@ -245,14 +246,15 @@ class Security:
     def __init__(
         self,
         context: zmq.Context[Socket],
-        poller: zmq.Poller,
+        poller: Poller,
         ring: KeyRing | None,
         tell: Callable[[Refusal], object],
     ) -> None:
         self._context, self._poller, self._ring, self._tell = context, poller, ring, tell
         self._has_keys = ring is not None
         self._watches: dict[Socket, _Watch] = {}
-        self._handshakes: dict[_Way, _Handshake] = {}
+        self._monitors: dict[Socket, Socket] = {}
+        self._handshakes: dict[str, dict[_Way, _Handshake]] = {}  # by peer
         self._greetings: dict[Socket, tuple[_Way, Greeting]] = {}
         self._told: set[Refusal] = set()
         self._strangers: set[tuple[str, bytes]] = set()
@@ -307,10 +309,16 @@ class Security:
 
     def trouble(self, device: str, peer: str) -> str | None:
         """What stands between a device and its peer now: for the message after a time-out."""
-        for (one, other, _), handshake in self._handshakes.items():
-            if (one, other) == (device, peer) and handshake.latest is not None:
+        for (one, _, _), handshake in self._handshakes.get(peer, {}).items():
+            if one == device and handshake.latest is not None:
                 return str(handshake.latest)
         return None
+
+    def forget(self, peer: str) -> None:
+        """What was gone through with a device that is there no more."""
+        self._handshakes.pop(peer, None)
+        for socket in [s for s, (way, _) in self._greetings.items() if way[1] == peer]:
+            self._end_greeting(socket)
 
     def retry(self, socket: Socket) -> None:
         """Connect again after ZeroMQ gave up; what waited in the socket was lost with that."""
@@ -322,9 +330,9 @@ class Security:
 
     def release(self, socket: Socket) -> None:
         """Watch a socket no longer; to be called before it is closed."""
-        for monitor, watch in list(self._watches.items()):
-            if watch.socket is socket:
-                self._drop(monitor)
+        monitor = self._monitors.get(socket)
+        if monitor is not None:
+            self._drop(monitor)
 
     def close(self) -> None:
         """Release everything. From now on servers refuse whoever knocks."""
@@ -346,7 +354,7 @@ class Security:
         except zmq.ZMQError:
             zap.close()
             raise
-        self._poller.register(zap, zmq.POLLIN)
+        self._poller.register(zap)
         return zap
 
     def _give_keys(self, socket: Socket, device: str) -> None:
@@ -363,12 +371,14 @@ class Security:
         monitor.setsockopt(zmq.LINGER, 0)
         monitor.setsockopt(zmq.RCVHWM, _MONITOR_ROOM)
         monitor.connect(address)
-        self._poller.register(monitor, zmq.POLLIN)
+        self._poller.register(monitor)
         self._watches[monitor] = _Watch(socket, device, peer)
+        self._monitors[socket] = monitor
 
     def _drop(self, monitor: Socket) -> None:
         """End a monitor, its source first: libzmq would wait for a reader that has gone."""
         watch = self._watches.pop(monitor)
+        del self._monitors[watch.socket]
         if not watch.socket.closed:
             watch.socket.disable_monitor()
         self._poller.unregister(monitor)
@@ -431,11 +441,11 @@ class Security:
     def _note_client(self, device: str, peer: str, endpoint: str, event: int, value: int) -> None:
         way = device, peer, endpoint
         if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
-            self._handshakes.pop(way, None)
+            self._handshakes.get(peer, {}).pop(way, None)
             for socket in [s for s, (at, _) in self._greetings.items() if at == way]:
                 self._end_greeting(socket)
             return
-        handshake = self._handshakes.setdefault(way, _Handshake())
+        handshake = self._handshakes.setdefault(peer, {}).setdefault(way, _Handshake())
         reason, why = at_client(self._has_keys, device, peer, event, value)
         self.refused[device, reason] += 1
         handshake.latest = Refusal(device, peer, endpoint, reason, why)
@@ -463,14 +473,14 @@ class Security:
             handshake.greeted = True
             greeting = Greeting(self._context, way[2], "NULL" if self._ring is None else "CURVE")
             self._greetings[greeting.socket] = way, greeting
-            self._poller.register(greeting.socket, zmq.POLLIN)
+            self._poller.register(greeting.socket)
 
     def _read_greeting(self, socket: Socket) -> None:
         way, greeting = self._greetings[socket]
         greeting.read()
         if greeting.done:
             self._end_greeting(socket)
-        handshake = self._handshakes.get(way)
+        handshake = self._handshakes.get(way[1], {}).get(way)
         # The news of the end may fail to come: what the other end speaks is enough to conclude.
         is_open = greeting.theirs is None and not greeting.done
         if is_open or handshake is None or handshake.told:

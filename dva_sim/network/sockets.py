@@ -7,7 +7,7 @@ them with REQ or DEALER, and with SUB. `protocol/README.md` says the same for ot
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Final
@@ -18,7 +18,7 @@ from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.messaging import OnReply, Request, Service
-from dva_sim.network.realtime import LiveClock
+from dva_sim.network.realtime import LiveClock, Poller, has_more
 from dva_sim.network.security import Refusal, Security, Socket, user_of
 
 DRAIN: Final = 64  # messages read from one socket before others have their turn
@@ -26,8 +26,6 @@ DRAIN: Final = 64  # messages read from one socket before others have their turn
 # As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
 NOBLOCK: Final = int(zmq.NOBLOCK)
 MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
-EVENTS: Final = int(zmq.EVENTS)
-POLLIN: Final = int(zmq.POLLIN)
 
 
 def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
@@ -39,11 +37,6 @@ def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
         zmq.RCVBUF: zeromq.receive_buffer_bytes,
     }
     return {int(option): value for option, value in options.items() if value is not None}
-
-
-def has_more(socket: Socket) -> bool:
-    """Whether something can be read: asking costs a third of trying in vain."""
-    return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
 
 
 def next_of(socket: Socket) -> list[bytes] | None:
@@ -89,7 +82,7 @@ class SocketWire:
     kind: int
 
     def __init__(self, network: SocketNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._on_reply = network, on_reply
+        self._network, self._peer, self._on_reply = network, peer, on_reply
         self._socket = network.client(self.kind, node, peer)
         self._configure()
         network.clock.watch(self._socket, self._replies)
@@ -103,7 +96,7 @@ class SocketWire:
 
     def close(self) -> None:
         """See `Wire`."""
-        self._network.close_client(self._socket)
+        self._network.close_client(self._socket, self._peer)
 
     def _replies(self) -> None:
         for _ in range(DRAIN):
@@ -167,15 +160,16 @@ class SocketSubscription:
         topic: str,
         handler: Callable[[Any], object],
     ) -> None:
-        self._network, self._handler = network, handler
+        self._network, self._peer, self._handler = network, publisher, handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
-        self._paused = False
+        self._paused = self._over = False
         network.clock.watch(self._socket, self._hear)
 
     def close(self) -> None:
         """See `Subscription`."""
-        self._network.close_client(self._socket)
+        self._paused = self._over = True
+        self._network.close_client(self._socket, self._peer, soon=True)
 
     def pause(self) -> None:
         """See `Subscription`: what is not read waits in the socket."""
@@ -184,7 +178,7 @@ class SocketSubscription:
 
     def resume(self) -> None:
         """See `Subscription`."""
-        if self._paused and not self._socket.closed:
+        if self._paused and not self._over:
             self._paused = False
             self._network.clock.watch(self._socket, self._hear)
 
@@ -205,6 +199,7 @@ LARGEST_TOPIC: Final = 512  # the same of a subscriber [B]
 LARGEST_PICTURE: Final = 2_000_000  # the same of a publisher [B]
 LINGER: Final = 200  # for last words when a node leaves [ms]
 LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
+CLOSED_AT_ONCE: Final = 10  # sockets, at each such look
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
@@ -249,8 +244,7 @@ class SocketNetwork:
         # Each connection needs three; the system's own limit of open files comes first.
         self._context.set(zmq.MAX_SOCKETS, MOST_SOCKETS)
         self._ring = ring
-        # Polled now and then: each socket in the clock's own poller makes every message slower.
-        self._aside = zmq.Poller()
+        self._aside = Poller()  # what can wait is looked at now and then
         self._security = Security(self._context, self._aside, ring, self._refused)
         clock.every(LOOK_ASIDE, self._look_aside)
         self.counters: Counter[str] = Counter()
@@ -258,7 +252,8 @@ class SocketNetwork:
         self._services: dict[str, Service] = {}
         self._routers: dict[str, Socket] = {}
         self._publishers: dict[str, PublisherSocket] = {}
-        self._clients: dict[Socket, tuple[str, str]] = {}
+        self._clients: dict[str, dict[Socket, str]] = {}  # by peer: whose
+        self._leaving: deque[Socket] = deque()
 
     # --- who is where ------------------------------------------------------------------
 
@@ -267,8 +262,13 @@ class SocketNetwork:
         before = self.endpoint(node, published=False)
         self._addresses[node] = address
         if self.endpoint(node, published=False) != before:
-            for socket in [s for s, (_, peer) in self._clients.items() if peer == node]:
+            for socket in self._clients.get(node, ()):
                 self._reach(socket, node)
+
+    def forget(self, node: str) -> None:
+        """See `Transport`; whoever still has a connection to it closes that first."""
+        self._addresses.pop(node, None)
+        self._security.forget(node)
 
     def address(self, node: str) -> str | None:
         """Where a node is found, if anybody said."""
@@ -324,19 +324,28 @@ class SocketNetwork:
         self._discard(self._routers.pop(node), self._publishers.pop(node).socket)
 
     def _look_aside(self) -> bool:
-        for socket, _ in self._aside.poll(0):
+        if self._context.closed:
+            return False
+        for socket in self._aside.poll(0.0):
             self._security.handle(socket)
         for publisher in self._publishers.values():
             publisher.hear()
-        return not self._context.closed
+        for _ in range(min(CLOSED_AT_ONCE, len(self._leaving))):
+            self._close(self._leaving.popleft())
+        return True
 
     def close(self) -> None:
         """Close everything; what was sent last has a moment to leave."""
         for node in list(self._routers):
             self.leave(node)
-        for socket in list(self._clients):
-            self.close_client(socket, linger=LINGER)
+        for peer, sockets in list(self._clients.items()):
+            for socket in list(sockets):
+                socket.linger = LINGER
+                self.close_client(socket, peer)
+        while self._leaving:
+            self._close(self._leaving.popleft())
         self._security.close()
+        self._aside.close()
         self._context.term()
 
     # --- requests ----------------------------------------------------------------------
@@ -383,6 +392,7 @@ class SocketNetwork:
         except zmq.ZMQError:
             # The queue is full, or nobody is there: whoever waits for a reply has a time-out.
             self.counters["not sent"] += 1
+        self.clock.look(socket)
 
     # --- publications ------------------------------------------------------------------
 
@@ -429,7 +439,7 @@ class SocketNetwork:
         socket = self._socket(kind)
         socket.linger = 0
         socket.setsockopt(zmq.MAXMSGSIZE, LARGEST_PICTURE if kind == zmq.SUB else LARGEST)
-        self._clients[socket] = node, peer
+        self._clients.setdefault(peer, {})[socket] = node
         if self._has_key(peer):
             self._security.connect_client(socket, node, peer)
         else:
@@ -457,19 +467,34 @@ class SocketNetwork:
         if last:
             socket.disconnect(last)
         socket.connect(endpoint)
+        self.clock.look(socket)
 
-    def close_client(self, socket: Socket, linger: int = 0) -> None:
-        """Close a socket made by `client`."""
-        if self._clients.pop(socket, None) is not None:
+    def close_client(self, socket: Socket, peer: str, soon: bool = False) -> None:
+        """Close a socket made by `client`.
+
+        Args:
+            socket: Nothing more is read from it.
+            peer: Whom it connects to.
+            soon: A few at a time: when many devices vanish together, the others are not to wait.
+        """
+        sockets = self._clients.get(peer, {})
+        if sockets.pop(socket, None) is not None:
+            if not sockets:
+                del self._clients[peer]
             self.clock.unwatch(socket)
-            self._security.release(socket)
-            socket.close(linger)
+            if soon:
+                self._leaving.append(socket)
+            else:
+                self._close(socket)
+
+    def _close(self, socket: Socket) -> None:
+        self._security.release(socket)
+        socket.close()
 
     def _discard(self, *sockets: Socket) -> None:
         for socket in sockets:
             self.clock.unwatch(socket)
-            self._security.release(socket)
-            socket.close()
+            self._close(socket)
 
     def _refused(self, refusal: Refusal) -> None:
         """A connection could not be made: say so, and try again where ZeroMQ does not."""
@@ -480,8 +505,9 @@ class SocketNetwork:
     def _retry(self, node: str, peer: str) -> None:
         if self._security.trouble(node, peer) is None:
             return
-        for socket in [s for s, way in self._clients.items() if way == (node, peer)]:
+        for socket in [s for s, one in self._clients.get(peer, {}).items() if one == node]:
             self._security.retry(socket)
+            self.clock.look(socket)
         self.clock.call_after(RETRY, self._retry, node, peer)
 
 

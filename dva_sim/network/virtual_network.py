@@ -58,6 +58,9 @@ class VirtualNetwork:
     def introduce(self, node: str, address: str) -> None:
         """See `Transport`: here everybody is found by name."""
 
+    def forget(self, node: str) -> None:
+        """See `Transport`."""
+
     def serve(self, node: str, service: Service) -> None:
         """See `Transport`."""
         self._services[node] = service
@@ -112,7 +115,7 @@ class VirtualNetwork:
         self._clients[client.peer][client] = None
         self._wanted.clear()
 
-    def forget(self, client: VirtualClient) -> None:
+    def release(self, client: VirtualClient) -> None:
         """Somebody wants nothing more of a node."""
         self._clients[client.peer].pop(client, None)
         self._wanted.clear()
@@ -162,7 +165,7 @@ class VirtualClient:
     def close(self) -> None:
         """See `Wire` and `Subscription`."""
         self.connection.close()
-        self._network.forget(self)
+        self._network.release(self)
 
     def _open(self) -> None:
         if self._network.is_wanted(self):

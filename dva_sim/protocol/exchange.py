@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Hashable
 from enum import Enum
 from hashlib import blake2b
@@ -71,12 +71,14 @@ class ReplyCache:
         each: How many replies are kept for each source; the oldest are forgotten first, so
             that no other source can make one's own be forgotten.
         sources: For how many sources; those longest unheard of are forgotten first.
+        room: How much is kept for each source, of which the last reply is more at most [B].
     """
 
-    def __init__(self, each: int = 64, sources: int = 1024) -> None:
-        self._each, self._sources = each, sources
+    def __init__(self, each: int = 64, sources: int = 1024, room: int = 65_536) -> None:
+        self._each, self._sources, self._room = each, sources, room
         self._replies: dict[Key, bytes] = {}
         self._order: OrderedDict[str, deque[Key]] = OrderedDict()
+        self._used: Counter[str] = Counter()
 
     def get(self, key: Key) -> bytes | None:
         """The reply to the same request, if it was answered before."""
@@ -88,10 +90,12 @@ class ReplyCache:
         self._order.move_to_end(source)
         keys.append(key)
         self._replies[key] = reply
-        if len(keys) > self._each:
-            self._replies.pop(keys.popleft(), None)
+        self._used[source] += len(reply)
+        while len(keys) > self._each or (self._used[source] > self._room and len(keys) > 1):
+            self._used[source] -= len(self._replies.pop(keys.popleft(), b""))
         if len(self._order) > self._sources:
-            _, forgotten = self._order.popitem(last=False)
+            gone, forgotten = self._order.popitem(last=False)
+            del self._used[gone]
             for key in forgotten:
                 self._replies.pop(key, None)
         return reply

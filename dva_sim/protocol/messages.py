@@ -40,8 +40,7 @@ CODE_NAMES: Final = {
     NOT_SUPPORTED: "not supported",
 }
 """Reply codes in words, for logs and for the text of a reply."""
-OBEYS_NO_MORE: Final = (NOT_PERMITTED, BAD_SESSION, WRONG_MODE)
-"""Answers to a command after which the next would fare no better."""
+OBEYS_NO_MORE: Final = (NOT_PERMITTED, BAD_SESSION, WRONG_MODE)  # the next fares no better
 
 EventKind = Literal["fire", "gas_leak", "flood"]
 EVENT_KINDS: Final[tuple[str, ...]] = get_args(EventKind)
@@ -222,11 +221,7 @@ class MissionStatus:
 
 @dataclass(frozen=True, slots=True)
 class GetSensorInfo:
-    """Ask for sensors: a robot for its own, answered with `SensorInfo`; the DVA with `SensorList`.
-
-    Attributes:
-        device: Id of the robot that the DVA is asked about; None: all.
-    """
+    """Ask a robot for its sensors (`SensorInfo`), or the DVA for those of one or all robots."""
 
     device: str | None = None
 
@@ -286,13 +281,7 @@ class PermissionRequest:
 
 @dataclass(frozen=True, slots=True)
 class HandoverRequest:
-    """The DVA asks the holder of a robot to give it up; `OK`: it does, `BUSY`: it does not.
-
-    Attributes:
-        device: Id of the robot.
-        holder: Id of the device that wants it.
-        label: What that device calls itself.
-    """
+    """The DVA asks who holds the robot `device` to give it up to `holder`: `OK`, or `BUSY`."""
 
     device: str
     holder: str

@@ -240,6 +240,10 @@ def test_a_robot_tells_everybody_which_sensors_it_has(sensing: Bench) -> None:
     assert [sensor.name for sensor in told.sensors] == ["heat_flux", "smoke"]
 
 
+def test_a_robot_knows_nothing_of_the_sensors_of_others(sensing: Bench) -> None:
+    assert sensing.say(ANA, m.GetSensorInfo(RUI)).code == m.UNKNOWN_DEVICE
+
+
 def test_a_revocation_that_overtakes_its_grant_holds(bench: Bench) -> None:
     bench.say(DVA, m.PermissionRevocation(ROBOT, ANA, 7))
     assert bench.say(DVA, m.PermissionGrant(ANA, "both", 7)).code == m.BAD_SESSION

@@ -209,3 +209,25 @@ def test_a_robot_hears_of_auctions_from_the_dva_alone(dva: PretendedDva) -> None
     dva.run_for(1.0)
     assert codes == [m.NOT_PERMITTED] * 2
     assert dva.bids() == []
+
+
+# --- asked to give a robot up --------------------------------------------------------------
+
+
+def test_who_drives_a_robot_keeps_it_and_says_so(
+    dva: PretendedDva, operator: OperatorAgent
+) -> None:
+    start(dva, 1, EAST)
+    assert dva.say(OPERATOR, m.HandoverRequest(ROBOT, OPERATOR, "control room")) == m.BUSY
+    assert is_driven(dva, ROBOT)
+    told = [moment.what for moment in dva.stage.recorder.timeline if moment.kind == "order"]
+    assert told[-1] == "keeps robot-1: control room asks"
+
+
+def test_who_does_not_drive_it_yet_gives_it_up(dva: PretendedDva, operator: OperatorAgent) -> None:
+    assert dva.say(OPERATOR, m.HandoverRequest(ROBOT, OPERATOR, "control room")) == m.OK
+    assert dva.order(1, EAST, robot=ROBOT) == m.OK
+    assert dva.say(OPERATOR, m.HandoverRequest(ROBOT, OPERATOR, "control room")) == m.OK
+    assert dva.say(OPERATOR, m.OrderProgress(1, "done")) == m.OK  # as the DVA says then
+    dva.run_for(60.0)
+    assert not is_driven(dva, ROBOT)

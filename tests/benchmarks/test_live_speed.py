@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import zmq
@@ -67,7 +69,9 @@ def be_an_echo() -> None:
 def start(role: str) -> Iterator[str]:
     """The address of another process, which ends when this one is done with it."""
     command = [sys.executable, __file__, role]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    tests = {"PYTHONPATH": str(Path(__file__).parents[1])}
+    with subprocess.Popen(command, env=os.environ | tests, **pipes) as process:
         assert process.stdout is not None
         try:
             yield process.stdout.readline().decode().strip()

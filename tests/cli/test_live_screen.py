@@ -1,5 +1,6 @@
 """What a live run prints."""
 
+from dataclasses import replace
 from io import StringIO
 
 from rich.console import Console
@@ -31,3 +32,12 @@ def test_the_last_lines_of_the_story_are_the_latest() -> None:
     board.hear(report("world", 3.0, 2.6))
     board.hear(report("dva", 3.4, 2.5))
     assert [line.split()[-1] for line in str(board.lines_of_story()).splitlines()] == ["2.5", "2.6"]
+
+
+def test_a_device_that_the_dva_has_forgotten_is_shown_no_longer() -> None:
+    board, row = Board(), {"label": "robot-1", "type": "Robot", "address": "10.0.0.1"}
+    rows = [row, row | {"label": "passes by"}]
+    board.hear(replace(report("dva", 1.0), rows=rows))
+    board.hear(replace(report("world", 1.0), rows=[{"label": "guard-1", "doing": "waiting"}]))
+    board.hear(replace(report("dva", 2.0), rows=[row]))
+    assert set(board.devices) == {"robot-1", "guard-1"}

@@ -48,8 +48,9 @@ def test_who_asks_now_and_then_finds_out_that_the_robot_is_gone(world: World) ->
         assert world.clock.now - gone < 2 * brief + 1.0
 
 
-def test_who_asks_now_and_then_finds_out_that_it_is_refused(world: World) -> None:
-    pattern = load_pattern(EXAMPLE, {"every": 3})()
+@pytest.mark.parametrize("name", ["req-rep", "pipelined", EXAMPLE])
+def test_who_asks_finds_out_that_it_is_refused(world: World, name: str) -> None:
+    pattern = load_pattern(name, {"every": 3} if name == EXAMPLE else {})()
     drive = small_drive(world, pattern, refuses=4, timeout=PATIENCE_S)
     drive.begin()
     world.run_until(lambda: drive.told)

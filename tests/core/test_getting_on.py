@@ -121,3 +121,16 @@ def test_nothing_is_owed_of_an_order_that_was_not_answered_yet(office: Office) -
     for now in range(1, 400, 10):
         office.tick(float(now))
     assert office.event().responder == GUARD
+
+
+def test_a_robot_may_stand_while_its_operator_has_another_in_hand() -> None:
+    rules = Rules(operator_span=2, still_within=30.0, merge_distance=0.0)
+    office = Office(rules=rules)
+    office.register(OTHER_ROBOT, "Robot", at=30)
+    office.busy(GUARD)
+    office.ok(office.fire(12))
+    office.ok(office.fire(32))
+    for event in (1, 2):
+        office.progress(OPERATOR, "departed", 1.0, event=event)
+    for now in range(2, 300, 10):
+        assert office.tick(float(now)) == []

@@ -7,6 +7,7 @@ from office import ADDRESS, DVA, GUARD, OPERATOR, OTHER_OPERATOR, ROBOT, TEAM, O
 
 from dva_sim.core.events import State
 from dva_sim.core.handovers import ANSWER_WITHIN, DECLINED_FOR, FETCH_WITHIN, STOP_WITHIN
+from dva_sim.core.permissions import Access, AccessRule
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 
@@ -61,6 +62,7 @@ def test_who_has_an_order_with_it_holds_it_before_it_has_the_permission(office: 
 # --- asked for ---------------------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S2")
 def test_a_robot_is_handed_over_through_standstill_and_a_confirmed_end(office: Office) -> None:
     over = hold(office)
     reply, sends = ask(office, now=1.0)
@@ -82,6 +84,7 @@ def test_a_robot_is_handed_over_through_standstill_and_a_confirmed_end(office: O
     assert isinstance(reply.content, m.Permission)
     assert reply.content.session > over.session
     assert [type(send.body) for send in sends] == [m.PermissionGrant]
+    assert office.desk.counters["robot handed over"] == 1
     assert ask(office, OPERATOR, "no", 8.5)[0].content == m.Holder(
         OTHER_OPERATOR, "remote control", 2.0
     )
@@ -136,6 +139,7 @@ def test_a_handover_that_leads_nowhere_ends(office: Office, told: bool, waited: 
     sends = ask(office)[1]
     if told:
         office.ok(sends)
+    assert office.desk.next_deadline() <= waited
     office.tick(waited)
     assert office.desk.handovers.under_way == {}
     assert office.desk.sessions.reserved == set()
@@ -160,9 +164,23 @@ def test_a_late_yes_takes_nothing_from_the_next_holder(office: Office) -> None:
     assert office.desk.sessions.permissions.grants[ROBOT].holder == third
 
 
+def test_a_late_yes_takes_nothing_from_who_was_sent_with_it_meanwhile(office: Office) -> None:
+    third = "02:00:00:03:00:03"
+    office.register(third, "TeleOp")
+    over = hold(office)
+    asked = ask(office)[1]
+    office.say(OPERATOR, over)
+    office.busy(GUARD, OPERATOR)
+    office.fire(12, now=1.0)
+    assert office.event().operator == third
+    assert office.ok(asked, 2.0) == []
+    assert office.event().operator == third
+
+
 # --- forced ------------------------------------------------------------------------------------
 
 
+@pytest.mark.invariant("S2")
 def test_a_supervisor_need_not_ask_but_waits_for_standstill_too(office: Office) -> None:
     over = hold(office)
     reply, sends = ask(office, takeover="force")
@@ -174,6 +192,7 @@ def test_a_supervisor_need_not_ask_but_waits_for_standstill_too(office: Office) 
     assert isinstance(ask(office, takeover="force", now=5.0)[0].content, m.Permission)
 
 
+@pytest.mark.invariant("S5")
 def test_who_is_no_supervisor_forces_nothing(office: Office) -> None:
     assert ask(office)[0].code == m.OK
     reply, sends = ask(office, OPERATOR, "force")
@@ -187,6 +206,16 @@ def test_a_supervisor_does_not_wait_for_who_is_being_asked(office: Office) -> No
     ask(office, takeover="force", now=1.0)
     assert office.no(asked, 2.0) == []  # the answer comes too late to matter
     assert ask(office, now=3.0)[0].text == "it is being stopped for you"
+
+
+def test_who_may_not_have_the_level_takes_nothing_over_supervisor_or_not() -> None:
+    rules = Access([AccessRule(holders=frozenset({"teleop"}))])
+    office = Office(access=rules, supervisors=frozenset({OTHER_OPERATOR}))
+    office.register(OTHER_OPERATOR, "Remote Control")
+    hold(office)
+    for takeover in ("no", "ask", "force"):
+        reply, sends = ask(office, takeover=takeover)
+        assert (reply.code, sends) == (m.NOT_PERMITTED, [])
 
 
 # --- types of devices --------------------------------------------------------------------------

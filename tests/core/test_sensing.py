@@ -16,13 +16,13 @@ from office import (
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
-from dva_sim.core.sensing import IN_A_ROW, NO_NEWS, REACH, RENEW, Alarm, Sensing
+from dva_sim.core.sensing import IN_A_ROW, NO_NEWS, REACH, RENEW, Sensing, SensorAlarm
 from dva_sim.core.sessions import Send
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.protocol.schema import MAX_BYTES
 
-ALARMS = {"smoke": Alarm("fire", 0.3), "gas": Alarm("gas_leak", 0.002)}
+ALARMS = {"smoke": SensorAlarm("fire", 0.3), "gas": SensorAlarm("gas_leak", 0.002)}
 CARRIED = m.SensorInfo("http://robot/camera", (m.Sensor("smoke", "1/m"), m.Sensor("water", "m")))
 ASK = Send(ROBOT, m.GetSensorInfo())
 SMOKY = (0.5,) * IN_A_ROW
@@ -125,6 +125,26 @@ def test_a_robot_that_no_longer_knows_the_dva_is_told_its_permission_again(offic
     sends = office.tick(RENEW)
     assert [type(send.body) for send in sends] == [m.PermissionGrant]
     assert sends[0].to == ROBOT
+
+
+def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office: Office) -> None:
+    (grant,) = learn(office)
+    office.ok([grant])
+    office.silence(ROBOT, 11.0)
+    assert office.desk.sessions.permissions.observers == {}
+    assert office.tick(40.0, alive=False) == []
+    assert office.register(ROBOT, "Robot", 10, now=41.0) == [ASK]
+    (again,) = learn(office, now=41.0)
+    assert isinstance(again.body, m.PermissionGrant)
+
+
+@pytest.mark.invariant("S10")
+def test_of_a_robot_that_is_gone_nothing_is_kept(office: Office) -> None:
+    office.silence(ROBOT, 11.0)
+    office.no([ASK], 27.0)
+    learn(office, now=28.0)
+    fresh = Sensing(ALARMS, 2.0)
+    assert office.desk.sensing == fresh
 
 
 def test_a_dva_that_heeds_nothing_reads_nothing() -> None:
@@ -246,6 +266,7 @@ def test_a_detector_says_better_where_it_is_and_nobody_has_set_out(office: Offic
     assert set(event.sources) == {ROBOT, DETECTOR}
 
 
+@pytest.mark.invariant("S6")
 def test_who_is_on_the_way_to_where_it_was_felt_is_sent_to_where_it_is(office: Office) -> None:
     office.ok(office.shows(ROBOT, "smoke", *SMOKY))
     sends = office.fire(25, now=2.0)

@@ -99,6 +99,43 @@ def test_a_mistake_is_told_by_file_line_and_column(
     assert "\n" not in line
 
 
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        (
+            "question: !!python/object/apply:os.system [x]\n",
+            "1:11: !!python/object/apply:os.system",
+        ),
+        ("question: !!python/name:os.system\n", "1:11: !!python/name:os.system"),
+        ("a: 1\nb: [2, !!python/tuple [3]]\n", "2:8: !!python/tuple"),
+        ("? !!python/tuple [1, 2]\n: 3\n", "1:3: !!python/tuple"),
+        ("!!python/object:x {a: 1}\n", "1:1: !!python/object:x"),
+        ("%TAG ! tag:yaml.org,2002:python/\n---\na: !name:x y\n", "3:4: !!python/name:x"),
+        ("a: !mine x\n", "1:4: !mine"),
+        ("a: !!omap [b: 1]\n", "1:4: !!omap"),
+        ("a: !!set {b, c}\n", "1:4: !!set"),
+        ("a: !!binary aGk=\n", "1:4: !!binary"),
+    ],
+)
+def test_a_tag_of_another_kind_than_plain_values_is_told_by_its_place(
+    tmp_path: Path, text: str, place: str
+) -> None:
+    path = tmp_path / "tagged.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_yaml(path)
+    assert str(caught.value).startswith(f"{path}:{place} makes no value that is known here")
+
+
+def test_tags_of_plain_values_and_merged_keys_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "tagged.yaml"
+    path.write_text('a: &a {x: 1}\nb: {<<: *a, y: !!str 2}\nc: !!int "7"\n')
+    document = load_yaml(path)
+    assert document.data == {"a": {"x": 1}, "b": {"x": 1, "y": "2"}, "c": 7}
+    assert str(document.error("bad", ("b", "y"))).startswith(f"{path}:2:13")
+    assert str(document.error("bad", ("b", "x"))).startswith(f"{path}:2:")
+
+
 def test_yaml_12_keeps_times_as_text(tmp_path: Path) -> None:
     path = tmp_path / "time.yaml"
     path.write_text("name: 12:30:56\n")

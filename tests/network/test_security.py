@@ -16,6 +16,7 @@ from patience import PATIENCE_S
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network import security as module
 from dva_sim.network.keys import KeyRing, create_keys
+from dva_sim.network.realtime import Poller
 from dva_sim.network.security import Reason, Refusal, Security, user_of
 
 ROBOT, OPERATOR = "02:00:00:01:00:01", "02:00:00:03:00:01"
@@ -29,7 +30,7 @@ class End:
 
     def __init__(self, ring: KeyRing | None, device: str) -> None:
         self.context: zmq.Context[Socket] = zmq.Context()
-        self.poller, self.device, self.said = zmq.Poller(), device, list[Refusal]()
+        self.poller, self.device, self.said = Poller(), device, list[Refusal]()
         self.security = Security(self.context, self.poller, ring, self.said.append)
         self.open: list[Socket] = []
 
@@ -37,7 +38,7 @@ class End:
         socket = self.context.socket(kind)
         socket.linger = 0
         self.open.append(socket)
-        self.poller.register(socket, zmq.POLLIN)
+        self.poller.register(socket)
         return socket
 
     def bind(self, kind: int) -> tuple[Socket, str]:
@@ -55,8 +56,9 @@ class End:
 
     def turn(self) -> list[Socket]:
         """One turn of the loop; the sockets that have something for the application."""
-        ready = [s for s, _ in self.poller.poll(20)]
-        return [s for s in ready if not self.security.handle(s)]
+        for socket in self.open:
+            self.poller.look(socket)
+        return [s for s in self.poller.poll(0.02) if not self.security.handle(s)]
 
     def close(self) -> None:
         self.security.close()

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from patience import PATIENCE_S
@@ -11,6 +12,7 @@ from patience import PATIENCE_S
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
+from dva_sim.protocol.codec import decode
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.physical_world import Field
@@ -73,3 +75,18 @@ def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
     field.world.advance_to(clock.now)
     assert robot.body.distance > 0.3
     assert robot.controller.mode == "Idle"
+
+
+def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):
+    code = re.search(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)[1]
+    lives = []
+    for now in (1000.25, 1000.5):
+        monkeypatch.setattr("time.time", lambda now=now: now)
+        said = []
+        life = {}
+        exec(code.partition("dva, robot =")[0], life)
+        socket = SimpleNamespace(send_string=said.append, recv_string=lambda: "")
+        life["ask"](socket, "02:00:00:00:00:01", "<Access><GetDeviceList/></Access>")
+        lives += said
+    assert lives[0] != lives[1]
+    assert [decode(said.encode()).message_id for said in lives] == [1, 1]

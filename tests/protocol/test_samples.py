@@ -34,7 +34,7 @@ NEW_IN_1_4 = {
     *("get-grant", "get-sensor-info-device", "handover-request"),
     *("permission-request-ask", "permission-request-force", "permission-request-no"),
     *("reply-holder", "reply-sensor-list", "reply-session-floor"),
-    *("robot-holder", "robot-holder-nobody"),
+    *("robot-holder", "robot-holder-nobody", "robot-holder-refusing"),
 }
 OLD = etree.XMLSchema(file=str(Path(__file__).parents[1] / "data" / "dva-1.3.xsd"))
 

@@ -128,15 +128,13 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
     name = operator.device.label_of(robot)
     operator.watch_status(robot)
     try:
-        if not (yield from _drive(operator, robot, session, commands)):
-            return
-        reply = yield Ask(robot, m.Emergency(), session)
-        operator.tell(f"sends {name} an emergency: {_answer(reply)}")
-        reply = yield Ask(robot, _swaying(0, operator.seen_tick), session)
-        operator.tell(f"sends {name} one more command: {_answer(reply)}")  # the robot is idle
-        yield Pause(STANDSTILL)
-        if not (yield from _drive(operator, robot, session, COMMANDS_AGAIN)):
-            return
+        if (yield from _drive(operator, robot, session, commands)):
+            reply = yield Ask(robot, m.Emergency(), session)
+            operator.tell(f"sends {name} an emergency: {_answer(reply)}")
+            reply = yield Ask(robot, _swaying(0, operator.seen_tick), session)
+            operator.tell(f"sends {name} one more command: {_answer(reply)}")  # the robot is idle
+            yield Pause(STANDSTILL)
+            yield from _drive(operator, robot, session, COMMANDS_AGAIN)
         reply = yield Ask(robot, m.StopTeleOp(), session)
         operator.tell(f"stops {name}: {_answer(reply)}")
     except GeneratorExit:

@@ -30,7 +30,8 @@ WAYS = (
 )
 """All ways, the best first; `cleared` is a false alarm that was refuted."""
 _OF_EVENTS = {"contained": CONFIRMED, "open": NOTHING, "undetected": "never reported"}
-_OF_DRIVES = {"lost link": "link lost", "gave up": "given up"}  # why the DVA escalated
+# Why the DVA escalated; who is refused cannot but give up.
+_OF_DRIVES = {"lost link": "link lost", "gave up": "given up", "refused": "given up"}
 
 
 @dataclass(frozen=True)

@@ -152,6 +152,7 @@ _ENDINGS = {
     "refuted": "refuted",
     "lost link": "link lost",
     "gave up": "given up",
+    "refused": "obeyed no more",
     "escalated": "escalated",
     "expired": "expired",
     "undetected": "never reported",

@@ -22,7 +22,7 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
-from dva_sim.core.sensing import Alarm, Sensing
+from dva_sim.core.sensing import Sensing, SensorAlarm
 from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import Floats, SiteKnowledge, Start, WaitingPlace
@@ -81,9 +81,9 @@ def add_dva(
 
 
 _ALARMS = {
-    "temperature": Alarm("fire", HEAT_ALARM),
-    "smoke": Alarm("fire", SMOKE_ALARM),
-    "gas": Alarm("gas_leak", GAS_ALARM * min(gas.lower for gas in GASES.values())),
+    "temperature": SensorAlarm("fire", HEAT_ALARM),
+    "smoke": SensorAlarm("fire", SMOKE_ALARM),
+    "gas": SensorAlarm("gas_leak", GAS_ALARM * min(gas.lower for gas in GASES.values())),
 }
 """From where on a sensor of a robot gives the alarm: where a fixed detector would. It cannot tell
 which gas it is: the one that explodes first counts."""

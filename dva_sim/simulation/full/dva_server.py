@@ -41,7 +41,8 @@ class DvaAgent:
         self._policy_failures = 0
         self._problem: str | None = None
         self.beats: Counter[str] = Counter()
-        self._heard: dict[tuple[str, str], tuple[str, Subscription]] = {}
+        self._heard: dict[str, tuple[str, list[Subscription]]] = {}  # address, at which heard
+        self._attended = 0
         device.serve(self._on_request)
 
     def start(self) -> None:
@@ -50,8 +51,7 @@ class DvaAgent:
         if self._memory is not None and self._memory.recall(self.desk, clock.now):
             count = len(self.desk.book.open)
             self.device.tell(f"remembers {count} open event{'s' * (count != 1)}")
-            for entry in list(self.desk.registry.entries.values()):
-                self._meet(entry.device)
+            self._attend()
             self._carry_out(self.desk.go_on())
         clock.every(TICK, self._tick, start=clock.now + TICK)
 
@@ -81,35 +81,48 @@ class DvaAgent:
 
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
-        if isinstance(message.body, m.Registration) and reply.code == m.OK:
-            body = message.body
-            self._meet(m.Device(message.source, body.label, body.device_type, body.address))
+        self._attend()
         self._carry_out(sends)
         return reply
+
+    def _attend(self) -> None:
+        """Listen to who is there, not to who is silent, and know nothing of who is forgotten."""
+        registry = self.desk.registry
+        if registry.version == self._attended:
+            return
+        self._attended = registry.version
+        for id_tag, entry in registry.moves().items():
+            if entry is None or entry.silent:
+                self._leave(id_tag)
+            else:
+                self._meet(entry.device)
+            if entry is None:
+                del self.beats[id_tag]
+                self.device.forget(id_tag)
+
+    def _leave(self, source: str) -> None:
+        for subscription in self._heard.pop(source, ("", []))[1]:
+            subscription.close()
 
     def _meet(self, device: m.Device) -> None:
         """Listen to what a device publishes, anew when it has moved to another address.
 
         Detectors only speak when they have something to report.
         """
-        source = device.id_tag
-        self.device.network.introduce(source, device.address)
+        source, network = device.id_tag, self.device.network
+        network.introduce(source, device.address)
+        if self._heard.get(source, ("", []))[0] == device.address:
+            return
+        self._leave(source)
         topics = [] if device.device_type == DETECTOR else [HEARTBEAT]
         if device.device_type in (ROBOT, GUARD):
             topics.append(STATUS)
         if device.device_type == ROBOT:
             me = self.device.id_tag
             topics += [sensor_topic(name, me) for name in self.desk.sensing.alarms]
-        for topic in topics:
-            address, earlier = self._heard.get((source, topic), ("", None))
-            if address == device.address:
-                continue
-            if earlier is not None:
-                earlier.close()
-            heard = self.device.network.subscribe(
-                self.device.id_tag, source, topic, partial(self._on_published, source)
-            )
-            self._heard[source, topic] = device.address, heard
+        heard = partial(self._on_published, source)
+        listening = [network.subscribe(self.device.id_tag, source, t, heard) for t in topics]
+        self._heard[source] = device.address, listening
 
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
@@ -121,12 +134,16 @@ class DvaAgent:
 
     def _tick(self) -> None:
         self._carry_out(self.desk.tick(self.device.clock.now))
+        self._attend()
 
     def _carry_out(self, sends: list[Send]) -> None:
         """Keep what has changed, then say it: what was said must not be forgotten."""
         self._keep_changes()
         self._count_failures()
         for send in sends:
+            if send.to not in self.desk.registry.entries:
+                self.device.clock.call_after(0.0, self._undelivered, send)
+                continue
             self.device.ask(
                 send.to,
                 send.body,

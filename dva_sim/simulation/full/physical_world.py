@@ -29,6 +29,7 @@ DANGEROUS = Conditions(
     explosive=0.2,
 )
 """What makes a place dangerous, by the limits of `danger_radius` (worlds/HAZARDS.md)."""
+REPORT_AGAIN = 2.0  # after a report that was not answered, or refused [s]
 
 
 class Field(RunHazards):
@@ -117,9 +118,17 @@ class Field(RunHazards):
         position = m.Position(*self.stage.site.frame.to_latlon(*place))
         severity = incident.hazard.severity(self.stage.clock.now)
         body = m.EventReport(None, incident.kind, position, severity, 0.9, "detected")
-        device.ask(DVA, body)
+        self._say(device, body)
         device.tell(f"reports {incident.kind.replace('_', ' ')}", "event")
         self._sound_alarm()
+
+    def _say(self, device: AgentDevice, body: m.EventReport) -> None:
+        """Report until the DVA has taken it: it is said only once."""
+
+        def again() -> None:
+            self.stage.clock.call_after(REPORT_AGAIN, self._say, device, body)
+
+        device.ask(DVA, body, lambda reply: None if reply.code == m.OK else again(), again)
 
     def _sound_alarm(self) -> None:
         """What detectors and callers report is heard by all who are in the building."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.events import Event, State
+from dva_sim.core.sensing import REACH
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.link import Link
 from dva_sim.simulation.full.hazards import RunHazard
@@ -109,7 +111,7 @@ class Recording(Playback):
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""
-        return event_about(self.incidents[number], self.events, self.site)
+        return event_about(self.incidents[number], self.events, self.site, self.robots)
 
 
 def ending_of(event: Event | None) -> Ending:
@@ -123,12 +125,19 @@ def ending_of(event: Event | None) -> Ending:
     return Ending(event.state.value, event.times["closed"])
 
 
-def event_about(incident: RunHazard, events: list[Event], site: Site) -> Event | None:
-    """The DVA's event that an incident was reported as; two near each other are one event."""
-    known: tuple[float, Event | None] = MERGED_WITHIN, None
+def event_about(
+    incident: RunHazard, events: list[Event], site: Site, robots: Collection[str]
+) -> Event | None:
+    """The DVA's event that an incident was reported as; two near each other are one event.
+
+    Of what only sensors of robots speak for, the robot's place is known, and not its own.
+    """
+    known: tuple[float, Event | None] = math.inf, None
     for event in events:
         at = site.frame.to_xy(event.position.latitude, event.position.longitude)
         gap = math.dist(at, incident.hazard.position)
-        if event.kind == incident.kind and gap <= known[0]:
+        felt = event.sources and all(source in robots for source in event.sources)
+        near = gap <= min(known[0], REACH if felt else MERGED_WITHIN)
+        if event.kind == incident.kind and near:
             known = gap, event
     return known[1]

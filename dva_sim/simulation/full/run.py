@@ -144,7 +144,9 @@ class Run:
             radii={name: robot.body.spec.radius for name, robot in field.robots.items()},
             duration=self.clock.now,
             contained=field.contained,
-            endings=[ending_of(event_about(i, events, stage.site)) for i in field.incidents],
+            endings=[
+                ending_of(event_about(i, events, stage.site, field.robots)) for i in field.incidents
+            ],
             events=events,
             robots=field.robots,
             links=self.links,
@@ -172,7 +174,7 @@ class Run:
             and all(d.ended is not None for d in self.recorder.drives)
             and not any(b.activity in (ALARMED, EVACUATING) for b in self.field.bystanders)
             and all(
-                event_about(i, events, self.stage.site) is not None
+                event_about(i, events, self.stage.site, self.field.robots) is not None
                 for i in self.field.incidents
                 if i.detected < math.inf
             )

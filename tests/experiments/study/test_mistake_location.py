@@ -84,6 +84,7 @@ def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
         ("robot.count=20", "site 'caparica' has 3 robot bases"),
         ("link.delay_s=-1", "should be at least 0, not -1"),
         ("robot.count=0", "nobody can respond: robot.count and guard.count are 0"),
+        ("dva.supervisors=[operator-7]", "operator 'operator-7' is unknown; known: operator-1"),
     ],
 )
 def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, setting, told):

@@ -114,3 +114,23 @@ def test_a_robot_forged_away_in_a_drive_is_driven_again_soon(body: str) -> None:
     until(run, lambda: len(drives) > 1 or body == "revocation", 60.0)
     until(run, lambda: drives[-1].started is not None and drives[-1].applied, 60.0)
     assert robot.controller.owner == drives[-1].operator
+
+
+# --- who says OK and does nothing -----------------------------------------------------------
+
+
+@pytest.mark.invariant("S6")
+def test_a_guard_that_says_ok_and_only_lives_on_holds_no_event() -> None:
+    base = {"robot.count": 0, "guard.count": 2, "guard.mobilisation_s": 5, "horizon_s": 200}
+    changes = base | {"operator.count": 0, "dispatch.depart_within_s": 60}
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), changes), 1)
+    liars = list(run.field.guards)
+    for guard in liars:
+        guard._take_up = lambda errand: None  # type: ignore[method-assign]
+    run.clock.run(30.0)
+    (event,) = run.dva.events.values()
+    first = event.responder
+    until(run, lambda: event.responder not in (None, first), 100.0)
+    assert 60.0 < run.clock.now < 75.0
+    assert run.dva.desk.counters["did not set out"] == 1
+    assert run.recorder.violations == {}

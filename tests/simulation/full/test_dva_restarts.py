@@ -84,3 +84,13 @@ def test_neither_kills_nor_a_link_that_loses_leave_an_event_hanging(tmp_path: Pa
     killed = Killed(tmp_path, [20.0, 70.0], 4.0, **{"link.loss": 0.1, "link.delay_s": 0.1})
     assert len(killed.events) == 3
     assert not any(e.open for e in killed.events)
+
+
+@pytest.mark.invariant("S6")
+def test_what_is_detected_while_the_dva_is_away_is_reported_until_it_is_there(
+    tmp_path: Path,
+) -> None:
+    """It is away for longer than three attempts last."""
+    killed = Killed(tmp_path, [4.0], away=90.0)
+    assert len(killed.events) == len(EVENTS)
+    assert all(event.times["detected"] > 94.0 for event in killed.events)

@@ -7,12 +7,13 @@ from typing import Any
 
 import pytest
 
-from dva_sim.core.events import State
+from dva_sim.core.events import Event, State
 from dva_sim.kernel.streams import Streams
+from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.hazards import HEARSAY_LATE, HEARSAY_WITHIN, draw_incidents
 from dva_sim.simulation.full.physical_world import Field, is_dangerous
-from dva_sim.simulation.full.recording import Recording
+from dva_sim.simulation.full.recording import Recording, event_about
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.scenario import EventConfig
@@ -178,3 +179,32 @@ def test_a_wall_keeps_one_out_of_danger_that_is_near_but_not_of_air_that_comes_t
         assert in_danger(field, *place, 75.0) is (place not in hidden)
     field.surroundings.at = lambda *_: CLEAR._replace(explosive=0.3)  # type: ignore[method-assign]
     assert in_danger(field, *hidden[0], 75.0)
+
+
+def test_an_event_that_only_a_robot_felt_is_about_what_is_farther_off() -> None:
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), {}), 1)
+    incident, site = run.field.incidents[0], run.stage.site
+    x, y = incident.hazard.position
+    place = m.Position(*site.frame.to_latlon(x + 15.0, y))
+    robot = id_of("robot", 1)
+    felt = Event(1, incident.kind, place, 0.5, sources={robot: 0.6})
+    seen = Event(2, incident.kind, place, 0.5, sources={id_of("detector", 1): 0.9})
+    assert event_about(incident, [felt], site, {robot}) is felt
+    assert event_about(incident, [seen], site, {robot}) is None
+
+
+@pytest.mark.parametrize("heeded", [(), ("gas",)])
+def test_a_leak_that_no_detector_notices_is_smelt_by_a_robot_on_its_round(
+    heeded: tuple[str, ...],
+) -> None:
+    changes: dict[str, Any] = {
+        "events": [{"kind": "gas_leak", "room": "Canteen", "at_s": 20}],
+        "patrols": [{"robot": "robot-1", "places": ["Canteen", "Main corridor"]}],
+        "dva.sensors": heeded,
+    }
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), changes), 1)
+    run.clock.run(140.0)
+    events = list(run.dva.events.values())
+    assert [e.kind for e in events] == ["gas_leak"] * len(heeded)
+    assert [set(e.sources) for e in events] == [{id_of("robot", 1)}] * len(heeded)
+    assert run.recorder.violations == {}

@@ -156,3 +156,15 @@ def test_a_live_run_says_it_before_anything_starts() -> None:
     out = Console(file=io.StringIO(), width=200)
     live.warn(out, LiveOptions("drive-to-event", ("link.delay_s=0.5",)))
     assert out.file.getvalue().startswith("warning: link.delay_s: a live run has the real link")
+
+
+def test_the_dva_heeds_no_sensor_that_no_robot_carries() -> None:
+    carried = [{"name": "smoke"}]
+    made = built(robot__sensors=carried, dva__sensors=["smoke", "gas"])
+    assert contradictions(made) == ["dva.sensors names 'gas', which no robot carries"]
+
+
+def test_what_the_dva_does_beside_is_written_only_where_it_does_something() -> None:
+    usual = built()
+    assert "dva" not in usual.model_dump()
+    assert built(dva__sensors=["gas"]).model_dump()["dva"]["sensors"] == ("gas",)

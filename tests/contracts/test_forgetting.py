@@ -1,0 +1,178 @@
+"""A DVA leaves who is silent, hears who is back, and keeps nothing open for who is gone."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+import zmq
+from office import Office
+from transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
+
+from dva_sim.agents.device import HEARTBEAT, AgentDevice
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.exchange import Outbox
+from dva_sim.simulation.full import dva_server
+from dva_sim.simulation.full.dva_server import DvaAgent
+
+pytestmark = [pytest.mark.contract, pytest.mark.invariant("S10")]
+SILENT, FORGOTTEN, BEAT = 0.4, 0.8, 0.05  # [s]
+
+
+class Site:
+    """A DVA that can be made quick to forget, and devices whose heartbeats can be stopped."""
+
+    def __init__(self, world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(dva_server, "TICK", BEAT)
+        self.world = world
+        desk = Office().new_desk()
+        self.registry = desk.registry
+        self.be_patient()
+        self.dva = DvaAgent(small_device(world, DVA), desk)
+        self.dva.start()
+        self.entries = desk.registry.entries
+        self.beating: set[str] = set()
+
+    def be_patient(self) -> None:
+        """Nobody falls silent, however slow this machine is."""
+        self.registry.silent_after = self.registry.forget_after = math.inf
+
+    def be_quick(self) -> None:
+        self.registry.silent_after, self.registry.forget_after = SILENT, FORGOTTEN
+
+    def device(self, id_tag: str) -> AgentDevice:
+        device = small_device(self.world, id_tag)
+        if isinstance(self.world, SocketWorld):
+            device.address = f"127.0.0.1:{self.world.port(id_tag)}"
+        device.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
+        self.world.clock.every(BEAT, lambda: self._beat(device))
+        return device
+
+    def _beat(self, device: AgentDevice) -> None:
+        if device.id_tag in self.beating:
+            device.publish(HEARTBEAT, m.Heartbeat())
+
+    def hears(self, id_tag: str) -> None:
+        """Wait until heartbeats come in."""
+        before = self.dva.beats[id_tag]
+        self.world.run_until(lambda: self.dva.beats[id_tag] > before + 2)
+
+    def is_silent(self, id_tag: str) -> bool:
+        return self.entries[id_tag].silent
+
+
+def registration(device: AgentDevice) -> m.Registration:
+    return m.Registration(device.label, device.device_type, device.address)
+
+
+def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(world, monkeypatch)
+    phone = site.device(PHONE)
+    phone.ask(DVA, registration(phone))
+    site.beating.add(PHONE)
+    site.hears(PHONE)
+    site.beating.clear()
+    site.be_quick()
+    site.world.run_until(lambda: site.is_silent(PHONE))
+    heard = site.dva.beats[PHONE]
+    site.beating.add(PHONE)
+    world.run_for(4 * BEAT)
+    assert site.is_silent(PHONE)
+    assert site.dva.beats[PHONE] == heard  # nobody listens
+    site.be_patient()
+    phone.ask(DVA, m.GetDeviceList())
+    site.hears(PHONE)
+    assert not site.is_silent(PHONE)
+
+
+def test_who_is_forgotten_learns_that_and_registers_again(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(world, monkeypatch)
+    phone = site.device(PHONE)
+    phone.ask(DVA, registration(phone))
+    world.run_until(lambda: PHONE in site.entries)
+    site.be_quick()
+    world.run_until(lambda: PHONE not in site.entries)
+    site.be_patient()
+    codes: list[int] = []
+    phone.ask(DVA, m.GetDeviceList(), lambda reply: codes.append(reply.code))
+    world.run_until(lambda: PHONE in site.entries)
+    phone.ask(DVA, m.GetDeviceList(), lambda reply: codes.append(reply.code))
+    world.run_until(lambda: len(codes) == 2)
+    assert codes == [m.NOT_REGISTERED, m.OK]
+
+
+def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = Site(world, monkeypatch)
+    robot = site.device(ROBOT)
+    robot.ask(DVA, registration(robot))
+    world.run_until(lambda: ROBOT in site.entries)
+    world.leave(ROBOT)
+    failed: list[bool] = []
+    site.dva.device.ask(ROBOT, m.GetSensorInfo(), on_failure=lambda: failed.append(True))
+    site.be_quick()
+    world.run_until(lambda: ROBOT not in site.entries)
+    assert failed == [True]
+    assert not site.dva.device._requesters
+
+
+FILES = Path("/proc/self/fd")
+
+
+@pytest.mark.skipif(not FILES.exists(), reason="no list of open files")
+def test_waves_of_devices_that_vanish_leave_no_file_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = SocketWorld()
+    try:
+        site = Site(world, monkeypatch)
+        levels = [_after_a_wave(site, wave) for wave in range(3)]
+    finally:
+        world.close()
+    assert max(levels[1:]) <= levels[0]
+
+
+def files() -> int:
+    """How many are open in this process."""
+    return len(list(FILES.iterdir()))
+
+
+def _after_a_wave(site: Site, wave: int, count: int = 25) -> int:
+    """How many files are open when all of a wave are forgotten."""
+    world = site.world
+    site.be_patient()
+    with zmq.Context() as outside, outside.socket(zmq.DEALER) as asker:
+        asker.linger = 0
+        asker.connect(f"tcp://{world.network.address(DVA)}")  # type: ignore[attr-defined]
+        before = files()
+        voices = []
+        for number in range(count):
+            publisher = outside.socket(zmq.PUB)
+            voice = Outbox(f"0A:00:00:00:{wave:02X}:{number:02X}")
+            publisher.linger = 0
+            port = publisher.bind_to_random_port("tcp://127.0.0.1")
+            kind = ("Robot", "Guard", "TeleOp")[number % 3]
+            body = m.Registration("passes by", kind, f"127.0.0.1:{port - 1}")
+            asker.send_multipart([b"", voice.encode(DVA, body, 0.0)])
+            voices.append((publisher, voice))
+        world.run_until(lambda: len(site.entries) == count)
+        world.run_until(lambda: _all_beat(site, voices))
+        assert files() > before + 4 * count
+        for publisher, _ in voices:
+            publisher.close()
+    site.be_quick()
+    world.run_until(lambda: not site.entries)
+    assert not site.dva.beats
+    world.run_for(0.2)  # sockets are closed in the background
+    world.run_until(lambda: files() <= before)
+    return files()
+
+
+def _all_beat(site: Site, voices: list[tuple[zmq.Socket[bytes], Outbox]]) -> bool:
+    for publisher, voice in voices:
+        publisher.send_multipart([HEARTBEAT.encode(), voice.encode(DVA, m.Heartbeat(), 0.0)])
+    return all(site.dva.beats[voice.source] for _, voice in voices)

@@ -1,0 +1,275 @@
+"""A robot taken over, and sensors that the DVA heeds: the same in virtual time and over sockets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from one_session import (
+    OPERATOR,
+    PATIENT,
+    ROBOT,
+    SILENT_AFTER,
+    STEP,
+    Witness,
+    _quick_network,
+)
+from patience import PATIENCE_S
+
+from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
+from dva_sim.core.events import State
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.keys import KeyRing, create_keys
+from dva_sim.network.messaging import Transport
+from dva_sim.network.realtime import LiveClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.protocol import messages as m
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.control_room import add_dva
+from dva_sim.simulation.full.physical_world import Field
+from dva_sim.simulation.full.stage import DVA, Stage, id_of
+
+SUPERVISOR, OTHER = id_of("operator", 2), id_of("operator", 3)
+SHOWS_SMOKE = {"robot.sensors": [{"name": "smoke", "low": 0.5}], "dva.sensors": ["smoke"]}
+
+
+@pytest.fixture(params=["virtual", "sockets", "sockets with keys"])
+def network(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transport]:
+    if request.param == "virtual":
+        yield _quick_network()
+        return
+    ring = None
+    if request.param == "sockets with keys":
+        create_keys(tmp_path, [DVA, ROBOT, OPERATOR, SUPERVISOR, OTHER, id_of("detector", 1)])
+        ring = KeyRing(tmp_path)
+    live = SocketNetwork(LiveClock(), ring)
+    yield live
+    live.close()
+
+
+class Scene:
+    """The DVA, a robot in a building where nothing happens, and whoever is added."""
+
+    def __init__(self, network: Transport, **changes: object) -> None:
+        quiet = {"events": [{"kind": "fire", "at_s": 5000}], "operator.count": 3}
+        quiet |= {"dva.supervisors": ["operator-2"]}
+        scenario = scenarios.build(scenarios.load("drive-to-event"), PATIENT | quiet | changes)
+        self.stage = Stage(scenario, 1, network, Recorder())
+        if isinstance(network, SocketNetwork):
+            self.stage.address = lambda kind, number: network.join(id_of(kind, number))
+        self.dva = add_dva(self.stage)
+        self.dva.desk.registry.silent_after = SILENT_AFTER
+        self.field = Field(self.stage)
+        self.field.populate()
+        self.robot = self.field.robots[ROBOT]
+        self.witness = Witness(self.robot.controller)
+        self.robot.trace = self.witness  # type: ignore[assignment]
+        self.dva.start()
+
+    def enters(
+        self, number: int, script: Callable[[ScriptedOperator], Script], kind: str = "TeleOp"
+    ) -> ScriptedOperator:
+        device = self.stage.device("operator", number)
+        device.device_type = kind
+        operator = ScriptedOperator(device, script)
+        operator.start()
+        return operator
+
+    def until(self, condition: Callable[[], object]) -> None:
+        clock, end = self.stage.clock, self.stage.clock.now + PATIENCE_S
+        while not condition():
+            assert clock.now < end, "has not come true"
+            clock.run(clock.now + STEP)
+
+
+def request(takeover: str | None) -> Ask:
+    return Ask(DVA, m.PermissionRequest(ROBOT, "teleoperation", (), takeover))
+
+
+def until_granted(takeover: str | None, heard: list[m.Reply]) -> Script:
+    """Ask until the robot is given; the last reply of each kind is noted."""
+    while True:
+        reply = yield request(takeover)
+        assert reply is not None
+        heard.append(reply)
+        if isinstance(reply.content, m.Permission):
+            return
+        yield Pause(0.2)
+
+
+def drives_until_refused(heard: list[m.Reply]) -> Callable[[ScriptedOperator], Script]:
+    """Drives round and round until a command is refused, which is heard."""
+
+    def script(_: ScriptedOperator) -> Script:
+        yield from until_granted(None, heard)
+        session = session_of(heard)
+        yield from starts(session)
+        reply = yield Ask(ROBOT, m.SetTeleOp(0.3, 0.3), session)
+        while reply is not None and reply.code == m.OK:
+            yield Pause(0.05)
+            reply = yield Ask(ROBOT, m.SetTeleOp(0.3, 0.3), session)
+        assert reply is not None
+        heard.append(reply)
+
+    return script
+
+
+def starts(session: int) -> Script:
+    reply = yield Ask(ROBOT, m.StartTeleOp(), session)
+    while reply is None or reply.code != m.OK:
+        yield Pause(0.1)
+        reply = yield Ask(ROBOT, m.StartTeleOp(), session)
+
+
+def session_of(heard: list[m.Reply]) -> int:
+    content = heard[-1].content
+    assert isinstance(content, m.Permission)
+    return content.session
+
+
+def takes_and_drives(
+    takeover: str, heard: list[m.Reply], speeds: list[float], scene: Scene
+) -> Callable[[ScriptedOperator], Script]:
+    def script(_: ScriptedOperator) -> Script:
+        heard.append((yield request("no")) or m.Reply(0, 0, ""))
+        yield from until_granted(takeover, heard)
+        scene.field.world.advance_to(scene.stage.clock.now)
+        speeds.append(scene.robot.body.speed)
+        session = session_of(heard)
+        yield from starts(session)
+        for _ in range(20):
+            yield Ask(ROBOT, m.SetTeleOp(0.2, 0.0), session)
+
+    return script
+
+
+def waits(_: ScriptedOperator) -> Script:
+    yield Ask(DVA, m.GetDeviceList())
+    yield Pause(1000.0)
+
+
+def is_moving(scene: Scene) -> bool:
+    scene.field.world.advance_to(scene.stage.clock.now)
+    return scene.robot.body.speed > 0.2
+
+
+@pytest.mark.invariant("S2")
+def test_a_supervisor_takes_a_moving_robot_over_and_it_stands_in_between(
+    network: Transport,
+) -> None:
+    scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
+    speeds: list[float] = []
+    driver = scene.enters(1, drives_until_refused(first))
+    scene.until(lambda: is_moving(scene))
+    taker = scene.enters(2, takes_and_drives("force", second, speeds, scene), kind="Remote Control")
+    scene.until(lambda: taker.done and driver.done)
+    holder = second[0].content
+    assert isinstance(holder, m.Holder)
+    assert (holder.holder, holder.label) == (OPERATOR, "operator-1")
+    assert holder.held_for > 0.0
+    assert abs(speeds[0]) < 0.05
+    assert first[-1].code in (m.WRONG_MODE, m.NOT_PERMITTED, m.BAD_SESSION)
+    kinds = [d.message for d in scene.witness.decisions if d.code == m.OK]
+    told = [k for k in kinds if k.startswith("Permission")]
+    assert told == ["PermissionGrant", "PermissionRevocation", "PermissionGrant"]
+    assert kinds[-20:] == ["SetTeleOp"] * 20
+    assert scene.robot.controller.owner == SUPERVISOR
+
+
+def test_who_is_no_supervisor_is_refused_and_whoever_is_asked_may_decline(
+    network: Transport,
+) -> None:
+    scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
+
+    def asks(_: ScriptedOperator) -> Script:
+        for takeover in ("force", "ask", "ask"):
+            second.append((yield request(takeover)) or m.Reply(0, 0, ""))
+            yield Pause(0.5)
+
+    scene.enters(1, drives_until_refused(first))
+    scene.until(lambda: is_moving(scene))
+    asker = scene.enters(3, asks)
+    scene.until(lambda: asker.done)
+    assert [reply.code for reply in second] == [m.NOT_PERMITTED, m.BUSY, m.BUSY]
+    assert "who does not give it up" in second[-1].text  # who follows a script gives nothing up
+    assert scene.robot.controller.owner == OPERATOR
+
+
+def test_a_holder_that_agrees_gives_its_robot_up(network: Transport) -> None:
+    scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
+    speeds: list[float] = []
+    driver = scene.enters(1, drives_until_refused(first))
+    asked: list[m.HandoverRequest] = []
+
+    def agree(message: m.Message) -> m.Reply:
+        if isinstance(message.body, m.HandoverRequest):
+            asked.append(message.body)
+        return m.Reply(message.message_id, m.OK, "")
+
+    driver.device.serve(agree)
+    scene.until(lambda: is_moving(scene))
+    taker = scene.enters(3, takes_and_drives("ask", second, speeds, scene))
+    scene.until(lambda: taker.done and driver.done)
+    assert asked == [m.HandoverRequest(ROBOT, OTHER, "operator-3")]
+    assert abs(speeds[0]) < 0.05
+    assert scene.robot.controller.owner == OTHER
+
+
+def test_with_keys_nobody_plays_the_supervisor(network: Transport) -> None:
+    """A supervisor is known by its id: with keys by its key, without them by its word."""
+    scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
+    scene.enters(1, drives_until_refused(first))
+    scene.until(lambda: is_moving(scene))
+    honest = scene.enters(2, waits)
+    scene.until(lambda: honest.asked)
+    impostor = scene.stage.device("operator", 3)
+    impostor.outbox.source = SUPERVISOR
+    impostor.ask(DVA, request("force").body, second.append)
+    scene.until(lambda: second)
+    with_keys = isinstance(network, SocketNetwork) and network._ring is not None
+    assert second[0].code == (m.NOT_PERMITTED if with_keys else m.BUSY)
+    assert (ROBOT in scene.dva.desk.sessions.reserved) is not with_keys
+
+
+def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network: Transport) -> None:
+    scene, heard = Scene(network, **SHOWS_SMOKE), list[m.Reply]()
+
+    def asks(_: ScriptedOperator) -> Script:
+        while True:
+            reply = yield Ask(DVA, m.GetSensorInfo())
+            assert reply is not None
+            heard.append(reply)
+            if isinstance(reply.content, m.SensorList) and reply.content.devices:
+                return
+            yield Pause(0.2)
+
+    asker = scene.enters(1, asks)
+    book = scene.dva.desk.book
+    scene.until(lambda: asker.done and book.total)
+    content = heard[-1].content
+    assert isinstance(content, m.SensorList)
+    (line,) = content.devices
+    assert (line.device, line.sensors) == (ROBOT, (m.Sensor("smoke", "1/m"),))
+    event = book.get(1)
+    assert event is not None
+    assert (event.kind, set(event.sources)) == ("fire", {ROBOT})
+    here = scene.robot.body.pose()
+    at = scene.stage.site.frame.to_xy(event.position.latitude, event.position.longitude)
+    assert math.dist(at, (here.x, here.y)) < 0.5
+
+
+def test_what_a_detector_reports_beside_the_robot_is_confirmed_by_it(network: Transport) -> None:
+    scene = Scene(network, **SHOWS_SMOKE)
+    pose = scene.robot.body.pose()
+    place = m.Position(*scene.stage.site.frame.to_latlon(pose.x + 3.0, pose.y))
+    detector = scene.stage.device("detector", 1)
+    report = m.EventReport(None, "fire", place, 0.5, 0.9, "detected")
+    detector.register(lambda: detector.ask(DVA, report))
+    book = scene.dva.desk.book
+    scene.until(lambda: book.total and book.get(1).state is State.CONFIRMED)  # type: ignore[union-attr]
+    assert book.total == 1
+    assert set(book.closed[1].sources) >= {detector.id_tag}
+    assert replace(book.closed[1]).position == place

@@ -1,0 +1,93 @@
+"""A poll costs what is ready, not what is open, and misses nothing whoever used the socket."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+import zmq
+from patience import becomes
+
+from dva_sim.network import realtime
+from dva_sim.network.realtime import Poller
+
+Socket = zmq.Socket[bytes]
+Make = Callable[[int], Socket]
+
+
+@pytest.fixture
+def make() -> Iterator[Make]:
+    context: zmq.Context[Socket] = zmq.Context()
+    made: list[Socket] = []
+
+    def socket(kind: int) -> Socket:
+        made.append(context.socket(kind))
+        return made[-1]
+
+    yield socket
+    context.destroy(linger=0)
+
+
+def pair(make: Make) -> tuple[Socket, Socket]:
+    here, there = make(zmq.PAIR), make(zmq.PAIR)
+    port = here.bind_to_random_port("tcp://127.0.0.1")
+    there.connect(f"tcp://127.0.0.1:{port}")
+    return here, there
+
+
+def test_a_socket_that_was_not_read_out_is_found_again(make: Make) -> None:
+    here, there = pair(make)
+    poller = Poller()
+    poller.register(here)
+    for number in range(3):
+        there.send(b"%d" % number)
+    got: list[bytes] = []
+
+    def read_one() -> bool:
+        for socket in poller.poll(0.05):
+            got.append(socket.recv())
+        return len(got) == 3
+
+    assert becomes(read_one)
+    assert got == [b"0", b"1", b"2"]
+    assert poller.poll(0.0) == []
+
+
+def test_what_came_while_the_socket_was_used_is_found_if_one_says_so(make: Make) -> None:
+    """Asking a socket, or sending, takes the signal away that something has come."""
+    here, there = pair(make)
+    poller = Poller()
+    poller.register(here)
+    assert poller.poll(0.0) == []
+    there.send(b"news")
+    assert becomes(lambda: here.getsockopt(zmq.EVENTS) & zmq.POLLIN)
+    assert poller.poll(0.0) == []  # the trap
+    poller.look(here)
+    assert poller.poll(0.0) == [here]
+
+
+def test_among_200_silent_sockets_only_those_are_asked_that_have_something(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    poller = Poller()
+    for _ in range(200):
+        poller.register(make(zmq.SUB))
+    here, there = pair(make)
+    poller.register(here)
+    poller.poll(0.0)
+    asked: list[object] = []
+    original = realtime.has_more
+    monkeypatch.setattr(realtime, "has_more", lambda s: asked.append(s) or original(s))
+    there.send(b"news")
+    assert becomes(lambda: poller.poll(0.05) == [here])
+    assert set(asked) == {here}
+
+
+def test_a_socket_that_is_unregistered_is_not_asked(make: Make) -> None:
+    here, _ = pair(make)
+    poller = Poller()
+    poller.register(here)
+    poller.unregister(here)
+    here.close()
+    poller.look(here)
+    assert poller.poll(0.0) == []
