@@ -13,10 +13,12 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
-from dva_sim.network.patterns import Pattern, PubSub
+from dva_sim.network.messaging import Request
+from dva_sim.network.patterns import Pattern, PubSub, ReqRep
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol.codec import decode
-from dva_sim.protocol.messages import SetTeleOp
+from dva_sim.protocol.exchange import Outbox
+from dva_sim.protocol.messages import BAD_MESSAGE, OK, Reply, SetTeleOp
 from dva_sim.worlds.geo import GeoFrame
 
 PHONE, ROBOT = "02:00:00:03:00:01", "02:00:00:01:00:01"
@@ -28,7 +30,10 @@ def small_network() -> VirtualNetwork:
 
 
 def small_sender(
-    network: VirtualNetwork, pattern: Pattern, seen: list[int | None]
+    network: VirtualNetwork,
+    pattern: Pattern,
+    seen: list[int | None],
+    told: list[str] | None = None,
 ) -> CommandSender:
     device = AgentDevice(
         id_tag=PHONE,
@@ -54,6 +59,7 @@ def small_sender(
         window=8,
         seen_tick=lambda: seen[-1],
         on_lost=lambda why: None,
+        on_refused=lambda why: told.append(why) if told is not None else None,
     )
 
 
@@ -116,3 +122,20 @@ def test_once_a_drive_is_over_its_pattern_sends_nothing() -> None:
     sent, last = sender.drive.sent, sender.drive.commands[-1]
     kept.line.publish(last)  # type: ignore[arg-type]
     assert sender.drive.sent == sent == 4
+
+
+@pytest.mark.parametrize("off", [0, 1])
+def test_a_reply_counts_only_if_it_answers_the_command(off: int) -> None:
+    network, told = small_network(), list[str]()
+    says = Outbox(ROBOT)
+
+    def answer(request: Request) -> None:
+        number = decode(request.data).message_id
+        request.answer(says.encode(PHONE, Reply(number + off, OK, ""), network.clock.now, 7))
+
+    network.serve(ROBOT, answer)
+    sender = small_sender(network, ReqRep(), [1], told)
+    sender.start()
+    network.clock.run(1.0)
+    assert sender.drive.refused[BAD_MESSAGE] == off * sender.drive.sent
+    assert told[:1] == ["the robot obeys no more: no answer that can be read"] * off
