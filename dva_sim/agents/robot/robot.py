@@ -28,7 +28,7 @@ from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Accepted, DriveLog
-from dva_sim.network.messaging import Subscription
+from dva_sim.network.messaging import Request, Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.bodies import RobotBody
@@ -246,7 +246,7 @@ class RobotAgent:
             self._handle,
             setup.pattern.newest_wins or setup.conflates,
             setup.limit,
-            device.admit,
+            self._admit,
         )
         self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
@@ -284,9 +284,13 @@ class RobotAgent:
 
     # --- messages ----------------------------------------------------------------------
 
+    def _admit(self, request: Request) -> m.Message | None:
+        """A request that is worth waiting for; without power it hears none."""
+        return None if self.device.silent else self.device.admit(request)
+
     def _published(self, data: bytes) -> None:
         """A command has arrived of the one who drives; what is none takes no time."""
-        message = self.device.read(data, self.controller.owner)
+        message = None if self.device.silent else self.device.read(data, self.controller.owner)
         if message is None:
             return
         if message.destination == self.device.id_tag:

@@ -70,7 +70,7 @@ class Held(NamedTuple):
         return self.level in (level, "both")
 
 
-class Request(NamedTuple):
+class Unanswered(NamedTuple):
     """A message that reached a robot, and is not answered yet."""
 
     message: m.Message
@@ -99,7 +99,7 @@ class Witness:
     obeys_within: float
     sessions: OrderedDict[int, Held] = field(default_factory=OrderedDict)
     over: dict[int, float] = field(default_factory=dict)
-    unanswered: dict[tuple[str, int], Request] = field(default_factory=dict)
+    unanswered: dict[tuple[str, int], Unanswered] = field(default_factory=dict)
     arrivals: OrderedDict[tuple[str, int], float] = field(default_factory=OrderedDict)
     stopped: float = -1.0
     ordered: float = -1.0
@@ -181,7 +181,9 @@ class SafetyAudit:
         message = _read(data)
         if message is None:
             return
-        witness.unanswered.setdefault((message.source, message.message_id), Request(message, now))
+        witness.unanswered.setdefault(
+            (message.source, message.message_id), Unanswered(message, now)
+        )
         if source == self._dva and isinstance(message.body, m.PermissionGrant):
             grant = message.body
             witness.sessions[grant.session] = Held(grant.holder, grant.level, grant.sensors)
@@ -205,7 +207,7 @@ class SafetyAudit:
             self._report(found, now, self._robots[source].device.label)
 
     def _answered(
-        self, witness: Witness, robot: RobotAgent, asked: Request, code: int, now: float
+        self, witness: Witness, robot: RobotAgent, asked: Unanswered, code: int, now: float
     ) -> Iterator[Broken]:
         """A robot has answered a request, and so has obeyed it or not."""
         message, body = asked.message, asked.message.body
@@ -226,7 +228,7 @@ class SafetyAudit:
             yield from self._ordered(witness, robot, asked, now)
 
     def _ordered(
-        self, witness: Witness, robot: RobotAgent, asked: Request, now: float
+        self, witness: Witness, robot: RobotAgent, asked: Unanswered, now: float
     ) -> Iterator[Broken]:
         """A robot has begun to do what somebody asked for."""
         message = asked.message
