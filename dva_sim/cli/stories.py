@@ -32,9 +32,11 @@ from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.moments import story
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
+from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.shift import TimedRecording, TimedScenario
 from dva_sim.simulation.shift.recording import OUTCOMES
+from dva_sim.simulation.shift.simulation import CHECKED_OF_SHIFTS
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.transport import TransportScenario
 
@@ -129,6 +131,7 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
     if tables["people"]:
         lines.append(f"people: {_fared(row, tables['people'])}")
     counts = f"{row['messages']} messages, {row['violations']} safety rules broken"
+    counts += f" ({CHECKED_IN_SHORT})"
     lines.append(f"{row['simulated_s']:.0f} s {how}, {counts}")
     if failures := row["plugin_failures"]:
         lines.append(
@@ -191,7 +194,7 @@ def tell_shift(run: Played, console: Console) -> None:
     broken = sum(recording.violations.values())
     console.print(
         f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages} messages, "
-        f"{broken} rules broken",
+        f"{broken} safety rules broken ({CHECKED_OF_SHIFTS})",
         soft_wrap=True,
     )
     if is_verbose() and scenario.keep == "events":

@@ -36,6 +36,7 @@ def run(request: RunRequest) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
     from dva_sim.experiments.report.figures.registry import load_figures
     from dva_sim.experiments.report.report import write_report
+    from dva_sim.experiments.report.summary import Reading
 
     try:
         study, cells = _loaded(request)
@@ -47,12 +48,16 @@ def run(request: RunRequest) -> ExitCode:
         failures = _told_failures(results) + _recorded(request, study)
         with console.status("Writing the report ..."):
             report = write_report(folder, figures=figures)
+            distrusted = Reading(results).distrusted
+        for part, told in distrusted.items():
+            problem = f"in part {part} {told}: no contrast of it is shown"
+            print(error_line(problem), file=sys.stderr)
         tell_files(folder, *WRITTEN)
         detail(f"{results.machine.get('cpu_s', 0):.1f} s of CPU time in all runs")
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
     say(f"Report: {report}")
-    return ExitCode.RUNS_FAILED if failures else ExitCode.OK
+    return ExitCode.RUNS_FAILED if failures or distrusted else ExitCode.OK
 
 
 def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:

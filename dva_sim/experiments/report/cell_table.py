@@ -55,6 +55,7 @@ SUMMARIES: tuple[Summary, ...] = (
     ("error_share", "errors", np.mean, percent),
     ("throughput_bps", "throughput [bit/s]", np.mean, number),
     ("delay_felt_s", "delay felt [s]", np.mean, number),
+    ("plugin_failures", "failures of own classes", np.sum, number),
     ("violations", "violations", np.sum, number),
 )
 

@@ -77,12 +77,15 @@ def _made_by(reading: Reading) -> str:
 
 
 def _usual(reading: Reading) -> list[str]:
+    from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT  # late: start-up
+
     study, is_task = reading.study, _is_task(reading)
     awaited = measure_called(reading.view.measure).awaits if reading.view else ""
     return paragraphs(
         "method",
         block="block" if is_task else "trial",
         is_task=is_task,
+        checked=CHECKED_IN_SHORT,
         alike=_alike(reading),
         is_small=reading.persons < _FEW,
         has_points=POINT in study.get("factors", {}),

@@ -95,9 +95,11 @@ class ShiftPage(ModelPage):
 
     def method(self, correlation: float | None) -> list[str] | None:
         """How shifts were simulated, followed and compared."""
+        from dva_sim.simulation.shift.simulation import CHECKED_OF_SHIFTS  # late: start-up
+
         shifts = self.shifts
         facts = {"follow": f"{shifts.follow:g} s", "correlated": correlated(correlation)}
-        return paragraphs("method_shift", **facts, bound=BOUND)
+        return paragraphs("method_shift", **facts, bound=BOUND, checked=CHECKED_OF_SHIFTS)
 
 
 def _cells(shifts: Shifts) -> CellTable:

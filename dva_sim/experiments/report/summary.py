@@ -269,11 +269,26 @@ class Reading:
         scenario = self.scenario_of(view.part.name)
         support = support_of_part(view.part, scenario)
         possible = possible_values(view.measure, scenario)
+        if view.part.name in self.distrusted:
+            view = replace(view, contrast=None)
         return replace(view, outside=support.outside if support else None, possible=possible)
 
     @cached_property
+    def distrusted(self) -> dict[str, str]:
+        """Parts in which a class of the user's failed, so that something else decided: how often.
+
+        What is said of such a part would be said of the default as well.
+        """
+        return {part: told for part in self.parts if (told := _failures_in(self.runs, part))}
+
+    @property
+    def parts(self) -> list[str]:
+        """The parts that have runs."""
+        return [str(name) for name in dict.fromkeys(self.runs["part"])] if self.runs else []
+
+    @cached_property
     def finding(self) -> Finding | None:
-        """The declared contrast as measured."""
+        """The declared contrast as measured; None, too, where it is withheld."""
         found = finding_of(self.view) if self.view is not None else None
         return replace(found, failed=len(self.results.failures)) if found is not None else None
 
@@ -349,6 +364,8 @@ class Reading:
         """What a reader should take home, and what it depends on."""
         if self.view is None:
             return Answer("No run was completed, so there is nothing to answer with.")
+        if why := self.distrusted.get(self.view.part.name):
+            return Answer(f"The answer is withheld: {why}. Mend it, and run the study again.")
         found = self.page.answer(self.finding)
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
         notes = [*found.notes, *filter(None, weighed)]
@@ -362,15 +379,22 @@ class Reading:
     @cached_property
     def judgement(self) -> Judgement:
         """The comparisons and hypotheses as they came out."""
-        return judged(self.study, self.runs) if self.runs else Judgement([], [])
+        return judged(self.study, self._trusted) if self._trusted else Judgement([], [])
+
+    @property
+    def _trusted(self) -> Table:
+        """The runs of all parts but those that are distrusted; empty without any."""
+        parts = np.asarray(self.runs["part"]) if self.runs else np.empty(0)
+        kept = ~np.isin(parts, list(self.distrusted))
+        return {name: np.asarray(self.runs[name])[kept] for name in self.runs} if kept.any() else {}
 
     @cached_property
     def plans(self) -> list[SizePlan]:
         """What a study would need: of an exploratory one for all, else for what stayed open."""
-        if not self.runs:
+        if not self._trusted:
             return []
         explores = status_of(self.manifest).kind == "exploratory"
-        return plans(self.study, self.runs, None if explores else self._decided)
+        return plans(self.study, self._trusted, None if explores else self._decided)
 
     @property
     def _decided(self) -> set[str]:
@@ -416,6 +440,8 @@ class Reading:
             errors = dict.fromkeys(str(failure.get("error")) for failure in failures)
             shown = "; ".join(list(errors)[:_MOST_ERRORS])
             found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
+        for part, told in self.distrusted.items():
+            found.append(f"In part {part} {told}: no contrast of this part is shown.")
         if broken := _broken(self.runs):
             found.append(f"Safety rules were broken in {broken}.")
         if tuning := tuning_warning(self.manifest):
@@ -423,6 +449,19 @@ class Reading:
         if self.manifest.get("versions", {}).get("dirty"):
             found.append("The program that made the runs had changes that were not committed.")
         return found
+
+
+_FAILED = "plugin_failures", "policy_failed"  # columns, of which a model has one
+
+
+def _failures_in(runs: Table, part: str) -> str:
+    """How often classes of the user's failed in the runs of a part; empty if they did not."""
+    here = np.asarray(runs["part"]) == part
+    counts = sum(np.nan_to_num(as_floats(runs[name])[here]) for name in _FAILED if name in runs)
+    times, failed = int(np.sum(counts)), int(np.count_nonzero(counts))
+    return (
+        f"a class of yours failed {times} times, in {failed} of {here.sum()} runs" if times else ""
+    )
 
 
 def _broken(runs: Table) -> str:

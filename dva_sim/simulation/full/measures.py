@@ -133,7 +133,10 @@ RUN_COLUMNS = (
     Measure("refused", "requests that were refused"),
     text("network_depth", "how closely the network was modelled: message, segment or datagram"),
     Measure("plugin_failures", "times that a class of the user's gave no answer that is one"),
-    Measure("violations", "safety rules found broken; there should be none"),
+    Measure(
+        "violations",
+        "broken safety rules found, of S1 to S7; docs/invariants.md says how they are checked",
+    ),
     Measure("simulated_s", "virtual time simulated"),
 )
 """What a row of `run_row` may hold; what is a number, a study may ask for."""

@@ -207,7 +207,10 @@ RUN_COLUMNS = (
     Measure("overruled", "decisions of the policy that the core did not follow"),
     Measure("policy_failed", "times that the policy gave no decision, and the default one decided"),
     Measure("messages", "messages that the DVA took"),
-    Measure("violations", "safety rules found broken; there should be none"),
+    Measure(
+        "violations",
+        "broken safety rules found, of S6 and S7; docs/invariants.md says how they are checked",
+    ),
     Measure("simulated_s", "virtual time simulated"),
 )
 """What a row of `run_row` may hold, and so what a study may ask for."""

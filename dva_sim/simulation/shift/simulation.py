@@ -37,6 +37,8 @@ from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.shift.travel import Occurrence, Place, Terrain, terrain_of
 
 SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
+CHECKS = 64  # of the balance in a run
+CHECKED_OF_SHIFTS = f"S6 checked {CHECKS} times, S7 at the end of each event; slack {SLACK:g} s"
 
 
 def check(shift: Shift) -> None:
@@ -81,9 +83,6 @@ def _team(shift: Shift) -> Iterator[str]:
             yield "an event that somebody should be at has nobody"
         elif event.responder == event.actor:
             yield "somebody is to do two things at once"
-
-
-CHECKS = 64  # of the balance in a run
 
 
 class Shift:

@@ -1,0 +1,69 @@
+"""A contrast that rests on a class of the user's that failed is withheld, and all say why."""
+
+import json
+
+import pytest
+from command_line import call
+
+import dva_sim
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.results import Results
+from dva_sim.kernel.errors import ExitCode
+
+POLICY = """
+from dva_sim.core.dispatch import Policy
+class Mine(Policy):
+    def advise(self, situation, rng):
+        raise RuntimeError("no idea")
+"""
+STUDY = """
+question: Is mine better?
+seed: 5
+persons: 2
+replications: 1
+factors:
+  dispatch.policy: [min_eta, "mine.py:Mine"]
+parts:
+  shift: {scenario: small-shift}
+answer:
+  part: shift
+  measure: response_mean_s
+  factor: dispatch.policy
+  contrast: ["mine.py:Mine", min_eta]
+  smallest_effect_s: 2
+comparisons:
+  waiting:
+    part: shift
+    measure: confirmation_mean_s
+    factor: dispatch.policy
+    contrast: ["mine.py:Mine", min_eta]
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    (tmp_path / "mine.py").write_text(POLICY)
+    (tmp_path / "study.yaml").write_text(STUDY)
+    return tmp_path / "study.yaml"
+
+
+def test_a_policy_that_always_fails_is_compared_with_nothing(study, tmp_path):
+    out = tmp_path / "out"
+    ran = call("run", study, "-o", out, "--jobs", "1")
+    assert ran.returncode == ExitCode.RUNS_FAILED
+    assert "error: in part shift a class of yours failed" in ran.stderr
+    reading = Reading(Results.load(out))
+    assert reading.finding is None
+    assert reading.answer.lead.startswith("The answer is withheld: a class of yours failed")
+    assert [c.difference for c in reading.judgement.compared if c.difference is not None] == []
+    assert any("no contrast of this part is shown" in line for line in reading.warnings)
+    assert "The answer is withheld" in (out / "report.html").read_text()
+    assert not list(out.glob("figures/answer*"))
+    assert json.loads(call("show", out, "--json").stdout)["answer"]["finding"] is None
+
+
+def test_without_a_failure_nothing_is_withheld(study, tmp_path):
+    (tmp_path / "mine.py").write_text(POLICY.replace('raise RuntimeError("no idea")', "return []"))
+    results = dva_sim.run(study, tmp_path / "out", jobs=1)
+    assert Reading(results).distrusted == {}
+    assert Reading(results).finding is not None
