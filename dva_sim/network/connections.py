@@ -24,9 +24,10 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.network.link import Link
 from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.tcp.parameters import HEADERS, MSS
 from dva_sim.network.zmtp import HIGH_WATER_MARK, ZmtpConnection, ZmtpOptions
 
+MSS = 1448  # payload of a full Ethernet segment with TCP time stamps [B]
+HEADERS = 52  # IPv4 + TCP with time stamps [B]
 MIN_RTO, FIRST_RTO, MAX_RTO = 0.2, 1.0, 60.0
 MAX_IN_FLIGHT = 1000  # ZeroMQ's default high-water mark, in messages
 

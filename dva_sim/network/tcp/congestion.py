@@ -25,6 +25,8 @@ class Reno:
 
     BACKOFF = 0.5
 
+    __slots__ = ("_start", "threshold", "window")
+
     def __init__(self, options: TcpOptions) -> None:
         self._start = float(options.initial_window)
         self.window, self.threshold = self._start, inf
@@ -77,6 +79,8 @@ class Cubic(Reno):
     BACKOFF = 0.7
     C = 0.4
     FRIENDLY = 3 * (1 - BACKOFF) / (1 + BACKOFF)
+
+    __slots__ = ("_epoch", "_estimate", "_inflection", "_last", "_peak", "_plateau", "_saved")
 
     def __init__(self, options: TcpOptions) -> None:
         super().__init__(options)
@@ -141,6 +145,8 @@ class HyStart:
 
     SAMPLES, LOW_WINDOW, LEAST, MOST = 8, 16, 0.004, 0.016
 
+    __slots__ = ("_count", "_end", "_shortest")
+
     def __init__(self) -> None:
         self._end, self._count, self._shortest = -1, 0, inf
 
@@ -167,8 +173,27 @@ class HyStart:
         return self._shortest > minimum + min(max(minimum / 8, self.LEAST), self.MOST)
 
 
+class Unlimited(Reno):
+    """No congestion window at all."""
+
+    __slots__ = ()
+
+    def __init__(self, options: TcpOptions) -> None:
+        super().__init__(options)
+        self.window = 1e9
+
+    def grow(self, segments: int, now: float, ahead: float) -> None:
+        """Nothing to grow."""
+
+    def reduce(self, now: float) -> float:
+        """Nothing to reduce."""
+        return self.window
+
+
 def make_window(options: TcpOptions) -> Reno:
     """The congestion window that the options ask for."""
+    if not options.congestion_window:
+        return Unlimited(options)
     return Cubic(options) if options.congestion == "cubic" else Reno(options)
 
 
@@ -180,6 +205,8 @@ class RateReduction:
     References:
         RFC 6937.
     """
+
+    __slots__ = ("_at_start", "_delivered", "_threshold", "sent")
 
     def __init__(self, threshold: float, in_flight: int) -> None:
         self._threshold, self._at_start = threshold, max(1, in_flight)

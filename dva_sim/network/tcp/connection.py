@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
-from dva_sim.network.tcp.parameters import FIRST_RTO, HEADERS, TcpOptions
+from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.receiver import BLOCKS, Receiver
 from dva_sim.network.tcp.retransmission_timer import Timer
 from dva_sim.network.tcp.sender import Sender
@@ -49,6 +49,7 @@ class TcpEndpoint:
         greet: Callable[[], object] = _nothing,
     ) -> None:
         self._clock, self._link, self._greet = clock, link, greet
+        self._headers = options.headers
         self.on_readable: Callable[[], object] = _nothing
         self.on_writable: Callable[[], object] = _nothing
         self.on_end: Callable[[], object] = _nothing
@@ -185,7 +186,7 @@ class TcpEndpoint:
         receiver = self._receiver
         duplicate = receiver.duplicate
         receiver.leaves(now, end > start)
-        arrival = self._link.carry(now, end - start + HEADERS)
+        arrival = self._link.carry(now, end - start + self._headers)
         if arrival is None:
             return
         blocks = tuple(receiver.blocks[:BLOCKS])
@@ -208,8 +209,7 @@ class TcpEndpoint:
 
 
 OPENING_BYTES = 60  # a SYN: IPv4, TCP and its options
-SYN_RETRIES, SYNACK_RETRIES = 6, 5  # tcp_syn_retries, tcp_synack_retries
-SYN_LINEAR = 4  # openings repeated at a fixed interval before doubling: tcp_syn_linear_timeouts
+SYNACK_RETRIES = 5  # tcp_synack_retries
 
 
 class TcpConnection:
@@ -258,8 +258,8 @@ class TcpConnection:
         peer: TcpOptions | None = None,
     ) -> None:
         self._clock, self._out, self._back = clock, out, back
-        opener, peer = opener or TcpOptions(), peer or TcpOptions()
-        self.opener = TcpEndpoint(clock, opener, out)
+        self._options, peer = opener or TcpOptions(), peer or TcpOptions()
+        self.opener = TcpEndpoint(clock, self._options, out)
         self.peer = TcpEndpoint(clock, peer, back, self._accept)
         self.opener.join(self.peer)
         self.peer.join(self.opener)
@@ -267,7 +267,7 @@ class TcpConnection:
         self._accepted: Callable[[], object] = _nothing
         self._asked = self._answered = 0
         self._asked_at = self._answered_at = 0.0
-        self._asking = Timer(clock, self._ask, opener.tick)
+        self._asking = Timer(clock, self._ask, self._options.tick)
         self._answering = Timer(clock, self._answer, peer.tick)
 
     def open(
@@ -275,7 +275,12 @@ class TcpConnection:
     ) -> None:
         """Shake hands: `then()` when the opener may write, `accepted()` when the peer may."""
         self._then, self._accepted = then, accepted or _nothing
-        self._ask()
+        if self._options.handshake:
+            self._ask()
+        else:
+            self._establish(self.opener, self.peer, None, 0)
+            self._accept()
+            then()
 
     def close(self) -> None:
         """Forget everything: nothing more is sent, delivered or called."""
@@ -286,15 +291,15 @@ class TcpConnection:
 
     def _ask(self) -> None:
         """Send the opening segment, again and again."""
-        tried = self._asked
+        tried, linear = self._asked, self._options.syn_linear
         if self.opener.gone:
             return
-        if tried > SYN_RETRIES + SYN_LINEAR:
+        if tried > self._options.syn_retries + linear:
             self.opener.reset()
             return
         self._asked += 1
         self._asked_at = now = self._clock.now
-        self._asking.set(now + FIRST_RTO * 2.0 ** max(0, tried - SYN_LINEAR))
+        self._asking.set(now + self._options.first_rto * 2.0 ** max(0, tried - linear))
         arrival = self._out.carry(now, OPENING_BYTES)
         if arrival is not None:
             self._clock.call_at(arrival, self._asked_for, now)
@@ -310,7 +315,7 @@ class TcpConnection:
             return
         stamp = stamp or self._asked_at
         now = self._clock.now
-        self._answering.set(now + FIRST_RTO * 2.0**self._answered)
+        self._answering.set(now + self._options.first_rto * 2.0**self._answered)
         self._answered += 1
         self._answered_at = now
         arrival = self._back.carry(now, OPENING_BYTES)

@@ -13,39 +13,68 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 
 CONGESTION = ("cubic", "reno")
-MSS = 1448  # payload of a full Ethernet segment with TCP time stamps [B]
-HEADERS = 52  # IPv4 + TCP with time stamps, on every segment [B]
-# Retransmission time-out: floor of its variance part, before a sample (RFC 6298), and longest [s].
-MIN_RTO, FIRST_RTO, MAX_RTO = 0.2, 1.0, 120.0
 
 
 @dataclass(frozen=True, slots=True)
 class TcpOptions:
     """One end of a connection.
 
+    The switches in the second half leave a mechanism out, to show what it is worth.
+
     Attributes:
         send_buffer: SO_SNDBUF as the program sets it [B] (the kernel doubles it);
             None = tuned by the kernel as the congestion window grows.
         receive_buffer: SO_RCVBUF as the program sets it [B] (doubled likewise); None = tuned.
+        mss: Payload of a full segment [B]: Ethernet with TCP time stamps.
+        headers: IPv4 + TCP with time stamps, on every segment [B].
         congestion: `cubic` or `reno`.
         initial_window: Congestion window at the start [segments] (RFC 6928).
         delayed_ack: How long an acknowledgement waits for data to ride on [s];
             0 acknowledges every segment at once.
+        min_rto: Floor of the variance part of the retransmission time-out [s].
+        first_rto: Time-out before there is a round-trip sample [s] (RFC 6298).
+        max_rto: Longest time-out [s].
         retries: Time-outs in a row after which the connection is given up [tcp_retries2].
+        syn_retries: The same for the opening [tcp_syn_retries].
+        syn_linear: Openings repeated at a fixed interval before doubling
+            [tcp_syn_linear_timeouts].
         tick: Granularity of the kernel's timers [s]; 0 = exact.
+        handshake: Whether opening takes a round trip.
+        congestion_window: Whether there is one at all.
         hystart: Whether slow start ends when the round trip grows (cubic).
+        idle_restart: Whether the window shrinks when nothing was sent for a time-out
+            [tcp_slow_start_after_idle].
+        rtt_variance: Whether the time-out follows the variance of the round trip.
         tail_probe: Whether a tail-loss probe goes before the time-out.
+        rack: Whether loss is judged by time; otherwise by three later segments acknowledged.
+        collapse: Whether small neighbours are sent again as one segment
+            [tcp_retrans_collapse].
+        undo: Whether a needless recovery is taken back (by time stamps).
     """
 
     send_buffer: int | None = None
     receive_buffer: int | None = None
+    mss: int = 1448
+    headers: int = 52
     congestion: str = "cubic"
     initial_window: int = 10
     delayed_ack: float = 0.04
+    min_rto: float = 0.2
+    first_rto: float = 1.0
+    max_rto: float = 120.0
     retries: int = 15
+    syn_retries: int = 6
+    syn_linear: int = 4
     tick: float = 0.004
+    handshake: bool = True
+    congestion_window: bool = True
     hystart: bool = True
+    idle_restart: bool = True
+    rtt_variance: bool = True
     tail_probe: bool = True
+    rack: bool = True
+    collapse: bool = True
+    undo: bool = True
 
     def __post_init__(self) -> None:
         if self.congestion not in CONGESTION:

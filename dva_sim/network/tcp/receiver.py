@@ -14,7 +14,7 @@ from collections.abc import Callable
 from math import inf
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.tcp.parameters import MSS, TcpOptions
+from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip, Timer
 from dva_sim.network.tcp.send_queue import SMALLEST
 
@@ -148,14 +148,14 @@ class Receiver:
     def _reopened(self) -> bool:
         """Whether the window has at least doubled, and by a segment (RFC 9293, 3.8.6.2.2)."""
         before, after = self.edge - self.next, self.read_to + self._window - self.next
-        least = min(MSS, self._window // 2)
+        least = min(self._options.mss, self._window // 2)
         return after >= 2 * before and after - before >= least
 
     def _note_rhythm(self, size: int, now: float) -> None:
         """How soon the next data may be expected."""
         gap, base = now - self._last_data, self._options.delayed_ack
         self._last_data = now
-        self._largest = max(self._largest, min(size, MSS))
+        self._largest = max(self._largest, min(size, self._options.mss))
         if gap > self._times.timeout:
             self._quick = QUICK
         elif gap <= base / 2:

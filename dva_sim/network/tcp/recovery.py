@@ -13,6 +13,7 @@ from __future__ import annotations
 from math import inf
 
 from dva_sim.network.tcp.congestion import RateReduction, Reno
+from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip
 from dva_sim.network.tcp.send_queue import Scoreboard, SentSegment
 
@@ -31,6 +32,18 @@ class ByTime:
     Attributes:
         round_trip: Of the latest segment delivered [s].
     """
+
+    __slots__ = (
+        "_duplicate_round",
+        "_furthest",
+        "_latest",
+        "_latest_end",
+        "_persist",
+        "_reordering",
+        "_steps",
+        "_times",
+        "round_trip",
+    )
 
     def __init__(self, times: RoundTrip) -> None:
         self._times = times
@@ -105,6 +118,30 @@ class ByTime:
                 board.mark_lost(sent)
 
 
+class ByCount(ByTime):
+    """A segment is lost when three that follow it have been acknowledged selectively."""
+
+    __slots__ = ()
+
+    def detect(self, board: Scoreboard, now: float, recovering: bool) -> float:
+        """See `ByTime`; there is nothing to wait for."""
+        later = board.sacked
+        for sent in board.queue:
+            if sent.sacked:
+                later -= 1
+            elif later < DUPLICATES:
+                break
+            elif not sent.lost:
+                board.mark_lost(sent)
+        return 0.0
+
+    def on_timeout(self, board: Scoreboard, now: float) -> None:
+        """Everything is lost (RFC 6675, section 5.1)."""
+        for sent in board.queue:
+            if not sent.sacked:
+                board.mark_lost(sent)
+
+
 OPEN, RECOVERY, LOSS = "open", "recovery", "loss"
 
 
@@ -112,6 +149,7 @@ class Recovery:
     """Open, recovering from losses found by acknowledgements, or from a time-out.
 
     Args:
+        options: Of this end.
         times: Its round trip.
         window: Its congestion window.
         board: What it has under way.
@@ -122,9 +160,27 @@ class Recovery:
         probe_end: First byte beyond the last tail-loss probe; -1 if none is open.
     """
 
-    def __init__(self, times: RoundTrip, window: Reno, board: Scoreboard) -> None:
+    __slots__ = (
+        "_before",
+        "_board",
+        "_first_repeat",
+        "_limited",
+        "_probe_repeats",
+        "_reduction",
+        "_undo",
+        "_until",
+        "_window",
+        "losses",
+        "probe_end",
+        "state",
+    )
+
+    def __init__(
+        self, options: TcpOptions, times: RoundTrip, window: Reno, board: Scoreboard
+    ) -> None:
         self._window, self._board = window, board
-        self.losses = ByTime(times)
+        self._limited, self._undo = options.congestion_window, options.undo
+        self.losses = ByTime(times) if options.rack else ByCount(times)
         self.state, self._until = OPEN, 0
         self._before = window.window, window.threshold
         self._first_repeat: float = inf
@@ -166,7 +222,7 @@ class Recovery:
         if self.state == OPEN:
             return
         over = acknowledged >= self._until
-        needless = echo < self._first_repeat
+        needless = self._undo and echo < self._first_repeat
         if needless and (over or self.state == LOSS or not self._board.resent):
             window, threshold = self._before
             self._window.window = max(self._window.window, window)
@@ -174,7 +230,7 @@ class Recovery:
             self._board.forgive()
             self.state = OPEN
         elif over:
-            if self.state == RECOVERY:
+            if self.state == RECOVERY and self._limited:
                 self._window.window = self._window.threshold
             self.losses.recovered()
             self.state = OPEN
@@ -195,7 +251,7 @@ class Recovery:
             delivered: Segments newly acknowledged.
             whole: The left edge moved and nothing more was found lost.
         """
-        if self.state == RECOVERY:
+        if self.state == RECOVERY and self._limited:
             in_flight = self._board.in_flight
             allowed = self._reduction.allows(delivered, in_flight, whole)
             self._window.window = float(in_flight + allowed)
@@ -208,7 +264,8 @@ class Recovery:
             self._window.reduce(now)
         self.state, self._until = LOSS, next_byte
         self.losses.on_timeout(self._board, now)
-        self._window.window = float(self._board.in_flight + 1)
+        if self._limited:
+            self._window.window = float(self._board.in_flight + 1)
 
     def _begin(self, state: str, next_byte: int) -> None:
         self._before = self._window.window, self._window.threshold
@@ -218,5 +275,5 @@ class Recovery:
             self._first_repeat = inf  # otherwise the one of the recovery before still counts
 
     def _mended(self, now: float) -> None:
-        if self.state == OPEN:
+        if self.state == OPEN and self._limited:
             self._window.window = min(self._window.window, self._window.reduce(now))

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from math import ceil, inf
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.tcp.parameters import FIRST_RTO, MAX_RTO, MIN_RTO
+from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.send_queue import Scoreboard
 
 
@@ -37,21 +37,31 @@ class RoundTrip:
         RFC 6298; Sarolahti, Kuznetsov: Congestion Control in Linux TCP. USENIX Annual
         Technical Conference, FREENIX Track, 2002 (the variation).
 
-    Args:
-        tick: Granularity of the time-out [s]; 0 = exact.
-
     Attributes:
         smoothed: SRTT [s]; 0 before the first sample.
         minimum: The shortest so far [s].
         timeout: RTO without back-off [s], in whole ticks.
     """
 
-    def __init__(self, tick: float = 0.0) -> None:
-        self._tick = tick
+    __slots__ = (
+        "_floor",
+        "_largest",
+        "_options",
+        "_round_end",
+        "_variation",
+        "minimum",
+        "smoothed",
+        "timeout",
+        "variance",
+    )
+
+    def __init__(self, options: TcpOptions) -> None:
+        self._options = options
+        self._floor = options.min_rto / 4
         self.smoothed = self.variance = self._variation = self._largest = 0.0
         self._round_end = 0
         self.minimum = inf
-        self.timeout = FIRST_RTO
+        self.timeout = options.first_rto
 
     def sample(self, rtt: float, acknowledged: int, sent: int) -> None:
         """Take one measurement.
@@ -66,9 +76,10 @@ class RoundTrip:
         else:
             self.smoothed = max(rtt, 1e-6)
             self._variation = rtt / 2
-            self.variance = self._largest = max(self._variation, MIN_RTO / 4)
+            self.variance = self._largest = max(self._variation, self._floor)
             self._round_end = sent
-        timeout, tick = min(self.smoothed + 4 * self.variance, MAX_RTO), self._tick
+        spread = 4 * self.variance if self._options.rtt_variance else self._options.min_rto
+        timeout, tick = min(self.smoothed + spread, self._options.max_rto), self._options.tick
         self.timeout = ceil(timeout / tick - 1e-6) * tick if tick else timeout
 
     def shortest(self, rtt: float) -> None:
@@ -90,7 +101,7 @@ class RoundTrip:
         self.variance = max(self.variance, self._largest)
         if acknowledged > self._round_end:
             self.variance -= (self.variance - self._largest) / 4
-            self._round_end, self._largest = sent, MIN_RTO / 4
+            self._round_end, self._largest = sent, self._floor
 
 
 _SLACK_S = 1e-6  # the clock counts whole microseconds
@@ -109,6 +120,8 @@ class Timer:
     Attributes:
         deadline: When it rings [s]; infinite if it is not set.
     """
+
+    __slots__ = ("_action", "_clock", "_due", "_tick", "deadline")
 
     def __init__(self, clock: Clock, action: Callable[[], object], tick: float = 0.0) -> None:
         self._clock, self._action, self._tick = clock, action, tick
@@ -164,9 +177,9 @@ class Alarm:
 
     Args:
         clock: The run's clock.
-        times: The round trip of this end.
+        options: Of this end.
+        times: Its round trip.
         ring: Called when the time has come.
-        tick: Granularity of the timer [s].
 
     Attributes:
         kind: What it waits for: a time-out, the moment for a tail-loss probe, the end of
@@ -175,16 +188,19 @@ class Alarm:
         doubt: When the next segment in doubt is held to be lost [s]; 0 if none is.
     """
 
+    __slots__ = ("_options", "_timeout_at", "_timer", "_times", "back_off", "doubt", "kind")
+
     def __init__(
-        self, clock: Clock, times: RoundTrip, ring: Callable[[], object], tick: float
+        self, clock: Clock, options: TcpOptions, times: RoundTrip, ring: Callable[[], object]
     ) -> None:
-        self._times, self._timer = times, Timer(clock, ring, tick)
+        self._options, self._times = options, times
+        self._timer = Timer(clock, ring, options.tick)
         self.kind, self.back_off = TIMEOUT, 0
         self._timeout_at = self.doubt = 0.0
 
     def timeout(self) -> float:
         """Retransmission time-out with its back-off [s]."""
-        return min(self._times.timeout * 2.0**self.back_off, MAX_RTO)
+        return min(self._times.timeout * 2.0**self.back_off, self._options.max_rto)
 
     def stop(self) -> None:
         """Wait for nothing."""
@@ -249,6 +265,6 @@ class Alarm:
     def _probe_time(self, segments: int) -> float:
         """RFC 8985, section 7.2: a single segment may meet a delayed acknowledgement."""
         if not self._times.smoothed:
-            return FIRST_RTO
-        patience = MIN_RTO if segments == 1 else 0.0
+            return self._options.first_rto
+        patience = self._options.min_rto if segments == 1 else 0.0
         return 2 * self._times.smoothed + patience

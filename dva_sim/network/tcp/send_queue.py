@@ -15,8 +15,6 @@ from __future__ import annotations
 
 from collections import deque
 
-from dva_sim.network.tcp.parameters import MSS
-
 PACKET_COST = 832  # beside the payload, of each packet that waits or is under way [B]
 SMALLEST = 4608  # the least that SO_SNDBUF gives, after doubling [B]
 LARGEST = 4_194_304  # tcp_wmem, third value [B]
@@ -33,6 +31,7 @@ class SendBuffer:
     Args:
         size: SO_SNDBUF as the program sets it [B], or None = automatic.
         initial_window: Of the congestion window [segments].
+        mss: Payload of a full segment [B].
 
     Attributes:
         limit: How much may be charged before no further packet is begun [B].
@@ -40,9 +39,20 @@ class SendBuffer:
         blocked: Whether somebody waits for room, because a write was not taken whole, say.
     """
 
-    def __init__(self, size: int | None, initial_window: int) -> None:
+    __slots__ = (
+        "_automatic",
+        "_largest_window",
+        "_mss",
+        "_packet",
+        "_waiting",
+        "blocked",
+        "limit",
+        "used",
+    )
+
+    def __init__(self, size: int | None, initial_window: int, mss: int) -> None:
         self._automatic = size is None
-        self._packet = MSS
+        self._mss = self._packet = mss
         self._largest_window = 0
         self.limit = 2 * initial_window * PER_SEGMENT
         if size is not None:
@@ -55,8 +65,8 @@ class SendBuffer:
         """The other end has room for `window` bytes [B]: packets may wait that are half as long."""
         if window > self._largest_window:
             self._largest_window = window
-            segments = min(WAITING_SEGMENTS, window // 2 // MSS)
-            self._packet = max(1, segments) * MSS
+            segments = min(WAITING_SEGMENTS, window // 2 // self._mss)
+            self._packet = max(1, segments) * self._mss
 
     @property
     def has_room(self) -> bool:
@@ -161,6 +171,8 @@ class Scoreboard:
         resent: How many have been sent again and are under way.
     """
 
+    __slots__ = ("lost", "queue", "resent", "sacked")
+
     def __init__(self) -> None:
         self.queue: list[SentSegment] = []
         self.sacked = self.lost = self.resent = 0
@@ -213,12 +225,12 @@ class Scoreboard:
             sent.resent = True
             self.resent += 1
 
-    def merge(self, index: int) -> int:
+    def merge(self, index: int, mss: int) -> int:
         """Let a segment swallow its small neighbours behind it: the charge set free [B]."""
         sent, free = self.queue[index], 0
         while index + 1 < len(self.queue):
             other = self.queue[index + 1]
-            if other.sacked or other.end - sent.start > MSS:
+            if other.sacked or other.end - sent.start > mss:
                 break
             self.lost -= other.lost
             self.resent -= other.resent

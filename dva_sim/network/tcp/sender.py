@@ -12,7 +12,7 @@ from math import inf
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.congestion import HyStart, make_window
-from dva_sim.network.tcp.parameters import MSS, TcpOptions
+from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.recovery import OPEN, Recovery
 from dva_sim.network.tcp.retransmission_timer import PROBE, REORDER, WINDOW, Alarm, RoundTrip
 from dva_sim.network.tcp.send_queue import Gain, Scoreboard, SendBuffer, SentSegment
@@ -53,14 +53,14 @@ class Sender:
         self._clock, self._options, self._emit, self._give_up = clock, options, emit, give_up
         self.total = self.next = self.first = self.edge = 0
         self.end_mark: float = inf
-        self.retransmitted = self.timeouts = self.tail_probes = 0
-        self.buffer = SendBuffer(options.send_buffer, options.initial_window)
+        self.segments = self.retransmitted = self.timeouts = self.tail_probes = 0
+        self.buffer = SendBuffer(options.send_buffer, options.initial_window, options.mss)
         self.board = Scoreboard()
-        self.times = RoundTrip(options.tick)
+        self.times = RoundTrip(options)
         self.window = make_window(options)
-        self.recovery = Recovery(self.times, self.window, self.board)
+        self.recovery = Recovery(options, self.times, self.window, self.board)
         self._hystart = HyStart()
-        self._alarm = Alarm(clock, self.times, self._ring, options.tick)
+        self._alarm = Alarm(clock, options, self.times, self._ring)
         self._unanswered = 0
         self._last_sent = 0.0
         self._window_used, self._most_out, self._use_round = False, 0, 0
@@ -74,7 +74,7 @@ class Sender:
             self.times.shortest(round_trip)
         elif repeated:
             self.times.without_sample()
-        if repeated > 1:
+        if repeated > 1 and self._options.congestion_window:
             self.window.window = 1.0  # RFC 5681, section 3.1; Linux forgives one repetition
 
     def write(self, count: int) -> int:
@@ -82,7 +82,7 @@ class Sender:
         taken = self.buffer.take(count)
         if taken:
             now = self._clock.now
-            if not self.board.queue:
+            if not self.board.queue and self._options.idle_restart:
                 self.window.after_idle(now - self._last_sent, self.times.timeout)
             self.total += taken
             self._push(now)
@@ -209,10 +209,10 @@ class Sender:
             self._repeat_lost(now)
         if self.total == self.next:
             return
-        room = int(self.window.window) - self.board.in_flight
+        room, mss = int(self.window.window) - self.board.in_flight, self._options.mss
         edge = self.edge + (self.end_mark < inf)  # the end itself takes no room
         while room > 0 and self.next < self.total:
-            end = min(self.next + MSS, self.total)
+            end = min(self.next + mss, self.total)
             if end > edge:
                 break
             self._send(end, now)
@@ -243,7 +243,8 @@ class Sender:
 
     def _repeat(self, index: int, now: float) -> None:
         sent = self.board.queue[index]
-        self.buffer.release(self.board.merge(index))
+        if self._options.collapse:
+            self.buffer.release(self.board.merge(index, self._options.mss))
         self.board.repeat(sent, now)
         if self.recovery.state != OPEN:
             self.recovery.repeated(now)
@@ -297,7 +298,7 @@ class Sender:
             self._alarm.fall_back(now, self.board)  # one probe at a time
             return
         self.tail_probes += 1
-        end = min(self.next + MSS, self.total)
+        end = min(self.next + self._options.mss, self.total)
         fresh = self.next < end <= self.edge
         if fresh:
             self._send(end, now)

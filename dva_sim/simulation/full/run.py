@@ -13,7 +13,7 @@ from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, Bystander
 from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder, TrackPoint
-from dva_sim.network.connections import Connector, Load
+from dva_sim.network.connections import HEADERS, MSS, Connector, Load
 from dva_sim.network.link import (
     ConstantRate,
     Direction,
@@ -23,7 +23,6 @@ from dva_sim.network.link import (
     part_links,
 )
 from dva_sim.network.link.link import Reception, make_link
-from dva_sim.network.tcp.parameters import HEADERS, MSS
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator
 from dva_sim.simulation.full.disturbance import Disturbance

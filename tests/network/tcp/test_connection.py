@@ -34,6 +34,10 @@ def test_a_lost_opening_is_repeated_each_second_four_times_and_then_doubling(los
     assert opened(lose_out=lost)[0]["opener"] == at
 
 
+def test_with_doubling_from_the_start_the_third_opening_leaves_after_three_seconds():
+    assert opened(lose_out={1, 2}, opener=options(syn_linear=0))[0]["opener"] == 3.1
+
+
 def test_a_lost_answer_comes_again_with_the_repeated_opening():
     # both ends repeat after a second; the answer leaves 0.05 s behind the opening
     assert opened(lose_back={1})[0]["opener"] == pytest.approx(1.1, abs=1e-6)
@@ -49,6 +53,12 @@ def test_an_unanswered_opening_is_given_up_after_131_seconds():
 def test_one_lost_opening_leaves_the_window_and_two_reduce_it_to_one_segment():
     for lost, window in (({1}, 10.0), ({1, 2}, 1.0)):
         assert opened(lose_out=lost)[2].opener.congestion_window == window
+
+
+def test_without_a_handshake_the_opener_may_write_at_once():
+    times, out, _ = opened(opener=options(handshake=False))
+    assert times == {"opener": 0.0, "peer": 0.0}
+    assert out.carried == []
 
 
 def test_data_opens_the_peer_when_the_last_acknowledgement_was_lost():

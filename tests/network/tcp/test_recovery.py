@@ -98,6 +98,13 @@ def test_three_later_segments_end_the_patience():
     assert pair.sent(1.0)[-1] == pytest.approx(1.103)
 
 
+def test_without_rack_three_later_segments_are_needed():
+    three = lost_at([1.0, 1.01, 1.02, 1.03], {1}, rack=False)
+    two = lost_at([1.0, 1.01, 1.02], {1}, rack=False)
+    assert three.sent(1.0)[-1] == pytest.approx(1.13)
+    assert two.sent(1.0)[-1] == pytest.approx(1.3)  # nothing but the time-out
+
+
 def test_a_lost_repetition_is_found_by_what_was_sent_after_it():
     # repeated at 1.2 and lost again; what left at 1.21 is acknowledged at 1.31
     pair = lost_at([1.0, 1.1, 1.101, 1.102, 1.21], {1, 5})
@@ -120,9 +127,12 @@ def test_a_segment_late_within_the_patience_is_not_repeated():
 
 
 def test_a_needless_recovery_is_taken_back_by_time_stamps():
-    pair = lost_at([1.0, 1.01, 1.02], set(), late={1: 0.08})
-    assert pair.opener.sender.retransmitted == 1
-    assert pair.opener.congestion_window == 10.0
+    late = {1: 0.08}
+    with_undo = lost_at([1.0, 1.01, 1.02], set(), late=late)
+    without = lost_at([1.0, 1.01, 1.02], set(), late=late, undo=False)
+    assert with_undo.opener.sender.retransmitted == without.opener.sender.retransmitted == 1
+    assert with_undo.opener.congestion_window == 10.0
+    assert without.opener.congestion_window < 10.0
 
 
 def test_once_reordering_was_seen_three_later_segments_do_not_end_the_patience():
@@ -133,8 +143,11 @@ def test_once_reordering_was_seen_three_later_segments_do_not_end_the_patience()
 def test_small_neighbours_are_repeated_as_one_segment():
     # after the time-out 3 x 400 B fit into one segment
     together = lost_at([1.0, 1.001, 1.002], {1, 2, 3, 4}, tail_probe=False)
+    apart = lost_at([1.0, 1.001, 1.002], {1, 2, 3, 4}, tail_probe=False, collapse=False)
     assert max(size for _, size in together.out.since(1.25)) == 1252
+    assert max(size for _, size in apart.out.since(1.25)) == 452
     assert sum(count for _, count in together.arrivals) == 1200
+    assert sum(count for _, count in apart.arrivals) == 1200
 
 
 def test_a_timeout_leaves_a_window_of_one_segment():
@@ -151,3 +164,10 @@ def test_slow_start_doubles_the_segments_of_a_round_trip():
     pair.clock.run(1.35)
     sent = pair.sent(1.0)
     assert [sent.count(at) for at in (1.0, 1.1, 1.2, 1.3)] == [10, 20, 40, 80]
+
+
+def test_without_a_congestion_window_all_that_is_written_leaves_at_once():
+    pair = Pair(opener=options(congestion_window=False, send_buffer=1_000_000))
+    pair.at(1.0, pair.opener.write, 60 * 1000)
+    pair.clock.run(1.01)
+    assert len(pair.sent(1.0)) == 42

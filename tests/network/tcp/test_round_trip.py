@@ -1,10 +1,11 @@
 import pytest
 
+from dva_sim.network.tcp.parameters import TcpOptions
 from dva_sim.network.tcp.retransmission_timer import RoundTrip
 
 
-def after(*samples, tick=0.0):
-    times = RoundTrip(tick)
+def after(*samples, tick=0.0, **changes):
+    times = RoundTrip(TcpOptions(tick=tick, **changes))
     for number, sample in enumerate(samples):
         times.sample(sample, 2 * number, 2 * number + 1)
     return times
@@ -41,6 +42,10 @@ def test_a_sudden_improvement_hardly_raises_the_variance():
     assert after(1.0, 0.3).variance == pytest.approx(0.5 + 0.00625)
 
 
+def test_without_variance_the_timeout_is_the_round_trip_and_200_ms():
+    assert after(0.5, 0.9, rtt_variance=False).timeout == pytest.approx(0.55 + 0.2)
+
+
 def test_an_opening_that_measured_nothing_leads_to_three_seconds():
     times = after()
     times.without_sample()
@@ -48,7 +53,7 @@ def test_an_opening_that_measured_nothing_leads_to_three_seconds():
 
 
 def test_the_timeout_is_never_beyond_the_longest():
-    assert after(100.0).timeout == 120.0
+    assert after(100.0, max_rto=120.0).timeout == 120.0
 
 
 def test_the_timeout_is_in_whole_ticks_of_the_kernel():
