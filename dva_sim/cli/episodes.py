@@ -13,6 +13,8 @@ from dva_sim.experiments.report.episode import EpisodeRequest, doubts, open_reco
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.simulation.full import Recording
 
+PART = ".part"  # what a live run leaves whose supervisor was killed
+
 
 def episode(request: EpisodeRequest, where: Console = console) -> None:
     """Play what is asked for, tell it, and write its files.
@@ -37,6 +39,12 @@ def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = con
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
+    if file.suffix == PART:
+        from dva_sim.live.recording import finish  # late: start-up
+
+        file, part = file.with_suffix(""), file
+        finish(part, file, own_code=False)
+        where.print(f"{file} made of {part}", soft_wrap=True)
     opened = open_recording(file, pictures)
     run = opened.playback
     tell_story(run, where)

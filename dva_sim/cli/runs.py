@@ -144,7 +144,8 @@ def live(
         Path | None, Option(metavar="FOLDER", help="Folder of keys: CURVE is on.")
     ] = None,
     record: Annotated[
-        Path | None, Option(metavar="FOLDER", help="Folder for the robots' traces.")
+        Path | None,
+        Option(metavar="FILE|FOLDER", help="A recording (.mcap); or a folder of traces."),
     ] = None,
     state: Annotated[
         Path | None,
@@ -171,6 +172,7 @@ def live(
     Examples:
         dva-sim live drive-to-event  # a simulated person drives
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
+        dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
     from dva_sim.cli import live_screen

@@ -89,7 +89,7 @@ class SocketWire:
     kind: int
 
     def __init__(self, network: SocketNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._on_reply = network, on_reply
+        self._network, self._node, self._on_reply = network, node, on_reply
         self._socket = network.client(self.kind, node, peer)
         self._configure()
         network.clock.watch(self._socket, self._replies)
@@ -129,6 +129,7 @@ class ReqWire(SocketWire):
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`; the last one sent must have been answered."""
         self._tag = tag
+        self._network.note(self._node, data)
         self._network.send(self._socket, [data])
 
     def _replies(self) -> None:
@@ -149,6 +150,7 @@ class DealerWire(SocketWire):
 
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`."""
+        self._network.note(self._node, data)
         self._network.send(self._socket, [tag.to_bytes(8, "big"), b"", data])
 
     def _reply(self, frames: list[bytes]) -> None:
@@ -167,7 +169,7 @@ class SocketSubscription:
         topic: str,
         handler: Callable[[Any], object],
     ) -> None:
-        self._network, self._handler = network, handler
+        self._network, self._node, self._handler = network, node, handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
         self._paused = False
@@ -194,6 +196,7 @@ class SocketSubscription:
             if frames is None:
                 return
             if len(frames) == 2:
+                self._network.note(self._node, frames[1], sent=False)
                 self._handler(frames[1])
             else:
                 self._network.counters["publications of another form"] += 1
@@ -234,6 +237,7 @@ class SocketNetwork:
 
     Attributes:
         counters: What was refused or could not be sent, by reason.
+        watcher: Told of each message: a node here, the content, whether that node sends it.
     """
 
     def __init__(
@@ -254,6 +258,7 @@ class SocketNetwork:
         self._security = Security(self._context, self._aside, ring, self._refused)
         clock.every(LOOK_ASIDE, self._look_aside)
         self.counters: Counter[str] = Counter()
+        self.watcher: Callable[[str, Any, bool], object] | None = None
         self._addresses: dict[str, str] = {}
         self._services: dict[str, Service] = {}
         self._routers: dict[str, Socket] = {}
@@ -269,6 +274,10 @@ class SocketNetwork:
         if self.endpoint(node, published=False) != before:
             for socket in [s for s, (_, peer) in self._clients.items() if peer == node]:
                 self._reach(socket, node)
+
+    def is_here(self, node: str) -> bool:
+        """Whether a node is one of this process."""
+        return node in self._routers
 
     def address(self, node: str) -> str | None:
         """Where a node is found, if anybody said."""
@@ -371,8 +380,19 @@ class SocketNetwork:
         route, body = frames[:start], frames[start:]
         # Anything but one frame is no message; its empty text is refused as such, and answered.
         data = body[0] if len(body) == 1 else b""
+        self.note(node, data, sent=False)
+
+        def answer(reply: bytes) -> None:
+            self.note(node, reply)
+            self.send(router, [*route, reply])
+
         # The first frame is what the socket itself calls the connection: nobody can take another's.
-        service(Request(data, lambda reply: self.send(router, [*route, reply]), sender, route[0]))
+        service(Request(data, answer, sender, route[0]))
+
+    def note(self, node: str, payload: Any, sent: bool = True) -> None:
+        """Somebody may want to know what is said here."""
+        if self.watcher is not None:
+            self.watcher(node, payload, sent)
 
     def send(self, socket: Socket, frames: list[bytes]) -> None:
         """Send without waiting; what does not fit is dropped and counted."""
@@ -390,6 +410,7 @@ class SocketNetwork:
         """See `Transport`; what is not bytes packs itself into bytes."""
         publisher = self._publishers.get(node)
         if publisher is not None:
+            self.note(node, payload)
             data = payload if isinstance(payload, bytes) else payload.pack(size)
             self.send(publisher.socket, [topic.encode(), data])
 

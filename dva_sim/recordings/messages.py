@@ -206,6 +206,9 @@ picture
 timestamp: time; to: text; size_bytes: count; captured_s x_m y_m heading_rad visibility_m: number;
 hazards: SeenHazard*
 
+dva_sim.Decision | A line of the trace of a robot or the DVA, by which its decisions are replayed
+timestamp: time; line: text
+
 dva_sim.Hazard | What burns, leaks or floods, once a second while it goes on; `number` counts from 1
 timestamp: time; number: count; kind room: text; x_m y_m radius_m danger_radius_m severity: number
 """

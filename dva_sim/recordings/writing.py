@@ -10,8 +10,9 @@ import io
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any
@@ -101,14 +102,16 @@ def write_recording(
     *,
     tables: Tables | None = None,
     about: Mapping[str, str] | None = None,
+    traces: Mapping[str, Sequence[tuple[float, str]]] | None = None,
 ) -> None:
-    """Write a run as MCAP, in virtual time from zero.
+    """Write a run as MCAP, in its time from zero.
 
     Args:
         playback: The run, simulated with `keep_traffic`.
         path: Where; what was there is replaced once all is written.
         tables: What was measured, rows by table; goes with it as JSON.
         about: More to say of the run, such as its place in a study.
+        traces: What was decided: lines with their time [s], by who decides.
 
     Raises:
         DvaSimError: the file cannot be written.
@@ -117,7 +120,7 @@ def write_recording(
     if playback.recorder.traffic is None:
         raise ValueError("a recording needs a run made with keep_traffic")
     with whole_file(path) as file:
-        _write(playback, file, tables, dict(about or {}))
+        _write(playback, file, tables, dict(about or {}), traces or {})
 
 
 @contextmanager
@@ -158,7 +161,9 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.shown(playback)
 
 
-def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: Any) -> None:
+def _write(
+    playback: Playback, file: IO[bytes], tables: Tables | None, about: Any, traces: Any
+) -> None:
     from mcap.writer import Writer
 
     writer: Any = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
@@ -172,22 +177,23 @@ def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: An
     writer.add_metadata(ABOUT, _about(playback) | about | {DIGEST: digest(attached)})
     for name, data in attached.items():
         writer.add_attachment(0, 0, name, _media_type(name), data)
-    _add_messages(writer, playback, files)
+    _add_messages(writer, playback, files, traces)
     writer.finish()
 
 
-def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -> None:
-    channels = _Channels(writer, playback)
+def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes], traces: Any) -> None:
+    ways = _Channels(writer, playback)
     plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
-    every = [_packed(message) for message in every_message(playback)]
+    said = chain(every_message(playback), channels.decided(traces))
+    every = [_packed(message) for message in said]
     if plan is not None:
         every.insert(
             0, _packed(ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()}))
         )
     every.sort(key=lambda entry: entry[0])
     for time, topic, schema, data in every:
-        channel = channels.of(topic, schema)
-        writer.add_message(channel, time, data, time, channels.count(channel))
+        channel = ways.of(topic, schema)
+        writer.add_message(channel, time, data, time, ways.count(channel))
 
 
 def _packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:

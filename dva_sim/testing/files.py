@@ -25,10 +25,12 @@ _SUFFIXES: Final = {
     ".json": "plan",
     ".yaml": "configuration",
     ".yml": "configuration",
+    ".mcap": "recording",
+    ".jsonl": "trace",
 }
 _UNKNOWN: Final = (
-    "cannot be recognised; should be a message (.xml), a plan (.geojson), or a study, scenario, "
-    "site, ROS map or agent profile (.yaml)"
+    "cannot be recognised; should be a message (.xml), a plan (.geojson), a recording (.mcap), "
+    "a trace of decisions (.jsonl), or a study, scenario, site, ROS map or agent profile (.yaml)"
 )
 
 
@@ -61,6 +63,8 @@ def check_file(path: Path) -> FileVerdict:
         return _check_plan(path)
     if kind == "configuration":
         return _check_yaml(path)
+    if kind in ("recording", "trace"):
+        return _check_evidence(kind, path)
     return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
 
 
@@ -103,6 +107,14 @@ def _check_plan(path: Path) -> FileVerdict:
     from dva_sim.testing.configs import check_plan
 
     return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
+
+
+def _check_evidence(kind: str, path: Path) -> FileVerdict:
+    from dva_sim.testing.evidence import check_recording, check_trace
+
+    _read(path, 1)
+    problems, doubts = (check_recording if kind == "recording" else check_trace)(path)
+    return FileVerdict(kind, problems, doubts)
 
 
 def _check_yaml(path: Path) -> FileVerdict:

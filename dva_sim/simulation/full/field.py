@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Truth
-from dva_sim.agents.people.bystander import BystanderAgent
+from dva_sim.agents.people.bystander import SAFE, BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.field_of_view import HazardSpot
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.kernel.recorder import DriveLog
+from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.hazards import Hearsay, RunHazard, draw_incidents
 from dva_sim.simulation.full.people import People
@@ -113,6 +113,21 @@ class Field:
     def dangers(self, now: float) -> list[Danger]:
         """Where people should not be."""
         return [(i.hazard.position, i.hazard.danger_radius(now)) for i in self._going_on(now)]
+
+    def whereabouts(self, now: float) -> Iterator[tuple[str, TrackPoint]]:
+        """Where everybody is who is on the site, by name."""
+        self.world.advance_to(now)
+        for robot in self.robots.values():
+            pose, mode = robot.body.pose(), robot.controller.mode.value
+            yield robot.device.label, TrackPoint(now, pose.x, pose.y, pose.heading, mode)
+        people: list[tuple[str, GuardAgent | BystanderAgent]] = [
+            *((guard.device.label, guard) for guard in self.guards),
+            *((bystander.name, bystander) for bystander in self.bystanders),
+        ]
+        for name, who in people:
+            x, y = who.walking.place
+            if who.activity != SAFE:
+                yield name, TrackPoint(now, x, y, who.heading, who.activity)
 
     # --- what happens ------------------------------------------------------------------
 
