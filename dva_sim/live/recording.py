@@ -212,6 +212,8 @@ class TraceFile:
             while data and self._file is not None:
                 data = data[self._file.write(data) :]
         except OSError as error:
+            if self._file is not None:
+                self._file.close()
             self._file = None
             self._complain(f"keeps no trace any longer: {error.strerror}")
 
@@ -273,11 +275,15 @@ class Keeper:
             except OSError as error:
                 self.problem = error.strerror or str(error)
 
-    def finish(self) -> str | None:
-        """Make the recording when all parts have ended; in one line why not, or not all of it."""
+    def close(self) -> None:
+        """Wait until all parts have ended; what they have said is in the file."""
         for thread in self._threads:
             thread.join()
         self._file.close()
+
+    def finish(self) -> str | None:
+        """Make the recording when all parts have ended; in one line why not, or not all of it."""
+        self.close()
         try:
             lasted = finish(self.path, self._target)
         except DvaSimError as error:
@@ -327,7 +333,8 @@ class _Told:
         self._events: dict[int, Event] = {}
         self._drives: dict[tuple[str, int], DriveLog] = {}
         try:
-            first, *lines = part.read_bytes().split(b"\n")
+            with part.open("rb") as file:
+                first, *lines = file.read(MOST_BYTES).split(b"\n")
             self.start = json.loads(first)
             if self.start["format"] > FORMAT:
                 raise ValueError("made by a later version")

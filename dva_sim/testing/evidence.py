@@ -69,7 +69,7 @@ def _of_robot(lines: Sequence[bytes], path: Path) -> Iterator[Problem]:
 
     # The first line is what the robot was; what has happened to it takes lines, too.
     numbers = (number for number, line in enumerate(lines, 1) if b'"message"' in line)
-    for line, (message, then, now) in zip(numbers, replay(path, lines), strict=False):
+    for (message, then, now), line in zip(replay(path, lines), numbers, strict=False):
         if then != now:
             name = type(message.body).__name__
             told, found = tuple(then[:3]), tuple(now[:3])
