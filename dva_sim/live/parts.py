@@ -174,6 +174,7 @@ class WorldPart:
         self._field.populate()
         self._field.schedule_incidents()
         self._commands: dict[str, Rate] = {}
+        self._scripted = options.operators == "scripted"
         for label, robot in ((r.device.label, r) for r in self._field.robots.values()):
             trace = _trace_of(label, stage, options)
             robot.trace = None if trace is None else DecisionLog(trace, robot.controller)
@@ -219,10 +220,14 @@ class WorldPart:
         }
 
     def settled(self) -> bool:
-        """See `LivePart`: everything that will be noticed was reported, and every robot is idle."""
+        """See `LivePart`: all that will be noticed was reported, or is no matter of a script; and
+        every robot is idle.
+        """
         detected = [i.detected for i in self._field.incidents if i.detected < math.inf]
         reported = self._stage.clock.now > max(detected, default=0.0) + 2.0
-        return reported and all(r.controller.owner is None for r in self._field.robots.values())
+        return (reported or self._scripted) and all(
+            r.controller.owner is None for r in self._field.robots.values()
+        )
 
     def has_company(self) -> bool:
         """See `LivePart`: the DVA has answered one of those who are out here."""

@@ -22,7 +22,7 @@ from dva_sim.recordings import read_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.dva_trace import replay_dva, traced
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import DVA, id_of
+from dva_sim.simulation.full.stage import id_of
 from dva_sim.testing.evidence import check_recording, check_trace
 
 ROBOT, PHONE = id_of("robot", 1), id_of("operator", 1)
@@ -168,7 +168,7 @@ def test_who_records_never_waits_and_counts_what_has_no_room() -> None:
 def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording, "BYTES_PER_SECOND", 1000)
     monkeypatch.setattr(recording.time, "monotonic", lambda: 5.0)
-    with open(os.devnull, "wb") as nowhere:
+    with Path(os.devnull).open("wb") as nowhere:
         recorder = LiveRecorder(Clock(), Outlet(nowhere.fileno()))
         for number in range(1, 101):
             recorder.message(PHONE, message(number), True)
