@@ -42,12 +42,13 @@ class NotReadError(DvaSimError):
 class FileVerdict:
     """What was found: the kind of a file, its problems, and what does not go together in it.
 
-    It is valid if it has no problems.
+    It is valid if it has no problems. A note says how much was looked at.
     """
 
     kind: str
     problems: list[Problem]
     doubts: Sequence[str] = ()
+    note: str = ""
 
 
 def check_file(path: Path) -> FileVerdict:
@@ -113,8 +114,7 @@ def _check_evidence(kind: str, path: Path) -> FileVerdict:
     from dva_sim.testing.evidence import check_recording, check_trace
 
     _read(path, 1)
-    problems, doubts = (check_recording if kind == "recording" else check_trace)(path)
-    return FileVerdict(kind, problems, doubts)
+    return FileVerdict(kind, *(check_recording if kind == "recording" else check_trace)(path))
 
 
 def _check_yaml(path: Path) -> FileVerdict:

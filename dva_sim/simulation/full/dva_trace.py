@@ -119,7 +119,10 @@ class TracedDva:
 
     def _about(self, send: Send, now: float, reply: m.Reply | None) -> dict[str, Any]:
         said = None if reply is None else encode(_as_message(reply)).decode()
-        return {"do": "answer", "to": self._numbers[send], "reply": said, "now": now}
+        number = self._numbers.get(send)
+        if number is None:  # so many were sent since that it was forgotten: no replay goes on
+            self._sink = _nowhere
+        return {"do": "answer", "to": number, "reply": said, "now": now}
 
     def _decided(self, told: dict[str, Any], decide: Callable[[], T]) -> T:
         self._bits = []
@@ -134,6 +137,10 @@ class TracedDva:
         drawn = {"bits": self._bits} if self._bits else {}
         self._sink(json.dumps(told | drawn | {"decided": _in_words(decision)}))
         return decision
+
+
+def _nowhere(_: str) -> None:
+    """Takes what is kept no longer."""
 
 
 def traced(desk: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
