@@ -109,7 +109,7 @@ def test_a_simulated_person_drives_to_the_fire_and_confirms_it(
     assert "The run ended (settled): event 1 (fire) is confirmed." in run.said
     assert programs.processes() == {}
     decided = list(replay(tmp_path / "traces" / "robot-1.trace.jsonl"))
-    assert len(decided) > 100
+    assert sum(isinstance(message.body, m.SetTeleOp) for message, _, _ in decided) > 10
     assert all(then == now for _, then, now in decided)
 
 
