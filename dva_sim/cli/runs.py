@@ -71,7 +71,9 @@ def episode(
 
 
 def replay(
-    file: Annotated[Path, Argument(metavar="FILE", help="A recording: .mcap.")],
+    file: Annotated[
+        Path, Argument(metavar="FILE", help="A recording: .mcap, or the .mcap.part of a live run.")
+    ],
     video: Video = None,
     still: Still = None,
     strip: Strip = None,
