@@ -119,7 +119,7 @@ def _check_one(name: str) -> ExitCode:
     for doubt in verdict.doubts:
         _say(f"{name}: warning: {doubt}")
     if not number:
-        _say(f"{name}: {verdict.kind}: valid")
+        _say(f"{name}: {verdict.kind}: valid" + (f"; {verdict.note}" if verdict.note else ""))
         return VALID
     more = f", the first {_SHOWN} shown" if number > _SHOWN else ""
     _say(f"{name}: {verdict.kind}: invalid, {number} problem{'s'[: number > 1]}{more}")

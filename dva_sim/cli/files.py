@@ -74,7 +74,8 @@ def check(
         list[str],
         Argument(
             metavar="FILE...",
-            help="Messages, studies, scenarios, sites, plans, maps, agents; - reads a message. "
+            help="Messages, studies, scenarios, sites, plans, maps, agents, recordings, traces; "
+            "- reads a message. "
             f"Or {_TRIED}, and names of such or mine.py:Mine. "
             "Or link: the emulated one.",
         ),
@@ -92,6 +93,7 @@ def check(
     Examples:
         dva-sim check message.xml my-study.yaml worlds/*.yaml  # files of any kind
         dva-sim check - < message.xml  # a message from a pipe
+        dva-sim check run.mcap  # is all of it valid, and would it be decided so again?
         dva-sim check policy agents/policies/patrol.py:Patrol  # does it keep its promises?
         dva-sim check link  # does the emulated link do what it is told?
     """

@@ -20,17 +20,18 @@ from rich.text import Text
 
 from dva_sim.cli.verbosity import detail, is_verbose
 from dva_sim.core.registry import DETECTOR
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.live import process
 from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.keys import create_keys
 from dva_sim.network.sockets import DEFAULT_PORT
-from dva_sim.simulation.full.stage import DVA, id_of, label_of
-from dva_sim.simulation.scenario import Scenario, build, contradictions, load
+from dva_sim.simulation.full.stage import DVA, id_of, label_of, team_of
+from dva_sim.simulation.scenario import build, contradictions, load
 
 STORY_LINES = 12
+ALWAYS_TOLD = "refused", "not sent", "form", "not recorded"  # in the names of counters
 HELD = 2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
 DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
 WIDTH = 120  # where there is no terminal to ask [characters]
@@ -127,7 +128,7 @@ def run_all(options: LiveOptions) -> None:
     if not console.is_terminal:
         with closing(InOrder(console, board)) as told:
             summary = Supervisor(options, lambda _, report: told.hear(report)).run()
-        _conclude(console, board, summary)
+        _conclude(console, board, summary, options)
         return
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
@@ -138,7 +139,7 @@ def run_all(options: LiveOptions) -> None:
         summary = Supervisor(options, hear).run()
     for line in board.story:
         _print(console, story_line(line))
-    _conclude(console, board, summary)
+    _conclude(console, board, summary, options)
 
 
 def warn(console: Console, options: LiveOptions) -> None:
@@ -201,17 +202,21 @@ class InOrder:
         self._waiting = []
 
 
-def _conclude(console: Console, board: Board, summary: Summary) -> None:
+def _conclude(console: Console, board: Board, summary: Summary, options: LiveOptions) -> None:
     console.print(board.table())
     _print(console, f"The run ended ({summary.why}): {board.state_of_events()}.")
     counters: dict[str, int] = {}
     for part, report in summary.latest.items():
         detail(f"  {part}: at most {1000 * report.lateness:.1f} ms late")
         for name, count in report.counters.items():
-            if is_verbose() or "refused" in name or "not sent" in name or "form" in name:
+            if is_verbose() or any(word in name for word in ALWAYS_TOLD):
                 counters[name] = counters.get(name, 0) + count
     for name, count in sorted(counters.items()):
         _print(console, f"  {name}: {count}")
+    if summary.lost is not None:
+        raise DvaSimError(summary.lost)
+    if options.records_run:
+        _print(console, f"{options.record} written")
 
 
 _ID = re.compile(r"[0-9A-F]{2}(:[0-9A-F]{2}){5}")
@@ -250,17 +255,4 @@ def _ids(name: str) -> Iterator[str]:
             scenario = build(load(name))
         except ConfigError as error:
             raise ConfigError(f"{name!r} is no device (dva, robot-1) and no scenario") from error
-        yield from _team(scenario)
-
-
-def _team(scenario: Scenario) -> Iterator[str]:
-    """All devices of a scenario; each report may have a detector or a caller."""
-    counts = {
-        "robot": scenario.robot.count,
-        "guard": scenario.guard.count,
-        "operator": scenario.operator.count,
-        "detector": sum(event.reports for event in scenario.events),
-    }
-    yield DVA
-    for kind, count in counts.items():
-        yield from (id_of(kind, number) for number in range(1, count + 1))
+        yield from team_of(scenario)

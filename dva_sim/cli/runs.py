@@ -72,7 +72,9 @@ def episode(
 
 
 def replay(
-    file: Annotated[Path, Argument(metavar="FILE", help="A recording: .mcap.")],
+    file: Annotated[
+        Path, Argument(metavar="FILE", help="A recording: .mcap, or the .mcap.part of a live run.")
+    ],
     video: Video = None,
     still: Still = None,
     strip: Strip = None,
@@ -118,7 +120,10 @@ def live(
         ),
     ] = 0,
     keys: Annotated[Path | None, folder("Folder of keys: CURVE is on.")] = None,
-    record: Annotated[Path | None, folder("Folder for the robots' traces.")] = None,
+    record: Annotated[
+        Path | None,
+        Option(metavar="FILE|FOLDER", help="A recording (.mcap); or a folder of traces."),
+    ] = None,
     state: Annotated[Path | None, file("File that lets a killed DVA go on where it was.")] = None,
     seconds: Annotated[
         float | None,
@@ -141,6 +146,7 @@ def live(
     Examples:
         dva-sim live drive-to-event  # a simulated person drives
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
+        dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
     from dva_sim.cli import live_screen

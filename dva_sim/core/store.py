@@ -100,6 +100,10 @@ class Store:
         """Put the file away."""
         self._file.close()
 
+    def copy(self) -> bytes:
+        """The file as it is now."""
+        return self._file.serialize()
+
     # --- to the file -------------------------------------------------------------------
 
     def keep(self, dva: Dva, changed: Iterable[Event], now: float) -> str | None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, LiveOptions
-from dva_sim.live.process import Teller, run_part
+from dva_sim.live.process import run_part
+from dva_sim.live.recording import Outlet
 
 
 def main(argument: str) -> int:
@@ -18,14 +19,16 @@ def main(argument: str) -> int:
     options["changes"] = tuple(options["changes"])
     for key in PATHS:
         options[key] = None if options[key] is None else Path(options[key])
+    reports = Outlet(sys.stdout.fileno())  # a supervisor that does not read must not stop robots
     try:
         run_part(
             told["part"],
             LiveOptions(**options),
-            Teller(sys.stdout).say,
+            lambda report: reports.put(json.dumps(vars(report)).encode()),
             told["number"],
             told["epoch"],
             supervised=True,
+            outlet=told["outlet"],
         )
     except DvaSimError as error:
         print(error_line(error), file=sys.stderr)

@@ -31,7 +31,7 @@ class LiveOptions:
         dva: Address of the DVA, `HOST:PORT`.
         port: First port of the devices of this run, or part; each takes two. 0 for free ones.
         keys: Folder with the keys of the devices; None to run without.
-        record: Folder for a trace of each robot's decisions.
+        record: A recording to make, `.mcap`; or a folder for traces of all decisions.
         state: File in which the DVA keeps what must survive it; None: it keeps nothing.
         duration: How long the run lasts [s]; None: to the scenario's horizon.
     """
@@ -47,6 +47,11 @@ class LiveOptions:
     record: Path | None = None
     state: Path | None = None
     duration: float | None = None
+
+    @property
+    def records_run(self) -> bool:
+        """Whether a recording is wanted, and not traces alone."""
+        return self.record is not None and self.record.suffix == ".mcap"
 
     def read(self) -> Scenario:
         """The scenario, with its changes.
@@ -78,7 +83,8 @@ class LiveOptions:
         """The scenario as `read` gives it, with everything placed once.
 
         Raises:
-            ConfigError: see `read`; or the site has no place for the team.
+            ConfigError: see `read`; or the site has no place for the team, or what is recorded
+                cannot be put where it is wanted.
         """
         from dva_sim.simulation.full import rehearse
 
@@ -92,6 +98,13 @@ class LiveOptions:
         except ConfigError as error:
             found = blame(error, parse_changes(self.changes), make, document)
             raise set_by(self.changes, found) from None
+        if self.record is not None:
+            folder = self.record.parent if self.records_run else self.record
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                problem = f"cannot be written: {error.strerror}"
+                raise ConfigError(problem, error.filename) from error
         return scenario
 
     def _built(self) -> Scenario:

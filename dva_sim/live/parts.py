@@ -9,8 +9,8 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from itertools import islice
-from pathlib import Path
 from typing import Any, Protocol
 
 from dva_sim.agents.operator.operator import OperatorAgent
@@ -24,9 +24,12 @@ from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.options import PARTS, LiveOptions
+from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.dva_trace import traced
 from dva_sim.simulation.full.physical_world import Field
+from dva_sim.simulation.full.run import FILM_PERIOD
 from dva_sim.simulation.full.stage import Stage
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
@@ -50,8 +53,22 @@ class LivePart(Protocol):
     def has_company(self) -> bool:
         """Whether anybody has ever answered, or come, whom this part is nothing without."""
 
+    def keep(self, recorder: LiveRecorder) -> None:
+        """Say for the recording what is new, once a second."""
+
     def finish(self) -> None:
         """Leave everything in a safe state; a moment is left for last words."""
+
+
+def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str], object] | None:
+    """What takes the lines of what a robot, or the DVA, decides, if that is wanted."""
+    recorder = stage.recorder
+    if isinstance(recorder, LiveRecorder):
+        return TraceLines(recorder, label)
+    if options.record is None:
+        return None
+    path = options.record / f"{label}.trace.jsonl"
+    return TraceFile(path, lambda told: recorder.tell(stage.clock.now, label, told, "link"))
 
 
 class Rate:
@@ -84,12 +101,22 @@ class DvaPart:
             memory = Store(options.state, epoch=time.time() - stage.clock.now)
         self._agent = add_dva(stage, permissions, memory, keep_events=False)
         self._agent.desk.registry.most = _devices_that_fit()
+        trace = _trace_of("dva", stage, options)
+        if trace is not None:
+            self._agent.desk = traced(self._agent.desk, trace, stage, memory)
         self._agent.start()
         self._stage = stage
         book = self._agent.desk.book
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
         self._settled_before = 0 if book.open else book.total
         self._beats: dict[str, Rate] = {}
+
+    def keep(self, recorder: LiveRecorder) -> None:
+        """See `LivePart`: how the events stand."""
+        for e in self._events():
+            at = [e.position.latitude, e.position.longitude]
+            told = e.number, e.kind, at, e.state.value, dict(e.times)
+            recorder.put_new("event", *told, key=f"event {e.number}")
 
     def rows(self) -> list[Row]:
         """See `LivePart`: what the first so many told the DVA, who is there before who is not."""
@@ -150,20 +177,26 @@ class WorldPart:
         self._field.populate()
         self._field.schedule_incidents()
         self._commands: dict[str, Rate] = {}
-        self._traces: list[DecisionLog] = []
-        if options.record is not None:
-            self._record(options.record)
+        self._scripted = options.operators == "scripted"
+        for label, robot in ((r.device.label, r) for r in self._field.robots.values()):
+            trace = _trace_of(label, stage, options)
+            robot.trace = None if trace is None else DecisionLog(trace, robot.controller)
+        if isinstance(stage.recorder, LiveRecorder):
+            stage.clock.every(FILM_PERIOD, partial(self._sample, stage.recorder))
 
-    def _record(self, folder: Path) -> None:
-        """Give each robot a trace."""
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            for robot in self._field.robots.values():
-                path = folder / f"{robot.device.label}.trace.jsonl"
-                robot.trace = DecisionLog(path, robot.controller)
-                self._traces.append(robot.trace)
-        except OSError as error:
-            raise ConfigError(f"cannot be written: {error.strerror}", error.filename) from error
+    def _sample(self, recorder: LiveRecorder) -> None:
+        """Say for the recording where everybody is."""
+        now = self._stage.clock.now
+        places = [(name, *point[1:]) for name, point in self._field.whereabouts(now)]
+        recorder.put("at", now, places)
+
+    def keep(self, recorder: LiveRecorder) -> None:
+        """See `LivePart`: who there is, and which hazards are dealt with."""
+        robots = self._field.robots.items()
+        radii = {name: robot.body.spec.radius for name, robot in robots}
+        recorder.put_new("team", dict(self._stage.labels), radii, key="team")
+        for number, when in self._field.contained.items():
+            recorder.put_new("contains", number, when, key=f"contained {number}")
 
     def rows(self) -> list[Row]:
         """See `LivePart`: how robots and guards are."""
@@ -190,10 +223,14 @@ class WorldPart:
         }
 
     def settled(self) -> bool:
-        """See `LivePart`: everything that will be noticed was reported, and every robot is idle."""
+        """See `LivePart`: all that will be noticed was reported, or is no matter of a script; and
+        every robot is idle.
+        """
         detected = [i.detected for i in self._field.incidents if i.detected < math.inf]
         reported = self._stage.clock.now > max(detected, default=0.0) + 2.0
-        return reported and all(r.controller.owner is None for r in self._field.robots.values())
+        return (reported or self._scripted) and all(
+            r.controller.owner is None for r in self._field.robots.values()
+        )
 
     def has_company(self) -> bool:
         """See `LivePart`: the DVA has answered one of those who are out here."""
@@ -202,9 +239,7 @@ class WorldPart:
         return any(device.round_trips for device in devices)
 
     def finish(self) -> None:
-        """See `LivePart`."""
-        for trace in self._traces:
-            trace.close()
+        """See `LivePart`: robots stop by themselves."""
 
 
 class OperatorPart:
@@ -229,6 +264,10 @@ class OperatorPart:
         trips = agent.device.round_trips
         row["round_trip_s"] = statistics.median(trips) if trips else None
         return [row]
+
+    def keep(self, recorder: LiveRecorder) -> None:
+        """See `LivePart`: how the drives stand."""
+        recorder.catch_up()
 
     def _commands_sent(self) -> int:
         return sum(drive.sent for drive in self._stage.recorder.drives)

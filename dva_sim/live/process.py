@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import gc
-import json
-import os
 import signal
 import socket
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, TextIO
+from typing import Any
 
-from dva_sim.kernel.errors import RunsFailed
+from dva_sim.kernel.errors import DvaSimError, RunsFailed
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.options import LiveOptions
 from dva_sim.live.parts import DvaPart, LivePart, make_part
+from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork, split_address
-from dva_sim.simulation.full.stage import DVA, Stage, id_of
+from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]
@@ -68,6 +66,7 @@ def run_part(
     number: int = 1,
     epoch: float | None = None,
     supervised: bool = False,
+    outlet: int | None = None,
 ) -> None:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
 
@@ -80,20 +79,54 @@ def run_part(
         number: Which operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
         supervised: End when standard input does: whoever started this process is gone.
+        outlet: Number of the open file that takes what is recorded. None, and a recording is
+            wanted: this part makes it alone.
 
     Raises:
         ConfigError: scenario, keys or part are not as they should be.
+        DvaSimError: what was to be recorded is not, or not all of it.
         NetworkError: a port is taken.
         NobodyThere: this part stayed alone.
     """
+    keeper = None
+    if options.records_run and outlet is None:
+        assert options.record is not None
+        keeper = Keeper(options.record, options.read(), options.seed)
+        outlet = keeper.inlet()
+    out = None if outlet is None else Outlet(outlet)
+    try:
+        _run_part(name, options, say, number, epoch, supervised, out)
+    finally:
+        if out is not None:
+            out.close()
+        lost = None if keeper is None else keeper.finish()
+    if lost is not None:
+        raise DvaSimError(lost)
+
+
+def _run_part(
+    name: str,
+    options: LiveOptions,
+    say: Callable[[Report], object],
+    number: int,
+    epoch: float | None,
+    supervised: bool,
+    out: Outlet | None,
+) -> None:
     scenario = options.read()
     ring = None if options.keys is None else KeyRing(options.keys)
     clock, recorder = LiveClock(epoch), Recorder()
+    if out is not None:
+        recorder = LiveRecorder(clock, out)
 
     def tell(line: str) -> None:
         recorder.tell(clock.now, name, line, "link")
 
     network = SocketNetwork(clock, ring, tell, scenario.zeromq)
+    if isinstance(recorder, LiveRecorder):
+        team = frozenset(team_of(scenario))
+        recorder.is_own = team.__contains__ if supervised else network.is_here
+        network.watcher = recorder.message
     try:
         joining = _joining(network, options, name)
         stage = Stage(scenario, options.seed, network, recorder, joining, _time_of_day(clock))
@@ -167,6 +200,8 @@ class _Reporter:
     def report(self) -> Report:
         """What there is to say now."""
         recorder, part = self._stage.recorder, self._part
+        if isinstance(recorder, LiveRecorder):
+            part.keep(recorder)
         story, recorder.timeline = recorder.timeline, []
         clock = self._network.clock
         return Report(
@@ -220,28 +255,3 @@ class _ending:  # noqa: N801 - reads as a statement
             signal.signal(number, handler)
         self._reader.close()
         self._writer.close()
-
-
-class Teller:
-    """Writes reports as lines of JSON for a program to read, and never waits for it.
-
-    A reader that does not read must not stop the robots: what it has no room for is dropped,
-    but for the rest of a line that has begun.
-    """
-
-    def __init__(self, stream: TextIO) -> None:
-        self._file, self._rest = stream.fileno(), b""
-        os.set_blocking(self._file, False)
-
-    def say(self, report: Report) -> None:
-        """Write a report, if there is room."""
-        if not self._flush():
-            return
-        self._rest = json.dumps(vars(report)).encode() + b"\n"
-        self._flush()
-
-    def _flush(self) -> bool:
-        with suppress(BlockingIOError, BrokenPipeError):
-            while self._rest:
-                self._rest = self._rest[os.write(self._file, self._rest) :]
-        return not self._rest

@@ -17,6 +17,7 @@ from typing import IO
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import Report
+from dva_sim.live.recording import Keeper
 from dva_sim.simulation.scenario import Scenario
 
 SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
@@ -48,10 +49,12 @@ class Summary:
     Attributes:
         why: `settled`, `the script is done`, `time is up` or `interrupted`.
         latest: The last report of each part, by its name.
+        lost: What was to be recorded and is not, in one line; None: nothing.
     """
 
     why: str
     latest: dict[str, Report] = field(default_factory=dict)
+    lost: str | None = None
 
 
 class Supervisor:
@@ -69,6 +72,7 @@ class Supervisor:
         self._epoch = time.monotonic()
         self._interrupted = False
         self._settled_since: float | None = None
+        self._keeper: Keeper | None = None
 
     def run(self) -> Summary:
         """Start everything, wait for the end, end everything.
@@ -77,7 +81,22 @@ class Supervisor:
             PartFailed: a part could not start, or ended by itself.
             ConfigError: the scenario cannot be run live.
         """
-        scenario = self._options.check()
+        scenario, options = self._options.check(), self._options
+        if options.records_run and options.record is not None:
+            self._keeper = Keeper(options.record, scenario, options.seed)
+        try:
+            why = self._run(scenario)
+        except DvaSimError as error:
+            lost = self._finish()
+            raise error if lost is None else type(error)(f"{error}; {lost}") from None
+        latest = {c.name: c.latest for c in self._children if c.latest}
+        return Summary(why, latest, self._finish())
+
+    def _finish(self) -> str | None:
+        """Make the recording, if one is wanted; in one line why not."""
+        return None if self._keeper is None else self._keeper.finish()
+
+    def _run(self, scenario: Scenario) -> str:
         limit = scenario.horizon_s if self._options.duration is None else self._options.duration
         before = {
             number: signal.signal(number, self._interrupt)
@@ -91,25 +110,29 @@ class Supervisor:
                 self._start("world", "world", address, port=next(ports))
                 for number in range(1, scenario.operator.count + 1):
                     self._start(f"operator-{number}", "operator", address, number, next(ports))
-            why = self._watch(limit)
+            return self._watch(limit)
         finally:
             self._end_all()
             for number, handler in before.items():
                 signal.signal(number, handler)
-        return Summary(why, {c.name: c.latest for c in self._children if c.latest})
 
     def _interrupt(self, *_: object) -> None:
         self._interrupted = True
 
     def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:
         """Start a part; it ends when its standard input does, whatever happens to us."""
+        outlet = None if self._keeper is None else self._keeper.inlet()
+        told = self._arguments(part, dva, number, port, outlet)
         process = subprocess.Popen(
-            [sys.executable, "-m", "dva_sim.live", *self._arguments(part, dva, number, port)],
+            [sys.executable, "-m", "dva_sim.live", told],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C reaches us alone; we end the parts in good order
+            pass_fds=() if outlet is None else (outlet,),
         )
+        if outlet is not None:
+            os.close(outlet)
         child = _Child(name, process)
         self._children.append(child)
         for stream, take in ((process.stdout, self._take_line), (process.stderr, self._take_error)):
@@ -117,11 +140,14 @@ class Supervisor:
             os.set_blocking(stream.fileno(), False)
             self._selector.register(stream, selectors.EVENT_READ, (child, take))
 
-    def _arguments(self, part: str, dva: str | None, number: int, port: int) -> Iterator[str]:
+    def _arguments(
+        self, part: str, dva: str | None, number: int, port: int, outlet: int | None
+    ) -> str:
         told = {**vars(self._options), "dva": dva, "port": port}
         for key in PATHS:
             told[key] = None if told[key] is None else str(told[key])
-        yield json.dumps({"part": part, "number": number, "epoch": self._epoch, "options": told})
+        about = {"part": part, "number": number, "epoch": self._epoch, "outlet": outlet}
+        return json.dumps(about | {"options": told})
 
     def _address_of_dva(self) -> str | None:
         """Where the DVA listens, once it does; None if the user ends the run before that."""

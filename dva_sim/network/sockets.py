@@ -82,7 +82,7 @@ class SocketWire:
     kind: int
 
     def __init__(self, network: SocketNetwork, node: str, peer: str, on_reply: OnReply) -> None:
-        self._network, self._peer, self._on_reply = network, peer, on_reply
+        self._network, self._node, self._peer, self._on_reply = network, node, peer, on_reply
         self._socket = network.client(self.kind, node, peer)
         self._configure()
         network.clock.watch(self._socket, self._replies)
@@ -122,6 +122,7 @@ class ReqWire(SocketWire):
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`; the last one sent must have been answered."""
         self._tag = tag
+        self._network.note(self._node, data)
         self._network.send(self._socket, [data])
 
     def _replies(self) -> None:
@@ -142,6 +143,7 @@ class DealerWire(SocketWire):
 
     def send(self, tag: int, data: bytes) -> None:
         """See `Wire`."""
+        self._network.note(self._node, data)
         self._network.send(self._socket, [tag.to_bytes(8, "big"), b"", data])
 
     def _reply(self, frames: list[bytes]) -> None:
@@ -160,7 +162,8 @@ class SocketSubscription:
         topic: str,
         handler: Callable[[Any], object],
     ) -> None:
-        self._network, self._peer, self._handler = network, publisher, handler
+        self._network, self._node, self._peer = network, node, publisher
+        self._handler = handler
         self._socket = network.client(zmq.SUB, node, publisher)
         self._socket.subscribe(topic)
         self._paused = self._over = False
@@ -188,6 +191,7 @@ class SocketSubscription:
             if frames is None:
                 return
             if len(frames) == 2:
+                self._network.note(self._node, frames[1], sent=False)
                 self._handler(frames[1])
             else:
                 self._network.counters["publications of another form"] += 1
@@ -229,6 +233,7 @@ class SocketNetwork:
 
     Attributes:
         counters: What was refused or could not be sent, by reason.
+        watcher: Told of each message: a node here, the content, whether that node sends it.
     """
 
     def __init__(
@@ -248,6 +253,7 @@ class SocketNetwork:
         self._security = Security(self._context, self._aside, ring, self._refused)
         clock.every(LOOK_ASIDE, self._look_aside)
         self.counters: Counter[str] = Counter()
+        self.watcher: Callable[[str, Any, bool], object] | None = None
         self._addresses: dict[str, str] = {}
         self._services: dict[str, Service] = {}
         self._routers: dict[str, Socket] = {}
@@ -269,6 +275,10 @@ class SocketNetwork:
         """See `Transport`; whoever still has a connection to it closes that first."""
         self._addresses.pop(node, None)
         self._security.forget(node)
+
+    def is_here(self, node: str) -> bool:
+        """Whether a node is one of this process."""
+        return node in self._routers
 
     def address(self, node: str) -> str | None:
         """Where a node is found, if anybody said."""
@@ -380,8 +390,19 @@ class SocketNetwork:
         route, body = frames[:start], frames[start:]
         # Anything but one frame is no message; its empty text is refused as such, and answered.
         data = body[0] if len(body) == 1 else b""
+        self.note(node, data, sent=False)
+
+        def answer(reply: bytes) -> None:
+            self.note(node, reply)
+            self.send(router, [*route, reply])
+
         # The first frame is what the socket itself calls the connection: nobody can take another's.
-        service(Request(data, lambda reply: self.send(router, [*route, reply]), sender, route[0]))
+        service(Request(data, answer, sender, route[0]))
+
+    def note(self, node: str, payload: Any, sent: bool = True) -> None:
+        """Somebody may want to know what is said here."""
+        if self.watcher is not None:
+            self.watcher(node, payload, sent)
 
     def send(self, socket: Socket, frames: list[bytes]) -> None:
         """Send without waiting; what does not fit is dropped and counted."""
@@ -400,6 +421,7 @@ class SocketNetwork:
         """See `Transport`; what is not bytes packs itself into bytes."""
         publisher = self._publishers.get(node)
         if publisher is not None:
+            self.note(node, payload)
             data = payload if isinstance(payload, bytes) else payload.pack(size)
             self.send(publisher.socket, [topic.encode(), data])
 

@@ -310,7 +310,7 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
     }
 
 
-STORY, MESSAGES = "/story", "/messages"
+STORY, MESSAGES, DECISIONS = "/story", "/messages", "/decisions/"
 SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
@@ -340,6 +340,14 @@ def said(playback: Playback) -> Iterator[ChannelMessage]:
         else:
             topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
             yield ChannelMessage(sent.time, topic, XML, sent.payload)
+
+
+def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[ChannelMessage]:
+    """The traces of those who decide, line by line, by name."""
+    for name, lines in traces.items():
+        for time, line in lines:
+            content = {"timestamp": messages.stamp(time), "line": line}
+            yield ChannelMessage(time, f"{DECISIONS}{name}", "dva_sim.Decision", content)
 
 
 def names_of(labels: Mapping[str, str]) -> dict[str, str]:

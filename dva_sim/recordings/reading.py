@@ -143,12 +143,14 @@ class Opened:
         tables: What was measured, rows by table, with nan for what is missing; None if the
             file does not say.
         lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
+        traces: The lines of what was decided, by who decides.
     """
 
     playback: Playback
     about: dict[str, str]
     tables: dict[str, list[dict[str, Any]]] | None
     lasted: float
+    traces: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def is_whole(self) -> bool:
@@ -288,7 +290,12 @@ def _opened(raw: _Raw) -> Opened:
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
-    return Opened(playback, raw.about or {}, tables, run["duration_s"])
+    traces = {
+        topic.removeprefix(channels.DECISIONS): [entry["line"] for _, entry in said]
+        for topic, said in raw.said.items()
+        if topic.startswith(channels.DECISIONS)
+    }
+    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces)
 
 
 def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:

@@ -11,9 +11,10 @@ import json
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, Any
@@ -104,14 +105,16 @@ def write_recording(
     *,
     tables: Tables | None = None,
     about: Mapping[str, str] | None = None,
+    traces: Mapping[str, Sequence[tuple[float, str]]] | None = None,
 ) -> None:
-    """Write a run as MCAP, in virtual time from zero.
+    """Write a run as MCAP, in its time from zero.
 
     Args:
         playback: The run, simulated with `keep_traffic`.
         path: Where; what was there is replaced once all is written.
         tables: What was measured, rows by table; goes with it as JSON.
         about: More to say of the run, such as its place in a study.
+        traces: What was decided: lines with their time [s], by who decides.
 
     Raises:
         DvaSimError: the file cannot be written.
@@ -120,7 +123,7 @@ def write_recording(
     if playback.recorder.traffic is None:
         raise ValueError("a recording needs a run made with keep_traffic")
     with whole_file(path) as file:
-        _write(playback, file, tables, dict(about or {}))
+        _write(playback, file, tables, dict(about or {}), traces or {})
 
 
 @contextmanager
@@ -161,7 +164,9 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.shown(playback)
 
 
-def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: Any) -> None:
+def _write(
+    playback: Playback, file: IO[bytes], tables: Tables | None, about: Any, traces: Any
+) -> None:
     from mcap.writer import Writer
 
     writer: Any = Writer(file, chunk_size=CHUNK, enable_data_crcs=True)
@@ -175,11 +180,11 @@ def _write(playback: Playback, file: IO[bytes], tables: Tables | None, about: An
     writer.add_metadata(ABOUT, _about(playback) | about | {DIGEST: digest(attached)})
     for name, data in attached.items():
         writer.add_attachment(0, 0, name, _media_type(name), data)
-    _add_messages(writer, playback, files)
+    _add_messages(writer, playback, files, traces)
     writer.finish()
 
 
-def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -> None:
+def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes], traces: Any) -> None:
     """All messages in order of time; schemas and channels are opened when first used."""
     ids = {name: device for device, name in channels.names_of(playback.labels).items()}
     counts: Counter[int] = Counter()
@@ -200,7 +205,8 @@ def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes]) -
         ends = {"source": source, "destination": destination}
         return int(writer.register_channel(topic, XML, number, ends))
 
-    every = [_packed(message) for message in every_message(playback)]
+    said = chain(every_message(playback), channels.decided(traces))
+    every = [_packed(message) for message in said]
     plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
     if plan is not None:
         told = ChannelMessage(0.0, "/plan", "foxglove.GeoJSON", {"geojson": plan.decode()})

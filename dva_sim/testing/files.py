@@ -26,10 +26,12 @@ _SUFFIXES: Final = {
     ".json": "plan",
     ".yaml": "configuration",
     ".yml": "configuration",
+    ".mcap": "recording",
+    ".jsonl": "trace",
 }
 _UNKNOWN: Final = (
-    "cannot be recognised; should be a message (.xml), a plan (.geojson), or a study, scenario, "
-    "site, ROS map or agent profile (.yaml)"
+    "cannot be recognised; should be a message (.xml), a plan (.geojson), a recording (.mcap), "
+    "a trace of decisions (.jsonl), or a study, scenario, site, ROS map or agent profile (.yaml)"
 )
 
 
@@ -41,12 +43,13 @@ class NotReadError(DvaSimError):
 class FileVerdict:
     """What was found: the kind of a file, its problems, and what does not go together in it.
 
-    It is valid if it has no problems.
+    It is valid if it has no problems. A note says how much was looked at.
     """
 
     kind: str
     problems: list[Problem]
     doubts: Sequence[str] = ()
+    note: str = ""
 
 
 def check_file(path: Path) -> FileVerdict:
@@ -62,6 +65,8 @@ def check_file(path: Path) -> FileVerdict:
         return _check_plan(path)
     if kind == "configuration":
         return _check_yaml(path)
+    if kind in ("recording", "trace"):
+        return _check_evidence(kind, path)
     return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
 
 
@@ -104,6 +109,13 @@ def _check_plan(path: Path) -> FileVerdict:
     from dva_sim.testing.file_kinds import check_plan
 
     return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
+
+
+def _check_evidence(kind: str, path: Path) -> FileVerdict:
+    from dva_sim.testing.evidence import check_recording, check_trace
+
+    _read(path, 1)
+    return FileVerdict(kind, *(check_recording if kind == "recording" else check_trace)(path))
 
 
 def _check_yaml(path: Path) -> FileVerdict:

@@ -25,6 +25,10 @@ from dva_sim.live import supervisor
         (["--dva", "127.0.0.1:65535"], "should be HOST:PORT"),
         (["--for", "-1"], "--for '-1' should be a number above 0"),
         (["--for", "nan"], "--for 'nan' should be a number above 0"),
+        (["--set", "robot.count=9"], "--set robot.count=9: site 'caparica' has 3 robot bases"),
+        (["--record", "/dev/null"], "/dev/null: cannot be written: File exists"),
+        (["--record", "/proc/no/run.mcap"], "cannot be written: No such file or directory"),
+        (["--record", "/proc/run.mcap"], "/proc/run.mcap.part: cannot be written"),
     ],
 )
 def test_a_mistake_ends_in_one_line_before_anything_is_started(

@@ -381,7 +381,7 @@ EXPECTED = {
     # In real time, over sockets
     "dva-sim live drive-to-event": NOT_HERE,
     "dva-sim live drive-to-event --operators scripted": Expected(four_things_done, dear=True),
-    "dva-sim live drive-to-event --set pattern=req-rep --record traces": NOT_HERE,
+    "dva-sim live drive-to-event --set pattern=req-rep --record run.mcap": NOT_HERE,
     "dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600": NOT_HERE,
     "dva-sim live drive-to-event --only world --dva 192.168.1.10:5600 --host 192.168.1.20": (
         NOT_HERE

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from dva_sim.agents.robot.controller import Decision, Limits, RobotController, TimedSetPoint
 from dva_sim.kernel.errors import ConfigError
@@ -18,15 +18,20 @@ LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
 
 
 class DecisionLog:
-    """Writes what one controller decides; each line is on disk before the next decision.
+    """Writes what one controller decides; each line is in its file before the next decision.
 
     Args:
-        path: The file; its folder must be there.
+        to: The file, whose folder must be there; or what takes each line.
         controller: Whose decisions these will be.
     """
 
-    def __init__(self, path: Path, controller: RobotController) -> None:
-        self._file = path.open("w", encoding="utf-8", buffering=1)
+    def __init__(self, to: Path | Callable[[str], object], controller: RobotController) -> None:
+        self._file: TextIO | None = None
+        self._take: Callable[[str], object] = self._put
+        if isinstance(to, Path):
+            self._file = to.open("w", encoding="utf-8", buffering=1)
+        else:
+            self._take = to
         start = {
             "robot": controller.id_tag,
             "dva": controller.dva,
@@ -50,10 +55,15 @@ class DecisionLog:
 
     def close(self) -> None:
         """Nothing more will be decided."""
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
+
+    def _put(self, line: str) -> None:
+        assert self._file is not None
+        self._file.write(line + "\n")
 
     def _write(self, data: dict[str, Any]) -> None:
-        self._file.write(json.dumps(data) + "\n")
+        self._take(json.dumps(data))
 
 
 def _as_data(decision: Decision) -> dict[str, Any]:
@@ -65,8 +75,14 @@ def _as_data(decision: Decision) -> dict[str, Any]:
     }
 
 
-def replay(path: Path) -> Iterator[tuple[m.Message, Decision, Decision]]:
+def replay(
+    path: Path, lines: Sequence[str | bytes] | None = None
+) -> Iterator[tuple[m.Message, Decision, Decision]]:
     """Ask a fresh controller the same again.
+
+    Args:
+        path: The file.
+        lines: What it holds, if that is known.
 
     Yields:
         Each message, what was decided then, and what is decided now (reply contents left out).
@@ -75,7 +91,7 @@ def replay(path: Path) -> Iterator[tuple[m.Message, Decision, Decision]]:
         ConfigError: the file cannot be read or is no trace, or its last line is not whole.
     """
     try:
-        lines = path.read_bytes().splitlines()
+        lines = path.read_bytes().splitlines() if lines is None else lines
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", path) from error
     controller: RobotController | None = None

@@ -61,11 +61,21 @@ def add_dva(
     Raises:
         ConfigError: a policy that cannot be loaded.
     """
-    dispatch, draw = stage.scenario.dispatch, stage.streams["dva/sessions"]
+    draw = stage.streams["dva/sessions"]
     permissions = permissions or Permissions(lambda: int(draw.integers(2**LOW_BITS)))
+    return DvaAgent(stage.device("dva", 1), make_desk(stage, permissions), memory, keep_events)
+
+
+def make_desk(stage: Stage, permissions: Permissions) -> Dva:
+    """What decides for the DVA, as a scenario wants it.
+
+    Raises:
+        ConfigError: a policy that cannot be loaded.
+    """
+    dispatch = stage.scenario.dispatch
     permissions.own, rate_hz = DVA, stage.scenario.dva.sensor_rate_hz
     policy = load_policy(dispatch.policy, dispatch.options)
-    desk = Dva(
+    return Dva(
         policy,
         _Ways(stage),
         replace(dispatch.rules(), operator_span=stage.scenario.operator.span),
@@ -77,7 +87,6 @@ def add_dva(
         sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
         supervisors=_supervisors(stage),
     )
-    return DvaAgent(stage.device("dva", 1), desk, memory, keep_events)
 
 
 _ALARMS = {

@@ -8,9 +8,10 @@ from collections.abc import Iterable, Iterator
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Truth
-from dva_sim.agents.people.bystander import BystanderAgent
+from dva_sim.agents.people.bystander import SAFE, BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.hazards import Danger, Hearsay, RunHazard, RunHazards
 from dva_sim.simulation.full.stage import DVA, Stage
@@ -82,6 +83,17 @@ class Field(RunHazards):
             math.dist(middle, (x, y)) < radius and sees(middle, (x, y))
             for middle, radius in dangers
         )
+
+    def whereabouts(self, now: float) -> Iterator[tuple[str, TrackPoint]]:
+        """Where everybody is who is on the site, by name."""
+        self.world.advance_to(now)
+        for robot in self.robots.values():
+            pose, mode = robot.body.pose(), robot.controller.mode.value
+            yield robot.device.label, TrackPoint(now, pose.x, pose.y, pose.heading, mode)
+        for name, who in self.people():
+            x, y = who.walking.place
+            if who.activity != SAFE:
+                yield name, TrackPoint(now, x, y, who.heading, who.activity)
 
     # --- what happens ------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from typing import Any
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
 from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import Recorder, TrackPoint
+from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.connections import HEADERS, MSS, Connector, Load
 from dva_sim.network.link import (
     ConstantRate,
@@ -246,12 +246,5 @@ class Run:
 
     def _sample(self) -> None:
         """Note where everybody is who is on the site."""
-        now, tracks = self.clock.now, self.recorder.tracks
-        self.field.world.advance_to(now)
-        for robot in self.field.robots.values():
-            pose, mode = robot.body.pose(), robot.controller.mode.value
-            tracks[robot.device.label].append(TrackPoint(now, pose.x, pose.y, pose.heading, mode))
-        for name, who in self.field.people():
-            x, y = who.walking.place
-            if who.activity != SAFE:
-                tracks[name].append(TrackPoint(now, x, y, who.heading, who.activity))
+        for name, point in self.field.whereabouts(self.clock.now):
+            self.recorder.tracks[name].append(point)

@@ -5,7 +5,7 @@ Ids on the wire and names for people are made here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -34,6 +34,19 @@ _ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4}
 def id_of(kind: str, number: int) -> str:
     """The id of the `number`-th device of a kind, from 1: locally administered, never random."""
     return f"02:00:00:{_ROOMS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
+
+
+def team_of(scenario: Scenario) -> Iterator[str]:
+    """All devices of a scenario by id; each report may have a detector or a caller."""
+    counts = {
+        "robot": scenario.robot.count,
+        "guard": scenario.guard.count,
+        "operator": scenario.operator.count,
+        "detector": sum(event.reports for event in scenario.events),
+    }
+    yield DVA
+    for kind, count in counts.items():
+        yield from (id_of(kind, number) for number in range(1, count + 1))
 
 
 def label_of(kind: str, number: int) -> str:

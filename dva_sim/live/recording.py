@@ -1,0 +1,448 @@
+"""A live run as a recording: parts say what happens, one file takes it, the end makes MCAP of it.
+
+Each part writes lines into a pipe and never waits: what has no room is dropped and counted. A
+thread of the supervisor puts them into `FILE.part`, so that no robot ever waits for a disk, and
+what a part has said is kept when it is killed. When all have ended, a recording is made of the
+lines, in the form of those of virtual runs. Of a run whose supervisor was killed `FILE.part` is
+left, and can be replayed, too.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
+from dva_sim.core.events import Event, State
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.kernel.streams import Streams
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.messages import Position
+from dva_sim.recordings import write_recording
+from dva_sim.simulation.full import Playback
+from dva_sim.simulation.full.dva_trace import OWN_CODE
+from dva_sim.simulation.full.hazards import draw_incidents
+from dva_sim.simulation.full.recording import ending_of, event_about
+from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.scenario import Scenario, site_of
+from dva_sim.worlds.hazards import Surroundings
+
+SUFFIX, PART = ".mcap", ".part"
+FORMAT = 1  # of the lines
+MOST_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
+BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
+PIPE_BYTES = 1024 * 1024  # that may wait to be taken
+MOST_FACTS = 20_000  # of which one knows that they were said
+MOST_STRANGERS = 200  # devices of another make whose messages are kept
+_ENDS = re.compile(
+    rb"<DestinationID>([0-9A-F:]{17})</DestinationID>.{0,200}?<SourceID>([0-9A-F:]{17})<", re.DOTALL
+)
+_NOT_KEPT = "not recorded"
+
+Line = list[Any]
+
+
+class Outlet:
+    """Writes lines into a pipe, and never waits for whoever reads them.
+
+    Args:
+        file: Number of the open file; it is closed by `close`.
+    """
+
+    def __init__(self, file: int) -> None:
+        self._file, self._rest = file, b""
+        os.set_blocking(file, False)
+
+    def put(self, line: bytes) -> bool:
+        """Write a whole line, or none of it: whether there was room."""
+        if not self._flush():
+            return False
+        self._rest = line + b"\n"
+        self._flush()
+        return True
+
+    def _flush(self) -> bool:
+        with suppress(BlockingIOError, BrokenPipeError):
+            while self._rest:
+                self._rest = self._rest[os.write(self._file, self._rest) :]
+        return not self._rest
+
+    def close(self) -> None:
+        """Say what was begun, if there is room, and nothing more."""
+        self._flush()
+        os.close(self._file)
+
+
+class LiveRecorder(Recorder):
+    """A recorder whose part of the story goes to the recording at once.
+
+    Args:
+        clock: The part's.
+        outlet: Takes lines.
+
+    Attributes:
+        is_own: Whether a device, by its id, is of this run: what it sends is kept where it is
+            sent, what others send where it arrives.
+    """
+
+    def __init__(self, clock: Clock, outlet: Outlet) -> None:
+        super().__init__()
+        self._clock, self._outlet = clock, outlet
+        self.is_own: Callable[[str], bool] = lambda _: False
+        self._strangers: set[str] = set()
+        self._second, self._room = 0, BYTES_PER_SECOND
+        self._drawn: dict[int, tuple[int, int]] = {}
+        self._facts: dict[str, Any] = {}
+
+    def put(self, *line: Any) -> bool:
+        """Keep a line: whether it was."""
+        if (second := int(time.monotonic())) != self._second:
+            self._second, self._room = second, BYTES_PER_SECOND
+        data = json.dumps(line).encode() if self._room > 0 else b""
+        self._room -= len(data)
+        kept = bool(data) and self._outlet.put(data)
+        self.counters[_NOT_KEPT] += not kept
+        return kept
+
+    def put_new(self, *line: Any, key: str) -> None:
+        """Keep a line if it says something else than the last one of that key."""
+        if self._facts.get(key) != line and self.put(*line):
+            if len(self._facts) >= MOST_FACTS:
+                self._facts.clear()
+            self._facts[key] = line
+
+    def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
+        """See `Recorder`."""
+        super().tell(time, who, what, kind)
+        self.put("told", time, who, what, kind)
+
+    def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
+        """See `Recorder`."""
+        self.put("view", robot, [time, x, y, heading])
+
+    def message(self, node: str, payload: Any, sent: bool) -> None:
+        """A node of this process sends a message, or takes one."""
+        now = self._clock.now
+        if isinstance(payload, CameraFrame):
+            self.put("frame", now, node, payload.observation, payload.captured)
+            return
+        ends = _ENDS.search(payload, 0, 400)
+        if ends is None:
+            return
+        destination, source = ends[1].decode(), ends[2].decode()
+        if sent or self._is_news(source, payload):
+            self.put("sent", now, source, destination, payload.decode())
+
+    def _is_news(self, source: str, data: bytes) -> bool:
+        """Whether it is a message, of somebody who keeps no record for us."""
+        if self.is_own(source) or self._room <= 0:
+            return False
+        if source not in self._strangers and len(self._strangers) >= MOST_STRANGERS:
+            self.counters[_NOT_KEPT] += 1
+            return False
+        try:
+            decode(data)
+        except ProtocolError:
+            return False  # it is counted where it is refused
+        self._strangers.add(source)
+        return True
+
+    def catch_up(self) -> None:
+        """Keep what is new about the drives."""
+        for number, drive in enumerate(self.drives):
+            frames, commands = self._drawn.get(number, (0, 0))
+            facts = [drive.robot, drive.operator, drive.event, drive.ordered]
+            facts += [drive.started, drive.ended, drive.outcome]
+            self.put_new("drive", drive.operator, number, facts, key=f"drive {number}")
+            seen = [(f.captured, f.time) for f in drive.frames[frames:]]
+            made = drive.commands[commands:]
+            if (seen or made) and self.put("drove", drive.operator, number, seen, made):
+                self._drawn[number] = len(drive.frames), len(drive.commands)
+
+    def trace(self, who: str, line: str) -> bool:
+        """Keep a line of somebody's decisions."""
+        return self.put("trace", self._clock.now, who, line)
+
+
+class TraceLines:
+    """The trace of one who decides, into the recording; after a gap nothing could be replayed."""
+
+    def __init__(self, recorder: LiveRecorder, who: str) -> None:
+        self._recorder, self._who, self._whole = recorder, who, True
+
+    def __call__(self, line: str) -> None:
+        """Keep a line, unless one was dropped."""
+        self._whole = self._whole and self._recorder.trace(self._who, line)
+
+
+class TraceFile:
+    """The same into a file, each line before the next decision; a full disk ends it, no robot.
+
+    Args:
+        path: Of the file.
+        complain: Told once if no more can be written.
+
+    Raises:
+        ConfigError: it cannot be written.
+    """
+
+    def __init__(self, path: Path, complain: Callable[[str], object]) -> None:
+        self._complain = complain
+        try:
+            self._file: IO[bytes] | None = path.open("wb", buffering=0)
+        except OSError as error:
+            raise ConfigError(f"cannot be written: {error.strerror}", path) from error
+
+    def __call__(self, line: str) -> None:
+        """Write a line, if nothing went wrong so far."""
+        data = line.encode() + b"\n"
+        try:
+            while data and self._file is not None:
+                data = data[self._file.write(data) :]
+        except OSError as error:
+            if self._file is not None:
+                self._file.close()
+            self._file = None
+            self._complain(f"keeps no trace any longer: {error.strerror}")
+
+
+class Keeper:
+    """Puts what all parts say into one file.
+
+    Args:
+        target: The recording that is to be made.
+        about: What the run is.
+
+    Raises:
+        ConfigError: it cannot be written.
+    """
+
+    def __init__(self, target: Path, scenario: Scenario, seed: int) -> None:
+        self._target, self.path = target, target.with_name(target.name + PART)
+        start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
+        self.problem: str | None = None
+        self._room = MOST_BYTES
+        try:
+            self._file: IO[bytes] = self.path.open("wb", buffering=0)
+        except OSError as error:
+            raise ConfigError(f"cannot be written: {error.strerror}", self.path) from error
+        self._threads: list[threading.Thread] = []
+        self._lock = threading.Lock()
+        self._keep(json.dumps(start).encode() + b"\n")
+
+    def inlet(self) -> int:
+        """A new pipe: where a part writes; whoever gets it closes it."""
+        reads, writes = os.pipe()
+        with suppress(OSError):
+            fcntl.fcntl(writes, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+        thread = threading.Thread(target=self._take, args=(reads,), daemon=True)
+        self._threads.append(thread)
+        thread.start()
+        return writes
+
+    def _take(self, reads: int) -> None:
+        """Take whole lines until the part has ended, however it did."""
+        rest = b""
+        while data := os.read(reads, 1 << 18):
+            whole, _, rest = (rest + data).rpartition(b"\n")
+            if whole:
+                self._keep(whole + b"\n")
+        os.close(reads)
+
+    def _keep(self, lines: bytes) -> None:
+        with self._lock:
+            if self.problem is not None:
+                return
+            self._room -= len(lines)
+            if self._room < 0:
+                self.problem = f"it has come to {MOST_BYTES >> 20} MB"
+                return
+            try:
+                while lines:
+                    lines = lines[self._file.write(lines) :]
+            except OSError as error:
+                self.problem = error.strerror or str(error)
+
+    def close(self) -> None:
+        """Wait until all parts have ended; what they have said is in the file."""
+        for thread in self._threads:
+            thread.join()
+        self._file.close()
+
+    def finish(self) -> str | None:
+        """Make the recording when all parts have ended; in one line why not, or not all of it."""
+        self.close()
+        try:
+            lasted = finish(self.path, self._target)
+        except DvaSimError as error:
+            return f"{self._target} was not recorded: {self.problem or error}"
+        if self.problem is None:
+            return None
+        return f"{self._target} is recorded up to {lasted:.0f} s only: {self.problem}"
+
+
+# --- from lines to a recording -----------------------------------------------------------
+
+
+def finish(part: Path, target: Path, own_code: bool = True) -> float:
+    """Make a recording of the lines of a run, and remove them; how long it lasts [s].
+
+    Args:
+        part: The lines.
+        target: The recording.
+        own_code: Whether classes in files that the scenario names may be run: not if the lines
+            were found somewhere.
+
+    Raises:
+        DvaSimError: there are no such lines, or the recording cannot be written.
+    """
+    told = _Told(part)
+    if not own_code and OWN_CODE in json.dumps(told.start["scenario"]["events"]):
+        raise ConfigError("names a class in a file, which is run for no recording", part)
+    playback = told.playback()
+    about = {"time": "real, from the start of the run", "live": "over sockets"}
+    write_recording(playback, target, about=about, traces=told.traces)
+    part.unlink(missing_ok=True)
+    return playback.duration
+
+
+class _Told:
+    """The lines of a run, sorted.
+
+    Raises:
+        ConfigError: they cannot be read, or are something else.
+    """
+
+    def __init__(self, part: Path) -> None:
+        self.recorder = Recorder(keep_traffic=True)
+        self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
+        self.duration, self.radii = 0.0, dict[str, float]()
+        self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
+        self._events: dict[int, Event] = {}
+        self._drives: dict[tuple[str, int], DriveLog] = {}
+        try:
+            with part.open("rb") as file:
+                first, *lines = file.read(MOST_BYTES).split(b"\n")
+            self.start = json.loads(first)
+            if self.start["format"] > FORMAT:
+                raise ValueError("made by a later version")
+            for line in lines[:-1]:  # what is behind the last end of a line is not whole
+                kind, *values = json.loads(line)
+                getattr(self, f"_{kind}")(*values)
+        except OSError as error:
+            raise ConfigError(f"cannot be read: {error.strerror}", part) from error
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise ConfigError(f"holds no lines of a live run: {error}", part) from error
+
+    def playback(self) -> Playback:
+        """What can be told and shown of the run."""
+        scenario, seed = Scenario.model_validate(self.start["scenario"]), self.start["seed"]
+        site, recorder = site_of(scenario, seed), self.recorder
+        incidents = draw_incidents(scenario.events, site, Streams(seed))
+        real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
+        surroundings = Surroundings(site, [incidents[number].hazard for number in real])
+        for number, when in self._contained.items():
+            surroundings.contain(real.index(number), when)
+        recorder.timeline.sort(key=lambda moment: moment.time)
+        recorder.traffic = sorted(self._traffic(), key=lambda sent: sent.time)
+        recorder.drives = [drive for _, drive in sorted(self._drives.items())]
+        for sent in recorder.traffic:
+            for end in (sent.source, sent.destination):
+                self._labels.setdefault(end, end)
+        events = list(self._events.values())
+        return Playback(
+            scenario=scenario,
+            seed=seed,
+            site=site,
+            recorder=recorder,
+            incidents=incidents,
+            surroundings=surroundings,
+            labels=self._labels,
+            radii=self.radii,
+            duration=self.duration,
+            contained=self._contained,
+            endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
+        )
+
+    def _traffic(self) -> Iterator[Sent]:
+        """Messages; a frame goes to whoever drives the robot, or to nobody by name."""
+        for sent in self.recorder.traffic or ():
+            if sent.destination:
+                yield sent
+                continue
+            drives = [d for d in self._drives.values() if d.robot == sent.source]
+            watching = [d.operator for d in drives if d.ordered <= sent.time]
+            yield sent._replace(destination=watching[-1] if watching else DVA)
+
+    # --- lines by their first word -------------------------------------------------------
+
+    def _until(self, when: float) -> None:
+        self.duration = max(self.duration, when)
+
+    def _told(self, when: float, *words: str) -> None:
+        self._until(when)
+        self.recorder.timeline.append(Moment(when, *words))
+
+    def _view(self, robot: str, seen: list[float]) -> None:
+        when, x, y, heading = seen
+        self.recorder.views[robot].append(TrackPoint(when, x, y, heading, "seen"))
+
+    def _team(self, labels: Mapping[str, str], radii: Mapping[str, float]) -> None:
+        self._labels.update(labels)
+        self.radii.update(radii)
+
+    def _at(self, when: float, places: list[list[Any]]) -> None:
+        self._until(when)
+        for name, x, y, heading, mode in places:
+            self.recorder.tracks[name].append(TrackPoint(when, x, y, heading, mode))
+
+    def _sent(self, when: float, source: str, destination: str, text: str) -> None:
+        self._until(when)
+        data = text.encode()
+        self._traffic_of.append(Sent(when, source, destination, len(data), data))
+
+    def _frame(self, when: float, robot: str, seen: list[Any], captured: float) -> None:
+        *values, hazards, visibility = seen
+        others = tuple(SeenHazard(*hazard) for hazard in hazards)
+        view = Observation._make((*values, others, visibility))
+        size = self.start["scenario"]["camera"]["frame_bytes"]
+        self._traffic_of.append(Sent(when, robot, "", size, CameraFrame(view, captured)))
+
+    @property
+    def _traffic_of(self) -> list[Sent]:
+        assert self.recorder.traffic is not None
+        return self.recorder.traffic
+
+    def _drive(self, operator: str, number: int, facts: list[Any]) -> None:
+        robot, who, event, ordered, started, ended, outcome = facts
+        known = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
+        known.started, known.ended, known.outcome = started, ended, outcome
+
+    def _drove(self, operator: str, number: int, seen: Line, made: Line) -> None:
+        drive = self._drives[operator, number]
+        drive.frames += [Shown(captured, when, 0) for captured, when in seen]
+        drive.commands += [(when, speed, turn_rate) for when, speed, turn_rate in made]
+
+    def _contains(self, number: int, when: float) -> None:
+        self._contained[number] = when
+
+    def _event(
+        self, number: int, kind: str, at: list[float], state: str, times: dict[str, float]
+    ) -> None:
+        event = Event(number, kind, Position(*at), 0.0, state=State(state), times=times)
+        self._events[number] = event
+
+    def _trace(self, when: float, who: str, line: str) -> None:
+        self.traces[who].append((when, line))

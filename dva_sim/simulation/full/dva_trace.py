@@ -1,0 +1,278 @@
+"""What the DVA was told and what it decided: kept as lines of JSON, and replayed.
+
+The DVA's decider is pure: the same messages at the same times, with the same random numbers, give
+the same replies and the same orders. The first line holds what it was made from; each other line
+a thing that happened to it, the random bits that were drawn, and what followed.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple, TypeVar, cast
+
+from dva_sim.core.dva import Dva, Reaction
+from dva_sim.core.sessions import Permissions, Send
+from dva_sim.core.store import Store
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.simulation.full.control_room import make_desk
+from dva_sim.simulation.full.stage import DVA, Stage
+from dva_sim.simulation.scenario import Scenario, robot_profiles
+
+REMEMBERED = 20_000  # sends that an answer may still come to
+OWN_CODE = ".py:"  # in a name: a class of the user's, in a file
+
+Sink = Callable[[str], object]
+T = TypeVar("T", Reaction, list[Send])
+
+
+class TracedDva:
+    """A desk that is written down: whoever has it asks as if it were the desk itself.
+
+    Args:
+        desk: What decides.
+        sink: Takes lines.
+        stage: Where it works.
+        memory: What it will recall, if it does.
+    """
+
+    def __init__(self, desk: Dva, sink: Sink, stage: Stage, memory: Store | None = None) -> None:
+        self._desk, self._sink = desk, sink
+        self._bits: list[int] = []
+        self._numbers: OrderedDict[Send, int] = OrderedDict()
+        self._given = 0
+        permissions = desk.sessions.permissions
+        draw = permissions.draw
+        permissions.draw = lambda: self._kept(draw())
+        kept = None if memory is None else base64.b64encode(memory.copy()).decode()
+        start = {
+            "dva": DVA,
+            "scenario": stage.scenario.model_dump(mode="json"),
+            "seed": stage.seed,
+            "sessions": permissions.count,
+            "most_devices": desk.registry.most,
+            "memory": kept,
+            "epoch": 0.0 if memory is None else memory.epoch,
+        }
+        sink(json.dumps(start))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._desk, name)
+
+    def _kept(self, bits: int) -> int:
+        self._bits.append(bits)
+        return bits
+
+    # --- what happens to it --------------------------------------------------------------
+
+    def handle(self, message: m.Message, now: float) -> Reaction:
+        """See `Dva`, as for all that follow."""
+        told = {"do": "handle", "message": encode(message).decode(), "now": now}
+        return self._decided(told, lambda: self._desk.handle(message, now))
+
+    def note(self, message: m.Message, now: float) -> list[Send]:
+        """What was published."""
+        told = {"do": "note", "message": encode(message).decode(), "now": now}
+        return self._decided(told, lambda: self._desk.note(message, now))
+
+    def delivered(self, send: Send, now: float, content: Any = None) -> list[Send]:
+        """Answered with OK, and with this content."""
+        told = self._about(send, now, m.Reply(1, m.OK, "", content))
+        return self._decided(told, lambda: self._desk.delivered(send, now, content))
+
+    def refused_grant(self, send: Send, reply: m.Reply, now: float) -> list[Send]:
+        """Answered, but not with OK."""
+        told = self._about(send, now, reply)
+        return self._decided(told, lambda: self._desk.refused_grant(send, reply, now))
+
+    def undelivered(self, send: Send, now: float) -> list[Send]:
+        """Not answered."""
+        return self._decided(
+            self._about(send, now, None), lambda: self._desk.undelivered(send, now)
+        )
+
+    def tick(self, now: float) -> list[Send]:
+        """What time brings."""
+        return self._decided({"do": "tick", "now": now}, lambda: self._desk.tick(now))
+
+    def go_on(self) -> list[Send]:
+        """After a recall."""
+        return self._decided({"do": "go on"}, self._desk.go_on)
+
+    def close(self) -> list[Send]:
+        """The end."""
+        return self._decided({"do": "close"}, self._desk.close)
+
+    def check_access(self, now: float) -> None:
+        """Only a memory that was recalled asks for this from outside."""
+        self._desk.check_access(now)
+        self._sink(json.dumps({"do": "recall", "now": now}))
+
+    def _about(self, send: Send, now: float, reply: m.Reply | None) -> dict[str, Any]:
+        said = None if reply is None else encode(_as_message(reply)).decode()
+        number = self._numbers.get(send)
+        if number is None:  # so many were sent since that it was forgotten: no replay goes on
+            self._sink = _nowhere
+        return {"do": "answer", "to": number, "reply": said, "now": now}
+
+    def _decided(self, told: dict[str, Any], decide: Callable[[], T]) -> T:
+        self._bits = []
+        decision = decide()
+        _, sends = _parts(decision)
+        for send in sends:
+            self._numbers[send] = self._given
+            self._numbers.move_to_end(send)
+            self._given += 1
+        while len(self._numbers) > REMEMBERED:
+            self._numbers.popitem(last=False)
+        drawn = {"bits": self._bits} if self._bits else {}
+        self._sink(json.dumps(told | drawn | {"decided": _in_words(decision)}))
+        return decision
+
+
+def _nowhere(_: str) -> None:
+    """Takes what is kept no longer."""
+
+
+def traced(desk: Dva, sink: Sink, stage: Stage, memory: Store | None) -> Dva:
+    """A desk that is written down; see `TracedDva`."""
+    return cast(Dva, TracedDva(desk, sink, stage, memory))
+
+
+def _as_message(reply: m.Reply) -> m.Message:
+    return m.Message(DVA, 1, DVA, "00:00:00", 0, replace(reply, text=reply.text[:256]))
+
+
+def _parts(decision: Any) -> tuple[m.Reply | None, list[Send]]:
+    return decision if isinstance(decision, tuple) else (None, decision)
+
+
+def _in_words(decision: Any) -> list[str]:
+    """The reply, if there is one, and what else is sent."""
+    reply, sends = _parts(decision)
+    return [*([] if reply is None else [repr(reply)]), *map(repr, sends)]
+
+
+# --- the same again ----------------------------------------------------------------------
+
+
+class Decided(NamedTuple):
+    """One line of a trace: what happened, what was decided then, and what is decided now."""
+
+    line: int
+    what: str
+    then: list[str]
+    now: list[str]
+
+
+def replay_dva(lines: Iterable[str | bytes], path: Path) -> Iterator[Decided]:
+    """Tell a fresh DVA the same again.
+
+    Args:
+        lines: Of a trace.
+        path: Where they are from, for what is said of them.
+
+    Raises:
+        ConfigError: this is no trace of a DVA; or it would have to run a class in a file.
+    """
+    again: _Again | None = None
+    for number, line in enumerate(lines, 1):
+        try:
+            entry = json.loads(line)
+            if again is None:
+                again = _Again(entry)
+            else:
+                then, now = entry.get("decided", []), again.decide(entry)
+                yield Decided(number, entry["do"], then, now)
+        except _BROKEN as error:
+            said = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+            raise ConfigError(f"is no line of a DVA's trace: {said}", path, number) from error
+    if again is None:
+        raise ConfigError("is no line of a DVA's trace: it is empty", path, 1)
+
+
+_BROKEN = ValueError, KeyError, IndexError, TypeError, AttributeError, ProtocolError
+
+
+class _Again:
+    """A DVA made from the first line of a trace."""
+
+    def __init__(self, start: dict[str, Any]) -> None:
+        scenario = Scenario.model_validate(start["scenario"])
+        _refuse_own_code(scenario)
+        # A desk talks to nobody, and no command is sent.
+        plain = scenario.model_copy(update={"pattern": "req-rep", "pattern_options": {}})
+        stage = Stage(plain, start["seed"], cast(Any, None), Recorder())
+        self._bits: deque[int] = deque()
+        permissions = Permissions(self._draw, count=start["sessions"])
+        self._desk, self._sends = make_desk(stage, permissions), list[Send]()
+        self._desk.registry.most = start["most_devices"]
+        self._memory, self._epoch = start["memory"], start["epoch"]
+
+    def _draw(self) -> int:
+        return self._bits.popleft() if self._bits else 0
+
+    def decide(self, entry: dict[str, Any]) -> list[str]:
+        """Let it happen once more; what is decided now."""
+        self._bits = deque(entry.get("bits", ()))
+        if entry["do"] == "recall":
+            self._recall(entry["now"])
+            return []
+        decision = self._decide(entry)
+        self._sends += _parts(decision)[1]
+        return _in_words(decision)
+
+    def _decide(self, entry: dict[str, Any]) -> Any:
+        desk = self._desk
+        match entry["do"]:
+            case "handle":
+                return desk.handle(decode(entry["message"].encode()), entry["now"])
+            case "note":
+                return desk.note(decode(entry["message"].encode()), entry["now"])
+            case "answer":
+                return self._answered(self._sends[entry["to"]], entry["reply"], entry["now"])
+            case "tick":
+                return desk.tick(entry["now"])
+            case "go on":
+                return desk.go_on()
+            case "close":
+                return desk.close()
+        raise ValueError(f"{entry['do']!r} does not happen to a DVA")
+
+    def _answered(self, send: Send, said: str | None, now: float) -> list[Send]:
+        if said is None:
+            return self._desk.undelivered(send, now)
+        reply = decode(said.encode()).body
+        assert isinstance(reply, m.Reply)
+        if reply.code == m.OK:
+            return self._desk.delivered(send, now, reply.content)
+        return self._desk.refused_grant(send, reply, now)
+
+    def _recall(self, now: float) -> None:
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "memory.sqlite"
+            file.write_bytes(base64.b64decode(self._memory))
+            store = Store(file, self._epoch)
+            store.recall(self._desk, now)
+            store.close()
+
+
+def _refuse_own_code(scenario: Scenario) -> None:
+    """A class in a file is run only when somebody names it, never because a trace does.
+
+    Raises:
+        ValueError: the DVA or its map would need one.
+    """
+    names = [scenario.dispatch.policy, *(r.drive for r in robot_profiles(scenario))]
+    for name in names:
+        if OWN_CODE in name:
+            raise ValueError(f"{name} is a class in a file, and a trace runs none")

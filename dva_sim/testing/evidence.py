@@ -1,0 +1,88 @@
+"""Recordings and traces: their messages are valid, and every decision is made the same again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing.messages import Problem, check_message
+
+CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
+
+
+Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was looked at
+
+
+def check_recording(path: Path) -> Found:
+    """What is wrong with a recording, and doubts: its messages, and the decisions it holds."""
+    from dva_sim.recordings import read_recording  # late: start-up
+
+    try:
+        opened = read_recording(path)
+    except ConfigError as error:
+        return [Problem(1, 1, error.problem)], [], ""
+    traffic = [(s, s.payload) for s in opened.playback.recorder.traffic or ()]
+    said = [(sent, data) for sent, data in traffic if isinstance(data, bytes)]
+    problems = list[Problem]()
+    for number, (sent, data) in enumerate(said, 1):
+        where = f"message {number}, at {sent.time:.1f} s, from {sent.source}"
+        problems += [Problem(1, 1, f"{where}: {found.text}") for found in check_message(data)]
+    note = f"{len(said)} messages"
+    for who, lines in opened.traces.items():
+        replayed = _replayed([line.encode() for line in lines], path)
+        problems += [Problem(1, 1, f"{who}, line {p.line}: {p.text}") for p in replayed.problems]
+        note += f", {replayed.decisions} decisions of {who}"
+    return problems, [] if opened.is_whole else ["was cut short"], note
+
+
+def check_trace(path: Path) -> Found:
+    """What is decided otherwise than a trace tells, and whether its end is missing."""
+    *lines, rest = path.read_bytes().split(b"\n")
+    replayed = _replayed(lines, path)
+    return replayed.problems, [CUT] if rest else [], f"{replayed.decisions} decisions"
+
+
+class _Replayed(NamedTuple):
+    """How many decisions were made again, and which of them otherwise."""
+
+    decisions: int
+    problems: list[Problem]
+
+
+def _replayed(lines: Sequence[bytes], path: Path) -> _Replayed:
+    problems, count = list[Problem](), 0
+    try:
+        for line, what, then, now in (_of_dva if _is_of_dva(lines) else _of_robot)(lines, path):
+            count += 1
+            if then != now:
+                problem = f"{what}: decided was {then or 'nothing'}, and now is {now or 'nothing'}"
+                problems.append(Problem(line, 1, problem))
+    except ConfigError as error:
+        problems.append(Problem(error.line or 1, 1, error.problem))
+    return _Replayed(count, problems)
+
+
+def _is_of_dva(lines: Sequence[bytes]) -> bool:
+    try:
+        return "scenario" in json.loads(lines[0])
+    except (ValueError, IndexError, TypeError, RecursionError):
+        return False
+
+
+def _of_dva(lines: Sequence[bytes], path: Path) -> Iterator[tuple[int, str, str, str]]:
+    from dva_sim.simulation.full.dva_trace import replay_dva  # late: start-up
+
+    for line, what, then, now in replay_dva(lines, path):
+        yield line, what, "; ".join(then), "; ".join(now)
+
+
+def _of_robot(lines: Sequence[bytes], path: Path) -> Iterator[tuple[int, str, str, str]]:
+    from dva_sim.agents.robot.decision_log import replay  # late: start-up
+
+    # The first line is what the robot was; what has happened to it takes lines, too.
+    numbers = (number for number, line in enumerate(lines, 1) if b'"message"' in line)
+    for (message, then, now), line in zip(replay(path, lines), numbers, strict=False):
+        yield line, type(message.body).__name__, str(tuple(then[:3])), str(tuple(now[:3]))

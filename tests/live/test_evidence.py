@@ -1,0 +1,310 @@
+"""What a live run leaves: every decision of the DVA made the same again, lines made a recording."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import call
+
+from dva_sim.core.dva import Dva
+from dva_sim.core.store import Store
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.live import recording
+from dva_sim.live.recording import Keeper, LiveRecorder, Outlet, TraceFile, finish
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
+from dva_sim.recordings import read_recording
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import dva_server
+from dva_sim.simulation.full.dva_trace import TracedDva, replay_dva, traced
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import id_of
+from dva_sim.testing.evidence import check_recording, check_trace
+
+ROBOT, PHONE = id_of("robot", 1), id_of("operator", 1)
+Change = Callable[[list[dict[str, Any]]], object]
+
+
+def scenario_of(name: str = "drive-to-event", **changes: object) -> scenarios.Scenario:
+    return scenarios.build(scenarios.load(name), changes)
+
+
+def trace_of(path: Path, name: str, memory: Store | None = None, **changes: object) -> Run:
+    """A virtual run whose DVA is written down."""
+    run = Run(scenario_of(name, **changes), 1)
+    with path.open("w") as file:
+        desk = run.dva.desk
+        run.dva.desk = traced(desk, lambda line: file.write(line + "\n"), run.stage, memory)
+        run.run()
+        run.dva.close()
+    return run
+
+
+def differences(path: Path) -> int:
+    return sum(d.then != d.now for d in replay_dva(path.read_bytes().splitlines(), path))
+
+
+@pytest.fixture(scope="module")
+def drill(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two events, robots, guards, operators; who goes is drawn by chance."""
+    path = tmp_path_factory.mktemp("traces") / "dva.trace.jsonl"
+    trace_of(path, "fire-drill", horizon_s=120, dispatch={"policy": "random"})
+    return path
+
+
+# --- the DVA decides the same again -------------------------------------------------------
+
+
+def test_a_dva_that_draws_by_chance_decides_the_same_again(drill: Path) -> None:
+    entries = [json.loads(line) for line in drill.read_text().splitlines()]
+    assert any(entry.get("bits") for entry in entries)
+    decided = "".join(text for entry in entries for text in entry.get("decided", ()))
+    for name in ("Order(", "PermissionGrant(", "Reply("):
+        assert name in decided
+    assert differences(drill) == 0
+    problems, doubts, note = check_trace(drill)
+    assert (problems, doubts) == ([], [])
+    assert int(note.split()[0]) > 200
+
+
+@pytest.mark.parametrize("policy", ["auction", "coverage", "hazard_team", "min_eta"])
+def test_a_dva_with_another_policy_decides_the_same_again(tmp_path: Path, policy: str) -> None:
+    path = tmp_path / "dva.trace.jsonl"
+    trace_of(path, "fire-drill", horizon_s=60, dispatch={"policy": policy})
+    assert differences(path) == 0
+
+
+def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path: Path) -> None:
+    first = Run(scenario_of(horizon_s=30), 1)
+    store = Store(tmp_path / "memory.sqlite")
+    first.dva._memory = store
+    first.run()
+    run = Run(scenario_of(horizon_s=60), 1)
+    path = tmp_path / "dva.trace.jsonl"
+    with path.open("w") as file:
+        run.dva._memory = store
+        desk = run.dva.desk
+        run.dva.desk = traced(desk, lambda line: file.write(line + "\n"), run.stage, store)
+        run.dva.start()
+        run.run()
+    assert '"do": "recall"' in path.read_text()
+    assert run.dva.desk.book.total == 1
+    assert differences(path) == 0
+
+
+def test_every_way_to_ask_the_dva_is_written_down() -> None:
+    """What changes a DVA and is in no trace would be missed by every replay."""
+    public = {name for name, _ in inspect.getmembers(Dva, inspect.isfunction) if name[0] != "_"}
+    asked = set(re.findall(r"\bdesk\.(\w+)\(", inspect.getsource(dva_server)))
+    kept = {name for name in vars(TracedDva) if name[0] != "_"}
+    assert public - kept == {"next_deadline"}  # which changes nothing
+    assert asked <= kept
+
+
+def _first_grant(entries: list[dict[str, Any]]) -> dict[str, Any]:
+    return next(e for e in entries if "PermissionGrant" in str(e.get("decided")))
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda es: _first_grant(es)["decided"].pop(), "decided was"),
+        (lambda es: es.remove(next(e for e in es if "<RegMsg>" in str(e))), "decided was"),
+        (lambda es: _first_grant(es).update(bits=[1, 1, 1]), "decided was"),
+        (lambda es: es[0].update(seed=2), "decided was"),
+        (lambda es: es[1].update(do="lunch"), "'lunch' does not happen to a DVA"),
+        (lambda es: es[1].pop("now"), "'now' is missing"),
+        (lambda es: es.clear(), "is no line of a robot's trace"),
+    ],
+)
+def test_a_trace_changed_by_hand_is_found_out(
+    drill: Path, tmp_path: Path, change: Change, text: str
+) -> None:
+    entries = [json.loads(line) for line in drill.read_text().splitlines()]
+    change(entries)
+    path = tmp_path / "changed.trace.jsonl"
+    path.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    problems, *_ = check_trace(path)
+    assert problems
+    assert any(text in problem.text for problem in problems)
+
+
+def test_a_trace_that_ends_in_the_middle_of_a_line_is_checked_up_to_there(
+    drill: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "cut.trace.jsonl"
+    path.write_bytes(drill.read_bytes()[:-20])
+    ended = call("check", str(path))
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "warning: its last line is cut off" in ended.stdout
+
+
+def test_a_trace_runs_no_class_in_a_file(drill: Path, tmp_path: Path) -> None:
+    start, *rest = drill.read_text().splitlines(keepends=True)
+    told = json.loads(start)
+    told["scenario"]["dispatch"]["policy"] = "mine.py:Mine"
+    path = tmp_path / "dva.trace.jsonl"
+    path.write_text("".join([json.dumps(told) + "\n", *rest]))
+    ((_, _, text, _),) = [(p.line, p.column, p.text, p.file) for p in check_trace(path)[0]]
+    assert "mine.py:Mine is a class in a file, and a trace runs none" in text
+
+
+# --- lines on their way -------------------------------------------------------------------
+
+
+def message(number: int, source: str = PHONE) -> bytes:
+    return encode(m.Message(ROBOT, number, source, "12:00:00", 7, m.SetTeleOp(0.1, 0.0, None)))
+
+
+def test_who_records_never_waits_and_counts_what_has_no_room() -> None:
+    reads, writes = os.pipe()
+    recorder = LiveRecorder(Clock(), Outlet(writes))
+    for number in range(1, 2001):
+        recorder.message(PHONE, message(number), True)
+    dropped = recorder.counters["not recorded"]
+    kept = 2000 - dropped
+    assert 0 < dropped < 2000
+    whole = os.read(reads, 1 << 20).split(b"\n")
+    assert abs(len(whole) - kept) <= 1  # the last one may be there in part
+    assert all(json.loads(line)[0] == "sent" for line in whole[:-1])
+    os.close(reads)
+    recorder.message(PHONE, message(1), True)  # nobody reads any longer: no exception
+    os.close(writes)
+
+
+def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "BYTES_PER_SECOND", 1000)
+    monkeypatch.setattr(recording.time, "monotonic", lambda: 5.0)
+    with Path(os.devnull).open("wb") as nowhere:
+        recorder = LiveRecorder(Clock(), Outlet(nowhere.fileno()))
+        for number in range(1, 101):
+            recorder.message(PHONE, message(number), True)
+    assert 95 <= recorder.counters["not recorded"] < 100
+
+
+def test_of_strangers_what_arrives_is_kept_of_others_what_they_send() -> None:
+    reads, writes = os.pipe()
+    recorder = LiveRecorder(Clock(), Outlet(writes))
+    recorder.is_own = {PHONE, ROBOT}.__contains__
+    stranger = "AA:BB:CC:DD:EE:01"
+    recorder.message(PHONE, message(1), True)
+    recorder.message(ROBOT, message(1), False)
+    recorder.message(ROBOT, message(2, stranger), False)
+    recorder.message(ROBOT, message(3, stranger).replace(b"0.1", b"fast"), False)  # is none
+    recorder.message(ROBOT, b"rubbish", False)
+    lines = [json.loads(line) for line in os.read(reads, 1 << 20).splitlines()]
+    assert [(line[0], line[2]) for line in lines] == [("sent", PHONE), ("sent", stranger)]
+    os.close(reads)
+    os.close(writes)
+
+
+def test_after_a_gap_a_trace_goes_on_no_more() -> None:
+    said = []
+
+    class Full(LiveRecorder):
+        def trace(self, who: str, line: str) -> bool:
+            said.append(line)
+            return line != "second"
+
+    take = recording.TraceLines(Full(Clock(), Outlet(os.open(os.devnull, os.O_WRONLY))), "dva")
+    for line in ("first", "second", "third"):
+        take(line)
+    assert said == ["first", "second"]
+
+
+# --- from lines to a recording ------------------------------------------------------------
+
+
+def record(path: Path, lines: int = 20) -> Keeper:
+    """A run of a few lines, whose part has ended."""
+    keeper = Keeper(path, scenario_of(), 1)
+    inlet = keeper.inlet()
+    recorder = LiveRecorder(Clock(), Outlet(inlet))
+    recorder.put("team", {ROBOT: "robot-1", PHONE: "operator-1"}, {ROBOT: 0.3})
+    for number in range(1, lines + 1):
+        recorder.put("sent", number / 10, PHONE, ROBOT, message(number).decode())
+        recorder.put("at", number / 10, [["robot-1", number / 10, 1.0, 0.0, "Idle"]])
+    recorder.tell(2.0, "robot-1", "is now in mode Idle", "mode")
+    os.close(inlet)
+    return keeper
+
+
+def test_what_parts_say_becomes_a_recording_whose_messages_are_valid(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    assert record(path).finish() is None
+    assert [file.name for file in tmp_path.iterdir()] == ["run.mcap"]
+    playback = read_recording(path).playback
+    assert [sent.payload for sent in playback.recorder.traffic or ()] == [
+        message(number) for number in range(1, 21)
+    ]
+    assert len(playback.recorder.tracks["robot-1"]) == 20
+    assert playback.recorder.timeline[0].what == "is now in mode Idle"
+    assert check_recording(path) == ([], [], "20 messages")
+
+
+def test_a_message_that_is_none_is_found_in_a_recording(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    keeper = record(path)
+    inlet = keeper.inlet()
+    bad = message(99).replace(b"0.1", b"fast").decode()
+    os.write(inlet, json.dumps(["sent", 3.0, PHONE, ROBOT, bad]).encode() + b"\n")
+    os.close(inlet)
+    assert keeper.finish() is None
+    ended = call("check", str(path))
+    assert ended.returncode == 1
+    assert f"message 21, at 3.0 s, from {PHONE}: " in ended.stdout
+
+
+def test_lines_that_were_left_are_made_a_recording_by_replay(tmp_path: Path) -> None:
+    """As of a run whose supervisor was killed, in the middle of a line."""
+    keeper = record(tmp_path / "run.mcap")
+    keeper.close()
+    with keeper.path.open("ab") as file:
+        file.write(b'["sent", 9.9, "02')
+    ended = call("replay", str(keeper.path))
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert "is now in mode Idle" in ended.stdout
+    assert check_recording(tmp_path / "run.mcap") == ([], [], "20 messages")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
+def test_a_full_disk_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap.part").symlink_to("/dev/full")
+    lost = record(tmp_path / "run.mcap").finish()
+    assert lost == f"{tmp_path / 'run.mcap'} was not recorded: No space left on device"
+
+
+def test_a_run_that_has_grown_too_large_is_kept_up_to_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording, "MOST_BYTES", 30_000)
+    lost = record(tmp_path / "run.mcap", lines=100_0).finish()
+    assert lost is not None
+    assert " s only: it has come to 0 MB" in lost
+    assert check_recording(tmp_path / "run.mcap")[0] == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
+def test_a_trace_on_a_full_disk_ends_and_is_told_once() -> None:
+    told: list[str] = []
+    take = TraceFile(Path("/dev/full"), told.append)
+    for _ in range(3):
+        take("line")
+    assert told == ["keeps no trace any longer: No space left on device"]
+
+
+@pytest.mark.parametrize("data", [b"", b"5\n", b"{}\n", b'{"format": 99}\n'])
+def test_what_holds_no_lines_ends_in_one_line(tmp_path: Path, data: bytes) -> None:
+    part = tmp_path / "run.mcap.part"
+    part.write_bytes(data)
+    with pytest.raises(ConfigError, match="holds no lines of a live run"):
+        finish(part, tmp_path / "run.mcap")
+    assert part.exists()
