@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from dva_sim.experiments.analysis.compare import Comparison as Comparison
 from dva_sim.experiments.results.results import Frame, frame_of, plain
 from dva_sim.experiments.results.results import Results as ResultsData
-from dva_sim.experiments.study.study_file import Settings, pairs_of
+from dva_sim.experiments.study.loading import Settings, pairs_of
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.suggestions import listed
 from dva_sim.simulation.models import AnyScenario, Tables, model_for
@@ -337,7 +337,7 @@ def new(name: str | Path) -> Path:
     Raises:
         DvaSimError: there is such a file, or it cannot be written.
     """
-    from dva_sim.experiments.study.study_file import write_study
+    from dva_sim.experiments.study.loading import write_study
 
     return write_study(str(name))
 

@@ -22,7 +22,7 @@ from pathlib import Path
 import dva_sim
 from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.study.cell_grid import cells, jobs
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 
 ROOT = Path(__file__).parent.parent
 RECORDED = ("drive-to-event", "fire-drill")

@@ -14,8 +14,8 @@ from pathlib import Path
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import StudyJob
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.study import Study
-from dva_sim.experiments.study.study_file import load_study
 from dva_sim.simulation.models import Tables
 
 STUDY = """\

@@ -99,7 +99,7 @@ def new(
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    from dva_sim.experiments.study.study_file import write_study
+    from dva_sim.experiments.study.loading import write_study
 
     typer.echo(told(write_study(name)))
 

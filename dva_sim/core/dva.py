@@ -17,14 +17,7 @@ from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
 from dva_sim.core.permissions import Access
 from dva_sim.core.registry import GUARD, OPERATOR, REMOTE, ROBOT, DeviceEntry, Registry
-from dva_sim.core.sensing import (
-    CONFIDENCE,
-    SEVERITY,
-    Sensing,
-    is_no_news,
-    only_felt,
-    within_reach,
-)
+from dva_sim.core.sensing import CONFIDENCE, SEVERITY, Sensing, is_no_news, only_felt, within_reach
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m

@@ -24,9 +24,9 @@ from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import Bands
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.registration import Preregistration, departures, load_registration
 from dva_sim.experiments.study.study import FOLDER, Study, Version
-from dva_sim.experiments.study.study_file import load_study
 from dva_sim.experiments.study.tuning import TunedValues
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, Document, KeyPath, load_yaml, validate

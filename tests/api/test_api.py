@@ -13,7 +13,7 @@ import typer
 
 import dva_sim
 from dva_sim import cli
-from dva_sim.experiments.study.study_file import pairs_of
+from dva_sim.experiments.study.loading import pairs_of
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 

@@ -18,7 +18,7 @@ from dva_sim.experiments.execution.kept_recordings import (
 )
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings import read_recording
 

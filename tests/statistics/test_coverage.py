@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.statistics import (
     band,
     effect_size,

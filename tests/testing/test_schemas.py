@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.files import schema_text

@@ -10,7 +10,7 @@ import dva_sim
 from dva_sim.cli import call
 from dva_sim.experiments.report.figures.registry import load_figures
 from dva_sim.experiments.report.report import write_report
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 
 RISK = Path("experiments/figures/risk.py")

@@ -12,7 +12,7 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.designs import saltelli
 from dva_sim.experiments.study.factor_levels import size
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 
 PLAIN = STUDY.split("answer:")[0]

@@ -8,8 +8,8 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.loading import load_study, write_study
 from dva_sim.experiments.study.registration import register
-from dva_sim.experiments.study.study_file import load_study, write_study
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.testing.files import check_file
 

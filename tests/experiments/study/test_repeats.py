@@ -8,7 +8,7 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import latin_hypercube, parameter_sets
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 
 

@@ -8,7 +8,7 @@ from small_study import REPEATED, STUDY, study_in, write_study
 
 from dva_sim.experiments.study import cell_grid, stopping
 from dva_sim.experiments.study.cell_grid import REFERENCE
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.statistics import mean_interval
 

@@ -4,7 +4,7 @@ import pytest
 from small_study import STUDY, study_in, write_study
 
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
 
 

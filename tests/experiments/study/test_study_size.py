@@ -11,7 +11,7 @@ from dva_sim.experiments.execution.dry_run import DryRun
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.factor_levels import runs_of
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.tuning import tuning_study
 from dva_sim.kernel.errors import ConfigError
 

@@ -11,7 +11,7 @@ from dva_sim.cli.checks import check
 from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.resources import available
 from dva_sim.live.options import LiveOptions
 from dva_sim.simulation import scenario as scenarios

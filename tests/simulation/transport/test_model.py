@@ -10,7 +10,7 @@ from rich.console import Console
 
 from dva_sim.cli.stories import tell
 from dva_sim.experiments.report.episode import Played
-from dva_sim.experiments.study.study_file import load_study
+from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError
