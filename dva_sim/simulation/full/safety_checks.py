@@ -29,6 +29,7 @@ MOVING = 0.05  # above this a robot is going somewhere [m/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second [s]
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
+ROUNDED = 0.002  # of ticks [s]
 MOST_KEPT = 1000  # of the newest messages to a robot, and of its sessions
 
 CHECKED: Final = {
@@ -71,10 +72,11 @@ class Held(NamedTuple):
 
 
 class Unanswered(NamedTuple):
-    """A message that reached a robot, and is not answered yet."""
+    """A message that reached a robot, and is not answered yet; `source` has really sent it."""
 
     message: m.Message
     at: float
+    source: str
 
 
 @dataclass
@@ -108,6 +110,13 @@ class Witness:
     allowed: float = 0.0
     offset: float | None = None
     last_mission: float = 0.0
+
+    def given(self, session: int, held: Held) -> None:
+        """The DVA gives a permission, or says that one holds."""
+        self.sessions[session] = held
+        if len(self.sessions) > MOST_KEPT:
+            forgotten, _ = self.sessions.popitem(last=False)
+            self.over.pop(forgotten, None)
 
     def permits(self, source: str, session: int | None, level: str, now: float) -> Broken | None:
         """Why a device must not act, or None."""
@@ -160,15 +169,13 @@ class SafetyAudit:
 
     def delivered(self, now: float, source: str, to: str, data: Any) -> None:
         """A message, or a picture, has reached somebody; `source` is who really sent it."""
-        if to in self._robots:
-            self._reaches_robot(now, source, to, data)
-        elif to == self._dva:
-            if b"<EventReport>" in data:
-                self._ledger.asked(_read(data))
-        elif isinstance(data, CameraFrame) and source in self._robots:
-            witness = self.witness(source)
-            if witness.offset is None:
+        if isinstance(data, CameraFrame):
+            if source in self._robots and (witness := self.witness(source)).offset is None:
                 witness.offset = data.captured - data.observation.tick / 1000
+        elif to in self._robots:
+            self._reaches_robot(now, source, to, data)
+        elif to == self._dva and b"<EventReport>" in data:
+            self._ledger.asked(_read(data))
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness = self.witness(robot)
@@ -182,19 +189,18 @@ class SafetyAudit:
         if message is None:
             return
         witness.unanswered.setdefault(
-            (message.source, message.message_id), Unanswered(message, now)
+            (message.source, message.message_id), Unanswered(message, now, source)
         )
         if source == self._dva and isinstance(message.body, m.PermissionGrant):
             grant = message.body
-            witness.sessions[grant.session] = Held(grant.holder, grant.level, grant.sensors)
-            if len(witness.sessions) > MOST_KEPT:
-                session, _ = witness.sessions.popitem(last=False)
-                witness.over.pop(session, None)
+            witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
     def sent(self, now: float, source: str, to: str, data: Any) -> None:
         """A message has been sent."""
         if source == self._dva and self._ledger.waits and b"<reply>" in data:
             self._report(self._ledger.answered(_read(data)), now, "dva")
+        if source == self._dva and to in self._robots and b"<Permission>" in data:
+            self._says_who_holds(to, _read(data))
         witness = self._witnesses.get(source)
         if witness is None or not witness.unanswered or not isinstance(data, bytes):
             return
@@ -206,6 +212,14 @@ class SafetyAudit:
             found = self._answered(witness, self._robots[source], asked, reply.body.code, now)
             self._report(found, now, self._robots[source].device.label)
 
+    def _says_who_holds(self, robot: str, reply: m.Message | None) -> None:
+        """The DVA has answered a robot that asked who holds it: that permission is good."""
+        content = reply.body.content if reply and isinstance(reply.body, m.Reply) else None
+        if isinstance(content, m.Permission):
+            witness = self.witness(robot)
+            witness.given(content.session, Held(content.device, content.level, content.sensors))
+            witness.over.pop(content.session, None)
+
     def _answered(
         self, witness: Witness, robot: RobotAgent, asked: Unanswered, code: int, now: float
     ) -> Iterator[Broken]:
@@ -214,15 +228,18 @@ class SafetyAudit:
         match body:
             case m.Emergency():
                 witness.stopped = max(witness.stopped, now)
-            case m.PermissionRevocation() if message.source == self._dva:
+            case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
-            case m.PermissionGrant() if message.source == self._dva and code == m.OK:
+            case m.PermissionGrant() if asked.source == self._dva and code == m.OK:
                 self._replaced(witness, body, now)
         if code != m.OK:
             return
         if isinstance(body, m.DevSub):
-            held = [h for h in witness.sessions.values() if h.holder == message.source]
-            if not any(body.sensor in h.sensors for h in held):
+            held = witness.sessions.get(message.session or 0)
+            mine = (
+                held is not None and held.holder == message.source and body.sensor in held.sensors
+            )
+            if not mine or now > witness.over.get(message.session or 0, now):
                 yield "S5", f"lets {message.source} read {body.sensor}"
         if isinstance(body, _ORDERS):
             yield from self._ordered(witness, robot, asked, now)
@@ -272,6 +289,8 @@ class SafetyAudit:
         if command.seen_tick is not None and witness.offset is not None:
             pictured = command.seen_tick / 1000 + witness.offset
             witness.allowed = min(witness.allowed, pictured + limits.max_age_s)
+            if pictured > command.time + ROUNDED:
+                found.append(("S1", "obeys a command behind a picture that was not taken yet"))
         self._report(found, command.time, self._robots[command.robot].device.label)
 
     # --- twice a second --------------------------------------------------------------------
@@ -290,11 +309,11 @@ class SafetyAudit:
             return
         late = [k for k, v in witness.unanswered.items() if now > v.at + witness.obeys_within]
         for key in late:
-            message, at = witness.unanswered.pop(key)
+            message, at, source = witness.unanswered.pop(key)
             body, by = message.body, at + witness.obeys_within
             if isinstance(body, m.Emergency) and robot.body.powered:
                 witness.stopped = max(witness.stopped, by)
-            elif message.source != self._dva:
+            elif source != self._dva:
                 pass
             elif isinstance(body, m.PermissionRevocation):
                 _end(witness, body.session, by)
@@ -398,6 +417,8 @@ class EventLedger:
         self._now = now
         if sum(book.counts.values()) != book.total:
             yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
+        if min(book.counts.values()) < 0:
+            yield "S6", "a count of events is below zero"
         for state in (State.PENDING, State.ASSIGNED, State.ON_SCENE):
             count = sum(e.state is state for e in book.open.values())
             if count != book.counts[state]:

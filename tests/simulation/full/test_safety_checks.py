@@ -320,3 +320,75 @@ def test_a_set_point_that_never_expires_breaks_s1(monkeypatch: pytest.MonkeyPatc
     assert broken(told_once()) == set()
     monkeypatch.setattr(RobotController, "_set", trusting)
     assert broken(told_once()) == {"S1"}
+
+
+@pytest.mark.invariant("S1")
+def test_a_robot_that_obeys_a_tick_from_the_future_breaks_s1(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def ahead() -> Run:
+        run = staged()
+        run.network.subscribe(DVA, ROBOT, "frame|", lambda _: None)
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        tick = run.field.robots[ROBOT].controller.tick(60.0)
+        ask(run, 12.0, m.SetTeleOp(0.1, 0.4, tick))
+        run.clock.run(13.0)
+        return run
+
+    assert broken(ahead()) == set()
+    honest = RobotController._set
+
+    def credulous(self: RobotController, message: m.Message, body: Any, *args: Any) -> Decision:
+        return honest(self, message, m.SetTeleOp(body.speed, body.turn_rate, None), *args)
+
+    monkeypatch.setattr(RobotController, "_set", credulous)
+    assert broken(ahead()) == {"S1"}
+
+
+@pytest.mark.invariant("S5")
+def test_a_robot_whose_permission_to_read_is_over_breaks_s5_if_it_lets_one_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def read() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "sensors", 5, None, ("temperature",)))
+        ask(run, 11.0, m.PermissionRevocation(ROBOT, DVA, 5))
+        ask(run, 12.0, m.DevSub("temperature", 1.0))
+        run.clock.run(14.0)
+        return run
+
+    assert broken(read()) == set()
+    monkeypatch.setattr(RobotController, "_subscription", lambda *_: Decision(m.OK))
+    assert broken(read()) == {"S5"}
+
+
+@pytest.mark.parametrize("forged", ["revocation", "grant"])
+def test_a_forgery_makes_no_honest_robot_a_breaker_of_rules(forged: str) -> None:
+    """Somebody speaks in the DVA's name; the robot asks the DVA, and is driven on."""
+    scenario = scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 90})
+    run = Run(scenario, 1)
+    run.clock.run(25.0)
+    controller = run.field.robots[ROBOT].controller
+    grant = controller.grant
+    assert grant is not None
+    body = (
+        m.PermissionRevocation(ROBOT, grant.holder, grant.session)
+        if forged == "revocation"
+        else m.PermissionGrant(STRANGER, "both", grant.session + 1)
+    )
+    message = m.Message(ROBOT, 77, DVA, "12:00:00", 0, body)
+    wire = run.network.connect(STRANGER, ROBOT, lambda *_: None, True)
+    wire.send(1, encode(message))
+    run.run()
+    assert broken(run) == set()
+
+
+def test_a_count_below_zero_breaks_s6() -> None:
+    run = staged()
+    run.clock.run(10.0)
+    counts = run.dva.desk.book.counts
+    counts[State.ESCALATED] -= 1
+    counts[State.CONFIRMED] += 1
+    run.audit.check(10.5)
+    assert broken(run) == {"S6"}
