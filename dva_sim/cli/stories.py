@@ -136,7 +136,7 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
     lines.append(f"{row['simulated_s']:.0f} s {how}, {counts}")
     if failures := row["plugin_failures"]:
         lines.append(
-            f"{failures} times an operator, filter, mapping or drive of yours gave no answer"
+            f"{failures} times a class of yours (policy, operator, filter, ...) gave no answer"
         )
     print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)
@@ -314,7 +314,7 @@ def tell_task(run: Played, console: Console) -> None:
     console.print(f"{_count(row['trials'])}: {', '.join(_task_lines(row))}", soft_wrap=True)
     if row["plugin_failures"]:
         failures = row["plugin_failures"]
-        console.print(f"{failures} times a strategy or filter of yours gave no answer")
+        console.print(f"{failures} times a class of yours gave no answer")
     console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
     tell_measures(row, _columns(run))
 

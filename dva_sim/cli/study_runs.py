@@ -36,7 +36,6 @@ def run(request: RunRequest) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
     from dva_sim.experiments.report.figures.registry import load_figures
     from dva_sim.experiments.report.report import write_report
-    from dva_sim.experiments.report.summary import Reading
 
     try:
         study, cells = _loaded(request)
@@ -48,7 +47,7 @@ def run(request: RunRequest) -> ExitCode:
         failures = _told_failures(results) + _recorded(request, study)
         with console.status("Writing the report ..."):
             report = write_report(folder, figures=figures)
-            distrusted = Reading(results).distrusted
+            distrusted = results.distrusted
         for part, told in distrusted.items():
             problem = f"in part {part} {told}: no contrast of it is shown"
             print(error_line(problem), file=sys.stderr)

@@ -182,6 +182,7 @@ class Comparison:
         Raises:
             ConfigError: no such measure or factor, or one in words.
         """
+        self.refuse_distrusted()
         table, column = self.find(measure)
         found = []
         for group in self.groups(by):
@@ -189,6 +190,16 @@ class Comparison:
             if any(np.isfinite(side.values).any() for side in rows):
                 found.append(difference(group.part, group.levels, *rows))
         return found
+
+    def refuse_distrusted(self) -> None:
+        """Nothing is said of what a user's class did that failed: the default did it.
+
+        Raises:
+            ConfigError: there is such a part.
+        """
+        for name, side in zip("AB", self.sides, strict=True):
+            for part, told in side.distrusted.items():
+                raise ConfigError(f"nothing is compared: in part {part} of {name} {told}")
 
     def judge(self, fail_if: str) -> list[GateVerdict]:
         """Look at a condition such as `p95(response_s) > 1.05x`, part by part.
@@ -302,6 +313,7 @@ def judge(gate: Gate, comparison: Comparison) -> list[GateVerdict]:
         ConfigError: no such measure or factor, or nothing to decide it by.
     """
     try:
+        comparison.refuse_distrusted()
         table, column = comparison.find(gate.measure)
         by = None if gate.per is None else () if gate.per == "cell" else (gate.per,)
         verdicts = list(_verdicts(gate, comparison, table, column, comparison.groups(by)))

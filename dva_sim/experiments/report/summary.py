@@ -275,16 +275,8 @@ class Reading:
 
     @cached_property
     def distrusted(self) -> dict[str, str]:
-        """Parts in which a class of the user's failed, so that something else decided: how often.
-
-        What is said of such a part would be said of the default as well.
-        """
-        return {part: told for part in self.parts if (told := _failures_in(self.runs, part))}
-
-    @property
-    def parts(self) -> list[str]:
-        """The parts that have runs."""
-        return [str(name) for name in dict.fromkeys(self.runs["part"])] if self.runs else []
+        """See `Results`: parts of which no contrast is shown."""
+        return self.results.distrusted
 
     @cached_property
     def finding(self) -> Finding | None:
@@ -449,19 +441,6 @@ class Reading:
         if self.manifest.get("versions", {}).get("dirty"):
             found.append("The program that made the runs had changes that were not committed.")
         return found
-
-
-_FAILED = "plugin_failures", "policy_failed"  # columns, of which a model has one
-
-
-def _failures_in(runs: Table, part: str) -> str:
-    """How often classes of the user's failed in the runs of a part; empty if they did not."""
-    here = np.asarray(runs["part"]) == part
-    counts = sum(np.nan_to_num(as_floats(runs[name])[here]) for name in _FAILED if name in runs)
-    times, failed = int(np.sum(counts)), int(np.count_nonzero(counts))
-    return (
-        f"a class of yours failed {times} times, in {failed} of {here.sum()} runs" if times else ""
-    )
 
 
 def _broken(runs: Table) -> str:

@@ -295,6 +295,17 @@ class Results:
         return list(self.manifest.get("failures", []))
 
     @property
+    def distrusted(self) -> dict[str, str]:
+        """Parts in which a class of the user's failed, so that something else decided: how often.
+
+        What is said of such a part would be said of the default as well.
+        """
+        runs = self.table("runs") if self.has("runs") else {}
+        parts = np.asarray(runs.get("part", []))
+        told = {str(part): _failures_in(runs, parts == part) for part in dict.fromkeys(parts)}
+        return {part: said for part, said in told.items() if said}
+
+    @property
     def tables(self) -> list[str]:
         """Names of the tables."""
         return sorted(path.stem for path in self._tables.glob("*.parquet"))
@@ -419,3 +430,16 @@ def _not_results(folder: Path) -> str:
             "from there, and 'dva-sim show' and 'report' tell what is known so far"
         )
     return f"{folder} holds no finished results: it has no {MANIFEST}; finish the study first"
+
+
+_FAILED = "plugin_failures", "policy_failed"  # columns, of which a model has one
+
+
+def _failures_in(runs: Mapping[str, Any], here: NDArray[np.bool_]) -> str:
+    """How often classes of the user's failed in some runs; empty if they did not."""
+    columns = [np.asarray(runs[name], dtype=np.float64)[here] for name in _FAILED if name in runs]
+    counts = np.nan_to_num(columns).sum(axis=0) if columns else np.zeros(0)
+    times, failed = int(counts.sum()), int(np.count_nonzero(counts))
+    if not times:
+        return ""
+    return f"a class of yours failed {times} times, in {failed} of {here.sum()} runs"

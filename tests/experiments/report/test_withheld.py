@@ -60,6 +60,10 @@ def test_a_policy_that_always_fails_is_compared_with_nothing(study, tmp_path):
     assert "The answer is withheld" in (out / "report.html").read_text()
     assert not list(out.glob("figures/answer*"))
     assert json.loads(call("show", out, "--json").stdout)["answer"]["finding"] is None
+    for more in ((), ("--fail-if", "share(confirmed) < 95 %"), ("--json",)):
+        compared = call("compare", out, out, *more)
+        assert compared.returncode == ExitCode.MISTAKE
+        assert "in part shift of A a class of yours failed" in compared.stderr
 
 
 def test_without_a_failure_nothing_is_withheld(study, tmp_path):
