@@ -476,7 +476,12 @@ class _PlainKinds(RoundTripConstructor):
             tag = str(node.tag).replace(_OWN, "!!")[:64]
             problem = f"{tag} makes no value that is known here; write the value without it"
             raise ConstructorError(problem=problem, problem_mark=node.start_mark)
-        return super().construct_object(node, deep)
+        try:
+            return super().construct_object(node, deep)
+        except (ValueError, KeyError, IndexError, TypeError) as error:
+            # Such as the date 2001-13-32, a number of 5000 digits, or `!!bool maybe`.
+            problem = f"has a value that cannot be read: {error}"
+            raise ConstructorError(problem=problem, problem_mark=node.start_mark) from error
 
 
 def _reader() -> YAML:
