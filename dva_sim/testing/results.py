@@ -151,9 +151,13 @@ def _designed(shape: Shape) -> Rows:
     ]
 
 
+_OF_CLASSES: Final = "plugin_failures", "policy_failed"  # nothing rests on runs with such
+
+
 def _measured(names: Iterable[str], shape: Shape, rng: np.random.Generator) -> dict[str, float]:
     """A value for each measure, or nan."""
     values = {name: 0.5 if shape.is_constant else _value(name, rng) for name in names}
+    values |= {name: 0.0 for name in values if name in _OF_CLASSES}
     return {
         name: value if rng.random() >= shape.missing else float("nan")
         for name, value in values.items()

@@ -97,7 +97,7 @@ def test_an_emergency_does_not_wait_behind_a_request_that_is_not_answered(world:
 
     def answer_emergencies(request: Request) -> None:
         if b"<EmergencyMsg>" in request.data:
-            request.answer(robot.device.answer(request.data, robot.act, request.sender))
+            robot.device.take(request, robot.act)
 
     world.serve(ROBOT, answer_emergencies)
     codes: list[int] = []

@@ -30,6 +30,7 @@ class Site:
         self.registry = desk.registry
         self.be_patient()
         self.dva = DvaAgent(small_device(world, DVA), desk)
+        self.dva.leave_after = 0.0
         self.dva.start()
         self.entries = desk.registry.entries
         self.beating: set[str] = set()

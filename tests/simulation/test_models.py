@@ -9,7 +9,7 @@ from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import model_of
 
 SHORT = {
-    "drive-to-event": {"horizon_s": 20},
+    "drive-to-event": {"horizon_s": 20, "disturbance.kind": "refuse", "disturbance.after_s": 2},
     "evacuation": {"horizon_s": 5},
     "small-shift": {"horizon_s": 3000, "dispatch.containment": True},
     "tasks/fitts-lag": {"trials": 1},

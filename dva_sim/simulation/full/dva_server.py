@@ -28,6 +28,7 @@ class DvaAgent:
 
     Attributes:
         beats: Heartbeats heard, by device.
+        leave_after: Who is silent is listened to for so much longer [s].
         events: Every event there ever was, by number, where `keep_events`.
     """
 
@@ -39,6 +40,7 @@ class DvaAgent:
         self._memory, self._keep_events = memory, keep_events
         self._told: dict[int, State] = {}
         self._policy_failures = 0
+        self.leave_after = device.timeout
         self._problem: str | None = None
         self.beats: Counter[str] = Counter()
         self._heard: dict[str, tuple[str, list[Subscription]]] = {}  # address, at which heard
@@ -92,13 +94,20 @@ class DvaAgent:
             return
         self._attended = registry.version
         for id_tag, entry in registry.moves().items():
-            if entry is None or entry.silent:
-                self._leave(id_tag)
-            else:
+            if entry is not None and entry.silent:
+                # Over a long link its first heartbeat takes longer than it may be silent.
+                self.device.clock.call_after(self.leave_after, self._leave_the_silent, id_tag)
+            elif entry is not None:
                 self._meet(entry.device)
-            if entry is None:
+            else:
+                self._leave(id_tag)
                 del self.beats[id_tag]
                 self.device.forget(id_tag)
+
+    def _leave_the_silent(self, id_tag: str) -> None:
+        entry = self.desk.registry.entries.get(id_tag)
+        if entry is not None and entry.silent:
+            self._leave(id_tag)
 
     def _leave(self, source: str) -> None:
         for subscription in self._heard.pop(source, ("", []))[1]:

@@ -92,6 +92,7 @@ class Run:
 
     def __init__(self, scenario: Scenario, seed: int, keep_traffic: bool = False) -> None:
         self.scenario, self.clock, self.recorder = scenario, Clock(), Recorder(keep_traffic)
+        self._listeners: tuple[SafetyAudit, ...] = ()  # the audit, once all are in place
         self.network = VirtualNetwork(
             self.clock, self._link_between, self._sent, connector_of(scenario), self._delivered
         )
@@ -117,6 +118,7 @@ class Run:
             ),
             dva=DVA,
         )
+        self._listeners = (self.audit,)
         Disturbance(self.stage, self.dva, self.field)
         self.dva.start()
         self.clock.every(WATCH_PERIOD, self._watch)
@@ -183,10 +185,12 @@ class Run:
 
     def _sent(self, now: float, source: str, to: str, size: int, payload: Any) -> None:
         self.recorder.message_sent(now, source, to, size, payload)
-        self.audit.sent(now, source, to, payload)
+        for audit in self._listeners:
+            audit.sent(now, source, to, payload)
 
     def _delivered(self, now: float, source: str, to: str, payload: Any) -> None:
-        self.audit.delivered(now, source, to, payload)
+        for audit in self._listeners:
+            audit.delivered(now, source, to, payload)
 
     def _make_links(self) -> dict[str, tuple[Link, Link]]:
         """To each robot and back, by its id."""

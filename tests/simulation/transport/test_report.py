@@ -36,7 +36,8 @@ def row(cell: int, transport: str, crowd: str, person: int) -> dict[str, object]
     """One run: TCP takes 40 s longer beside eight flows."""
     slow = 40.0 * (transport == "tcp" and crowd == "8")
     values = dict.fromkeys(names_of(RUN_COLUMNS), 1.0) | {
-        "movement_time_s": 80.0 + slow + person % 3
+        "plugin_failures": 0.0,
+        "movement_time_s": 80.0 + slow + person % 3,
     }
     if crowd == "0":
         values |= dict.fromkeys(("share_of_fair_down", "bulk_use_down", "jain_down"), float("nan"))
