@@ -126,7 +126,7 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         ("colour: blue\n", "1:1: cannot be recognised; should be a message (.xml), a plan"),
         ("- 1\n", "1:1: should be a mapping"),
         ("", "1:1: is empty"),
-        ("horizon_s: 2001-13-32\n", "1:1: has a value that cannot be read"),
+        ("horizon_s: 2001-13-32\n", "1:12: has a value that cannot be read"),
         ("horizon_s: " + "[" * 1000, "1:1: is nested too deeply"),
         ("horizon_s: &a [*a]\n", "1:1: horizon_s: should be a number"),
         (BOMB, "1:1: has more than 20000 values"),
