@@ -22,7 +22,7 @@ def names_in(*folders: str) -> Completer:
     """Completes the names of files in some folders, wherever those lie."""
 
     def complete(incomplete: str) -> list[str]:
-        from dva_sim.kernel.resources import available
+        from dva_sim.kernel.resources import available  # late: start-up
 
         found = [
             f"{'tasks/' if folder.endswith('/tasks') else ''}{name}"

@@ -61,10 +61,10 @@ def episode(
         dva-sim episode evacuation --strip fire.png  # several moments in one figure
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
-    from dva_sim.cli import stories
-    from dva_sim.experiments.report.episode import EpisodeRequest
-    from dva_sim.recordings.pictures import Wanted
-    from dva_sim.testing.file_kinds import mistakes_of
+    from dva_sim.cli import stories  # late: start-up
+    from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
+    from dva_sim.recordings.pictures import Wanted  # late: start-up
+    from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
 
     pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
     with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
@@ -92,8 +92,8 @@ def replay(
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
-    from dva_sim.cli import stories
-    from dva_sim.recordings.pictures import Wanted
+    from dva_sim.cli import stories  # late: start-up
+    from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     with loudness(quiet, verbose):
         stories.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
@@ -149,8 +149,8 @@ def live(
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
-    from dva_sim.cli import live_screen
-    from dva_sim.live.options import LiveOptions
+    from dva_sim.cli import live_screen  # late: start-up
+    from dva_sim.live.options import LiveOptions  # late: start-up
 
     changes = tuple(set_ or ())
     options = LiveOptions(
@@ -177,6 +177,6 @@ def keys(
         dva-sim keys keys drive-to-event  # for each device of the scenario
         dva-sim keys keys dva robot-1 operator-1  # for these devices
     """
-    from dva_sim.cli.live_screen import make_keys
+    from dva_sim.cli.live_screen import make_keys  # late: start-up
 
     typer.echo(make_keys(folder, names))

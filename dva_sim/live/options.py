@@ -86,7 +86,7 @@ class LiveOptions:
             ConfigError: see `read`; or the site has no place for the team, or what is recorded
                 cannot be put where it is wanted.
         """
-        from dva_sim.simulation.full import rehearse
+        from dva_sim.simulation.full import rehearse  # late: start-up
 
         scenario, document = self.read(), load(self.scenario)
 
