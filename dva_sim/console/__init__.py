@@ -1,1 +1,5 @@
-"""The console: a page in the browser, a world in real time, and the link between them."""
+"""The browser console: a run in real time, on a page, under a person's hands.
+
+It may import everything below the command line. Begin with `web/__init__.py` for what a browser
+meets, `pictures.py` for what a robot's camera shows.
+"""
