@@ -20,6 +20,8 @@ export const you = signal(null);
 export const selection = signal(null);
 /** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
 export const connection = signal('connecting');
+/** Why there are no camera pictures; empty while there are. */
+export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
 export const notice = signal('');
 

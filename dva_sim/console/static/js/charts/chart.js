@@ -61,7 +61,7 @@ function options({ width, height, lines, palette, span, least, sync }) {
       },
     },
     axes: [
-      { ...axis, size: 20, values: (/** @type {any} */ u, /** @type {number[]} */ at) => at.map((t) => ago(t - u.scales.x.max)) },
+      { ...axis, size: 20, splits: (/** @type {any} */ u) => [3, 2, 1, 0].map((n) => u.scales.x.max - (n * span) / 3), values: (/** @type {any} */ u, /** @type {number[]} */ at) => at.map((t) => ago(t - u.scales.x.max)) },
       { ...axis, size: 46 },
     ],
     series: [

@@ -1,6 +1,6 @@
 /** A robot's picture with its true age; old looks old. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
-import { scene } from '../store.js';
+import { pictures, scene } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { useEvery } from '../ui/every.js';
 import { secondsText } from '../ui/words.js';
@@ -48,7 +48,7 @@ function Age({ robot, trouble }) {
   const known = Number.isFinite(age);
   const limit = Math.max(HATCHED_S, scene.value?.stale_s ?? 0);
   const look = !known || age > limit ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
-  const text = known ? `${secondsTo(age)} old` : trouble || 'waiting for the first picture';
+  const text = known ? `${secondsTo(age)} old` : pictures.value || trouble || 'waiting for the first picture';
   return html`<div class=${`veil ${look}`}></div>
     <figcaption><b>${robot.label}</b><span class=${`picture-age ${look}`}>${text}</span></figcaption>`;
 }

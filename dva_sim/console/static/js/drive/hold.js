@@ -7,6 +7,7 @@
  * for nothing until it has been let go: only a new gesture drives on.
  */
 import { signal } from '../../vendor/preact.js';
+import { you } from '../store.js';
 import { steer } from '../net/wire.js';
 
 const EVERY_MS = 40;
@@ -97,11 +98,20 @@ function send() {
   steer({ do: 'input', n: count, speed, turn, held: held.value });
 }
 
+/** A last word that outlives the page, should the socket not carry it any more. */
+function sayGone() {
+  const body = JSON.stringify({ action: 'gone', client: you.peek()?.client });
+  navigator.sendBeacon?.('/api/actions', new Blob([body], { type: 'application/json' }));
+}
+
 /** Whatever interrupts. @returns {() => void} how to end that */
 export function watchInterruptions() {
   const blur = () => interrupt('The window lost the focus.');
   const hide = () => document.hidden && interrupt('The page was hidden.');
-  const leave = () => interrupt('The page was left.');
+  const leave = () => {
+    if (held.value) sayGone();
+    interrupt('The page was left.');
+  };
   const turned = () => interrupt('The screen was turned.');
   window.addEventListener('blur', blur);
   window.addEventListener('pagehide', leave);

@@ -1,6 +1,7 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
-import { connection, events, hazards, rows, scene, seat, story, tracks, you } from '../store.js';
+import { connection, events, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
 
@@ -24,12 +25,19 @@ const LINES = {
   seat: (line) => {
     if (isMine(line)) seat.value = line;
   },
-  you: (line) => (you.value = { client: line.client, role: line.role }),
+  you: (line) => {
+    you.value = { client: line.client, role: line.role };
+    rememberClient(line.client);
+  },
+  pictures: (line) => (pictures.value = line.ok ? '' : line.text),
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),
 };
 
-/** @param {any} line */
+/**
+ * Take note of a line.
+ * @param {any} line
+ */
 export function apply(line) {
   if (typeof line.t === 'number') hear(line.t);
   else hearAnything();
@@ -46,9 +54,10 @@ function snap(line) {
   if (line.scene) scene.value = line.scene;
   story.value = [];
   seat.value = null;
-  for (const part of Object.values(line.state ?? {})) {
-    for (const inner of Array.isArray(part) ? part : [part]) {
-      if (inner && typeof inner === 'object') LINES[inner.k]?.(inner);
-    }
+  const { pos, story: told, ...others } = line.state ?? {};
+  if (pos) LINES.pos({ p: pos });
+  if (told) story.value = told.slice(-STORY_KEPT);
+  for (const part of Object.values(others)) {
+    for (const inner of Array.isArray(part) ? part : [part]) LINES[inner?.k]?.(inner);
   }
 }

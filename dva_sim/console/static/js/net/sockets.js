@@ -3,6 +3,7 @@ import { effect } from '../../vendor/preact.js';
 import { connection, maySteer, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
+import { rememberedClient } from './client_id.js';
 import { keepAsking } from './round_trip.js';
 import { isDriveSocket, replaceDriveSocket } from './wire.js';
 
@@ -25,7 +26,10 @@ function address(path) {
 
 /** Begin to listen, for as long as the page lives. */
 export function connect() {
-  const socket = new WebSocket(address('/ws/state'));
+  const old = you.value?.client ?? rememberedClient();
+  const query = old ? `?client=${encodeURIComponent(old)}` : '';
+  const socket = new WebSocket(address(`/ws/state${query}`));
+  count = NaN;
   state = socket;
   let stopAsking = () => {};
   socket.onopen = () => {

@@ -5,7 +5,7 @@ import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
-import { Tour } from '../tour/tour.js';
+import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
 import { addressOf, page } from './route.js';
@@ -47,6 +47,7 @@ function Rail() {
       ([name, title, icon]) => html`<a href=${addressOf(name)}
         aria-current=${page.value === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
     )}
+    <${TourButton} />
   </nav>`;
 }
 

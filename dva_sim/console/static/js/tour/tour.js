@@ -65,8 +65,7 @@ export function TourButton() {
 /** The panel that leads through it. */
 export function Tour() {
   const now = progress.value;
-  if (!plan()) return null;
-  if (!now) return html`<div class="tour-corner"><${TourButton} /></div>`;
+  if (!plan() || !now) return null;
   return html`<aside class="tour" aria-label="Tour">
     <button type="button" class="close" aria-label="End the tour" onClick=${() => (progress.value = null)}>
       <${Icon} name="x" /></button>
