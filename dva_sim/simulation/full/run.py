@@ -24,7 +24,7 @@ from dva_sim.network.link import (
 )
 from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.virtual_network import VirtualNetwork
-from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.control_room import add_dva, add_operator, at_event_m
 from dva_sim.simulation.full.disturbance import Disturbance
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
@@ -118,6 +118,7 @@ class Run:
             ),
             dva=DVA,
             place_of=self.field.place_of,
+            at_event=at_event_m(scenario),
             tick=PHYSICS_TICK,
         )
         self._listeners = (self.audit,)

@@ -31,7 +31,6 @@ PENDING_SLACK = 2.0  # the desk looks at deadlines once a second [s]
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
 ROUNDED = 0.002  # of ticks [s]
 MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
-AT_EVENT = 20.0  # who is so near has seen what there is [m]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
 
@@ -59,7 +58,7 @@ Broken = tuple[str, str]
 _COMMAND = re.compile(  # as everybody here writes them, but any other would do no harm
     rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>.*<SetTeleOp>", re.DOTALL
 )
-_OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<Registration>"
+_OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>"
 _ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
@@ -183,6 +182,7 @@ class SafetyAudit:
         processing: Of a message at a robot, mean [s].
         dva: Its id.
         place_of: Where a device really is, by its id; None: it has no place.
+        at_event: From how far somebody may see what was reported somewhere [m].
         tick: Of the motors [s].
     """
 
@@ -197,11 +197,12 @@ class SafetyAudit:
         processing: float,
         dva: str,
         place_of: Callable[[str], m.Position | None],
+        at_event: float,
         tick: float,
     ) -> None:
         self._recorder, self._limits, self._robots = recorder, limits, robots
         self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
-        self._ledger, self._tick = EventLedger(book, rules, dva, place_of), tick
+        self._ledger, self._tick = EventLedger(book, rules, dva, place_of, at_event), tick
         self._witnesses: dict[str, Witness] = {}
         recorder.on_accepted = self.accepted
 
@@ -495,12 +496,19 @@ class EventLedger:
         rules: How long an event may wait, or be in one pair of hands.
         dva: Id of the DVA.
         place_of: Where a device really is.
+        at_event: Who is so near may have seen what there is [m].
     """
 
     def __init__(
-        self, book: EventBook, rules: Rules, dva: str, place_of: Callable[[str], m.Position | None]
+        self,
+        book: EventBook,
+        rules: Rules,
+        dva: str,
+        place_of: Callable[[str], m.Position | None],
+        at_event: float,
     ) -> None:
-        self._book, self._rules, self._dva, self._place_of = book, rules, dva, place_of
+        self._book, self._rules, self._dva = book, rules, dva
+        self._place_of, self._at_event = place_of, at_event
         self._asked: dict[tuple[str, int], m.EventReport] = {}
         self._orders: dict[tuple[str, int], int] = {}
         self._words: dict[int, Word] = {}
@@ -581,12 +589,12 @@ class EventLedger:
         if goes is None or event is None:
             return
         self._takes_up(number, source)
-        if finding != "confirmed" or self._is_near(goes, event, AT_EVENT):
+        if finding != "confirmed" or self._is_near(goes, event):
             word.found.add(finding)
 
-    def _is_near(self, device: str, event: Event, within: float) -> bool:
+    def _is_near(self, device: str, event: Event) -> bool:
         place = self._place_of(device)
-        return place is not None and apart(place, event.position) < within
+        return place is not None and apart(place, event.position) <= self._at_event
 
     def _answered(self, reporter: str, reply: m.Reply) -> Iterator[Broken]:
         """The DVA has taken a report: then there is an event."""
@@ -657,9 +665,8 @@ class EventLedger:
         """Whether who was sent there has said so; or a robot nearby may just have felt it."""
         if finding in self._word(event.number).found:
             return True
-        within = max(self._book.merge_distance, AT_EVENT)
         lately = [robot for robot, when in self._felt.items() if now - when < FELT_LATELY]
-        return finding == "confirmed" and any(self._is_near(r, event, within) for r in lately)
+        return finding == "confirmed" and any(self._is_near(r, event) for r in lately)
 
 
 def _keep_newest(kept: dict[Any, Any]) -> None:
