@@ -94,9 +94,11 @@ class Dva:
         elif isinstance(body, m.RobotStatus):
             self.registry.locate(entry, body.position)
             entry.mode = body.mode
+            self.orders.moved(message.source, now)
             self.handovers.seen(message.source, body, now)
         elif isinstance(body, m.PersonStatus):
             self.registry.locate(entry, body.position)
+            self.orders.moved(message.source, now)
         elif isinstance(body, m.SensorValue) and entry.position is not None:
             return self._and_revocations(self._felt(message, body, entry.position, now))
         return []
