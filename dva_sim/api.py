@@ -101,6 +101,7 @@ def episode(
     inset: bool = False,
     side_by_side: str | Sequence[str] | None = None,
     record: str | Path | None = None,
+    overwrite: bool = False,
 ) -> Episode:
     """Run one scenario once, and draw or keep it if asked to.
 
@@ -118,6 +119,7 @@ def episode(
         side_by_side: Run and draw the same seed under two patterns; the episode is that of the
             first.
         record: Keep the run as a file: `.mcap`.
+        overwrite: Replace a recording that is there.
 
     Raises:
         ConfigError: there is none, it is not valid with these changes, or it cannot be drawn so.
@@ -133,6 +135,7 @@ def episode(
             side_by_side=None if side_by_side is None else _joined(side_by_side),
             pictures=_wanted(video, still, strip, at, panels, camera, inset),
             record=None if record is None else Path(record),
+            overwrite=overwrite,
         )
         runs = [request.play(each) for each in request.scenarios()]
         list(request.write(runs))

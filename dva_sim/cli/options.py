@@ -116,6 +116,7 @@ Jobs = Annotated[
         "How many processes; default: one for each core.", "-j", "--jobs", least=1, most=MOST_JOBS
     ),
 ]
+Overwrite = Annotated[bool, Option("--overwrite", help="Replace what is there.")]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Json, Quiet, ResultsFolder, Verbose, count
+from dva_sim.cli.options import Json, Overwrite, Quiet, ResultsFolder, Verbose, count
 from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 
 
@@ -93,7 +93,7 @@ def export(
     form: Annotated[
         str | None, Option("--format", metavar="csv|parquet", help="In a folder; default: csv.")
     ] = None,
-    overwrite: Annotated[bool, Option("--overwrite", help="Replace what is there.")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write tables of results for other programs.
 

@@ -12,6 +12,7 @@ from dva_sim.cli.options import (
     At,
     Camera,
     Inset,
+    Overwrite,
     Panels,
     Quiet,
     RunSeed,
@@ -50,6 +51,7 @@ def episode(
     record: Annotated[
         Path | None, file("Keep the run as a file: .mcap, for replay and viewers.")
     ] = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -68,7 +70,9 @@ def episode(
 
     pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
     with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
-        stories.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
+        stories.episode(
+            EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record, overwrite)
+        )
 
 
 def replay(
@@ -124,6 +128,7 @@ def live(
         Path | None,
         Option(metavar="FILE|FOLDER", help="A recording (.mcap); or a folder of traces."),
     ] = None,
+    overwrite: Overwrite = False,
     state: Annotated[Path | None, file("File that lets a killed DVA go on where it was.")] = None,
     seconds: Annotated[
         float | None,
@@ -154,7 +159,8 @@ def live(
 
     changes = tuple(set_ or ())
     options = LiveOptions(
-        scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds
+        *(scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds),
+        overwrite=overwrite,
     )
     with loudness(quiet, verbose):
         if only is None:

@@ -67,6 +67,9 @@ def check_file(path: Path) -> FileVerdict:
         return _check_yaml(path)
     if kind in ("recording", "trace"):
         return _check_evidence(kind, path)
+    if path.suffix == ".part":
+        told = "holds what a live run left; dva-sim replay makes a recording of it"
+        return FileVerdict("unknown", [Problem(1, 1, told)])
     return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
 
 
