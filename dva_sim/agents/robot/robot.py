@@ -9,11 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
-from dva_sim.agents.observation import CameraFrame, Observation
+from dva_sim.agents.observation import FRAME, CameraFrame, Observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
 from dva_sim.agents.robot.controller import (
     ENDS,
+    STAND,
     Decision,
     Mission,
     Mode,
@@ -153,7 +154,6 @@ class MissionLoop:
             self._on_news()
 
 
-FRAME = "frame|"  # topic of the camera
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
@@ -213,6 +213,7 @@ class RobotAgent:
         refused: Messages that were refused.
         picture_age: How old the picture behind the last command was when it took effect [s],
             by the robot's own clock.
+        set_point: What it was told last, and until when.
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
     """
@@ -233,6 +234,7 @@ class RobotAgent:
         self._drive_of = drive_of
         self.applied = self.refused = 0
         self.picture_age: float | None = None
+        self.set_point = STAND
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
         self._fared, self._held_since = m.OK, 0.0
@@ -250,6 +252,7 @@ class RobotAgent:
         )
         self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
+        self._pattern = setup.pattern
         self._commands: Subscription | None = None
         self._encoding = False
         around = Surrounded(device.clock, world, body, planner)
@@ -275,6 +278,27 @@ class RobotAgent:
         speed, turn_rate = self.body.speed, self.body.turn_rate
         tick = self.controller.tick(now)
         return Observation(tick, *at, speed, turn_rate, hazards, visibility)
+
+    def expect(self, pattern: Pattern) -> None:
+        """From the next drive on, commands come by another pattern.
+
+        Raises:
+            RuntimeError: it is driven now.
+        """
+        if self.controller.mode is Mode.TELEOPERATION:
+            raise RuntimeError(f"{self.device.label} is driven")
+        self._pattern = pattern
+        self.inbox.latest_wins = pattern.newest_wins or self._setup.conflates
+
+    @property
+    def charge(self) -> float:
+        """Share of the battery's charge that is left."""
+        return self._setup.charge()
+
+    @property
+    def holder(self) -> tuple[str | None, float]:
+        """Who may act on it, by id, and for how long already [s]."""
+        return self._holder, self.device.clock.now - self._held_since
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
@@ -418,6 +442,7 @@ class RobotAgent:
             recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
     def _move(self, set_point: TimedSetPoint) -> None:
+        self.set_point = set_point
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
             self._guarded.take(set_point)
             return
@@ -431,7 +456,7 @@ class RobotAgent:
             self._commands.close()
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
-        if mode is Mode.TELEOPERATION and self._setup.pattern.published:
+        if mode is Mode.TELEOPERATION and self._pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
                 me, source, command_topic(me), self._published
