@@ -203,6 +203,11 @@ class PacedClock(LiveClock):
         self._factor = self._factor if factor is None else factor
         self._halted = self._halted if paused is None else paused
 
+    def go(self) -> None:
+        """Virtual time goes on from where it is, whatever real time has passed: it begins now."""
+        self._rebase(int(self.env._now))
+        self._worst = 0.0
+
     def worst_lag(self) -> float:
         """By how much an event has come too late at most since the last time of asking [s]."""
         worst, self._worst = self._worst, 0.0

@@ -59,7 +59,7 @@ class HeldRobot:
     Args:
         device: The person's.
         robot: By its id.
-        console: What the person works with.
+        console: What the person works with by now.
         alert: Told what the person has to know.
         let_go: Told that the robot is in these hands no longer.
 
@@ -77,7 +77,7 @@ class HeldRobot:
         self,
         device: AgentDevice,
         robot: str,
-        console: Console,
+        console: Callable[[], Console],
         alert: Callable[[str], object],
         let_go: Callable[[HeldRobot], object],
     ) -> None:
@@ -89,7 +89,7 @@ class HeldRobot:
         self.frame: CameraFrame | None = None
         self.arrived = 0.0
         self.last = Input(0, 0.0, 0.0, 0.0)
-        self.app = GivenTilt(console.phone)
+        self.app = GivenTilt(console().phone)
         self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
         self._sender: CommandSender | None = None
         self._picture: Subscription | None = None
@@ -143,7 +143,7 @@ class HeldRobot:
     def revoked(self, session: int) -> None:
         """The DVA says that a session is over; the robot has been told, too."""
         if self.phase != "gone" and session == self.session:
-            self._end("gave up")
+            self.end("gave up")
             self._alert(f"{self.label}: the permission was revoked")
             self._be_gone()
 
@@ -162,7 +162,7 @@ class HeldRobot:
             self.device,
             self.robot,
             self.session,
-            topic=self._console.setup.topic,
+            topic=self._console().setup.topic,
             on_frame=self._on_frame,
             seen=seen,
             blind=lambda url: self._alert(f"{self.label}: no camera to watch at {url!r}"),
@@ -193,11 +193,11 @@ class HeldRobot:
         self.device.recorder.drive_ordered(log)
 
         def refused(why: str) -> None:
-            self._end("gave up")
+            self.end("gave up")
             said(False, f"{self.label}: {why}")
 
         def lost() -> None:
-            self._end("lost link")
+            self.end("lost link")
             said(False, f"{self.label} does not answer")
 
         def begun() -> None:
@@ -216,7 +216,7 @@ class HeldRobot:
         )
 
     def _begin(self, log: DriveLog) -> None:
-        setup, device = self._console.setup, self.device
+        setup, device = self._console().setup, self.device
         self.phase, log.started = "driving", device.clock.now
         if self.event:
             device.progress(self.event, "departed")
@@ -242,7 +242,7 @@ class HeldRobot:
 
     def want(self, number: int, speed: float, turn: float) -> None:
         """What the person wants from now on, as shares of what the robot can do."""
-        now, reach = self.device.clock.now, self._console.reach(self.robot)
+        now, reach = self.device.clock.now, self._console().reach(self.robot)
         self.last = Input(number, now, speed, turn)
         if self.phase == "driving":
             self._inputs.append(self.last)
@@ -261,7 +261,7 @@ class HeldRobot:
             if said is not None:
                 said(True, f"{self.label} is not driven")
             return
-        self._end(outcome)
+        self.end(outcome)
         self.phase = "stopping"
 
         def stopped(reply: m.Reply | None = None) -> None:
@@ -275,7 +275,7 @@ class HeldRobot:
 
     def emergency(self, said: Said) -> None:
         """Stop at once, by the way that waits for nothing."""
-        self._end("emergency")
+        self.end("emergency")
         ask_emergency(self.device, self.robot, self.session, said)
 
     def _look_at_picture(self, log: DriveLog) -> bool:
@@ -288,15 +288,15 @@ class HeldRobot:
 
     def _lost(self, why: str) -> None:
         """Nobody answers: whatever still gets through shall stop the robot."""
-        self._end("lost link")
+        self.end("lost link")
         self._alert(f"{self.label}: the link counts as lost: {why}")
         self.device.ask(self.robot, m.Emergency(), session=self.session)
 
     def _refused(self, why: str) -> None:
-        self._end("refused")
+        self.end("refused")
         self._alert(f"{self.label}: {why}")
 
-    def _end(self, outcome: str) -> None:
+    def end(self, outcome: str) -> None:
         """A drive is over, however it ended."""
         if self._sender is not None:
             self._sender.stop()

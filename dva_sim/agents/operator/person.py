@@ -27,6 +27,7 @@ class PersonAgent:
         console: What it works with.
 
     Attributes:
+        console: As given; another counts from the next drive on.
         attended: Whether somebody sits there.
         order: The newest order of the DVA, until it is settled or declined.
         robots: What is in hand, by id.
@@ -35,7 +36,7 @@ class PersonAgent:
     """
 
     def __init__(self, device: AgentDevice, console: Console) -> None:
-        self.device, self._console = device, console
+        self.device, self.console = device, console
         self.attended = False
         self.order: m.Order | None = None
         self.robots: dict[str, HeldRobot] = {}
@@ -72,7 +73,7 @@ class PersonAgent:
         answers = Gathered(len(wanted), said)
         taken = []
         for robot in wanted:
-            held = HeldRobot(self.device, robot, self._console, self._alert, self._let_go)
+            held = HeldRobot(self.device, robot, lambda: self.console, self._alert, self._let_go)
             held.on_frame = self._on_frame
             self.robots[robot] = held
             taken.append(held)
@@ -115,6 +116,14 @@ class PersonAgent:
                 ask_emergency(self.device, robot, 0, answers)
             else:
                 held.emergency(answers)
+
+    def ended_by_others(self, robots: Sequence[str]) -> None:
+        """Somebody else at this console sends these robots an emergency."""
+        for robot in robots:
+            held = self.robots.get(robot)
+            if held is not None and held.is_driven:
+                held.end("emergency")
+                self._alert(f"{held.label}: somebody has pressed the emergency stop")
 
     def want(self, number: int, speed: float, turn: float) -> None:
         """What the person wants of all robots alike: shares of their limits, turns to the left."""

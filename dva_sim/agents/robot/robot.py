@@ -214,6 +214,7 @@ class RobotAgent:
         picture_age: How old the picture behind the last command was when it took effect [s],
             by the robot's own clock.
         set_point: What it was told last, and until when.
+        filmed: Told of each frame that it takes, with its id.
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
     """
@@ -235,6 +236,7 @@ class RobotAgent:
         self.applied = self.refused = 0
         self.picture_age: float | None = None
         self.set_point = STAND
+        self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
         self._fared, self._held_since = m.OK, 0.0
@@ -289,6 +291,11 @@ class RobotAgent:
             raise RuntimeError(f"{self.device.label} is driven")
         self._pattern = pattern
         self.inbox.latest_wins = pattern.newest_wins or self._setup.conflates
+
+    @property
+    def stale(self) -> bool:
+        """Whether the newest command of its holder came too late to be obeyed."""
+        return self._fared == m.STALE
 
     @property
     def charge(self) -> float:
@@ -472,6 +479,8 @@ class RobotAgent:
         if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
             return
         frame = CameraFrame(self.observe(), self.device.clock.now)
+        if self.filmed is not None:
+            self.filmed(me, frame)
         if self._setup.encode > 0.0:
             self._encoding = True
             self.device.clock.call_after(self._setup.encode, self._encoded, frame)

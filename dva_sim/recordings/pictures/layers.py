@@ -22,7 +22,8 @@ from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from dva_sim.recordings.pictures import colours, style
-from dva_sim.recordings.pictures.moments import BYSTANDER, FRESH, ROBOT, Moments, kind_of
+from dva_sim.recordings.pictures.colours import BYSTANDER, ROBOT
+from dva_sim.recordings.pictures.moments import FRESH, Moments, kind_of
 from dva_sim.worlds.hazards import Hazard, Raster
 
 LARGER = 1.25  # bodies are drawn a little larger than they are

@@ -32,7 +32,7 @@ from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import SafetyAudit
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
-from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.scenario import Scenario, request_timeout_s
 
 # Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
 OTHERS_HZ = 20.0
@@ -211,6 +211,11 @@ class Run:
                 if i.detected < math.inf
             )
         )
+
+    def be_patient(self, scenario: Scenario) -> None:
+        """From now on everybody waits for answers as long as another scenario's link needs."""
+        for device in self.stage.devices:
+            device.be_patient(request_timeout_s(scenario))
 
     # --- the network -------------------------------------------------------------------
 

@@ -82,7 +82,8 @@ class Stage:
         address: Gives a new device its address, by kind and number.
         time_of_day: See `AgentDevice`.
         cameras: Where the robots' pictures are.
-        patterns: What carries the commands for a robot, by its id, where that was changed.
+        devices: All that were made.
+        pattern_names: What carries the commands for a robot, by its id, where that was changed.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.
@@ -96,7 +97,8 @@ class Stage:
     time_of_day: tuple[float, bool] = (NOON, False)
     labels: dict[str, str] = field(default_factory=dict)
     cameras: Cameras = OVER_ZMQ
-    patterns: dict[str, Callable[[], Pattern]] = field(default_factory=dict)
+    devices: list[AgentDevice] = field(default_factory=list)
+    pattern_names: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.streams = Streams(self.seed)
@@ -127,7 +129,8 @@ class Stage:
 
     def pattern_for(self, robot: str) -> Pattern:
         """What carries the commands of the next drive of a robot, by its id."""
-        return self.patterns.get(robot, self.pattern)()
+        name = self.pattern_names.get(robot, self.scenario.pattern)
+        return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
         """What a robot can do, by its id, as its operator has been taught."""
@@ -136,7 +139,7 @@ class Stage:
 
     def device(self, kind: str, number: int) -> AgentDevice:
         """A new device: its identity and ways to talk."""
-        return AgentDevice(
+        device = AgentDevice(
             id_tag=id_of(kind, number),
             label=label_of(kind, number),
             device_type=TYPES[kind],
@@ -150,6 +153,8 @@ class Stage:
             labels=self.labels,
             time_of_day=self.time_of_day,
         )
+        self.devices.append(device)
+        return device
 
 
 @lru_cache(maxsize=4)
