@@ -1,0 +1,102 @@
+"""Pictures on their way from the process that draws them to the one that serves them.
+
+A record is the length of a header (4 bytes, big-endian), the header as JSON, and a JPEG of as many
+bytes as the header says. Whoever draws may die in the middle of a record and begin again on the
+same pipe, so the reader finds the next whole record by itself.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+MAGIC = b'{"robot":'  # how each header begins
+MOST_HEADER = 512  # bytes
+MOST_PICTURE = 1 << 20  # bytes
+ALIVE = -1  # robot of a record that says only that somebody draws
+
+
+class Picture(NamedTuple):
+    """What a robot's camera shows.
+
+    Attributes:
+        robot: Its index in the scene; `ALIVE` for none.
+        number: Of the frame.
+        captured_ms: When it was taken, virtual time [ms].
+        arrived_ms: When it came over the link, virtual time [ms].
+        jpeg: The picture.
+    """
+
+    robot: int
+    number: int
+    captured_ms: int
+    arrived_ms: int
+    jpeg: bytes
+
+
+def pack(picture: Picture) -> bytes:
+    """A picture as a record."""
+    robot, number, captured, arrived, jpeg = picture
+    header = {"robot": robot, "n": number, "captured_ms": captured, "arrived_ms": arrived}
+    data = json.dumps(header | {"bytes": len(jpeg)}, separators=(",", ":")).encode()
+    return len(data).to_bytes(4, "big") + data + jpeg
+
+
+class Unpacker:
+    """Records out of pieces of bytes.
+
+    Attributes:
+        skipped: Bytes that belonged to no whole record.
+    """
+
+    def __init__(self) -> None:
+        self._rest = bytearray()
+        self.skipped = 0
+
+    def feed(self, data: bytes) -> list[Picture]:
+        """Take some bytes; the pictures that are complete with them."""
+        self._rest += data
+        pictures = []
+        while len(self._rest) >= 4 + len(MAGIC):
+            found = self._first()
+            if found is None:
+                break
+            picture, used = found
+            del self._rest[:used]
+            if picture is not None:
+                pictures.append(picture)
+        return pictures
+
+    def _first(self) -> tuple[Picture | None, int] | None:
+        """The first record and its bytes; no picture if bytes are to be skipped; None to wait."""
+        size = int.from_bytes(self._rest[:4], "big")
+        if size > MOST_HEADER or self._rest[4 : 4 + len(MAGIC)] != MAGIC:
+            return None, self._skip()
+        if len(self._rest) < 4 + size:
+            return None
+        try:
+            header = json.loads(self._rest[4 : 4 + size])
+            names = ("robot", "n", "captured_ms", "arrived_ms", "bytes")
+            robot, number, captured, arrived, length = (int(header[name]) for name in names)
+        except (ValueError, KeyError, TypeError):
+            return None, self._skip()
+        end = 4 + size + length
+        if not 0 <= length <= MOST_PICTURE:
+            return None, self._skip()
+        if self._broken_off(4 + size, end):
+            return None, self._skip()
+        if len(self._rest) < end:
+            return None
+        jpeg = bytes(self._rest[4 + size : end])
+        return Picture(robot, number, captured, arrived, jpeg), end
+
+    def _broken_off(self, start: int, end: int) -> bool:
+        """Whether another record begins where the picture should go on."""
+        return self._rest.find(MAGIC, start, end) >= 0
+
+    def _skip(self) -> int:
+        """How many bytes to leave out up to where a record may begin."""
+        following = self._rest.find(MAGIC, 5)
+        used = following - 4 if following > 0 else max(1, len(self._rest) - len(MAGIC) - 3)
+        self.skipped += used
+        return used

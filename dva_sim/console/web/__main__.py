@@ -1,0 +1,95 @@
+"""The web process by itself: `python -m dva_sim.console.web --fd N`."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import signal
+import sys
+from collections.abc import Sequence
+
+from dva_sim.console.web.access import Entrance, Tokens, rules
+from dva_sim.console.web.app import make_app
+from dva_sim.console.web.camera import Cameras
+from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.server import listen, make_server, serve
+from dva_sim.console.web.simulation import Simulation
+from dva_sim.console.web.static_files import StaticFiles
+from dva_sim.kernel.errors import DvaSimError
+
+FAREWELL = 0.2  # for last words on their way [s]
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    """Serve until the simulation has ended; 0, or 1 if nothing can be served."""
+    options = _parser().parse_args(given)
+    try:
+        asyncio.run(run(options))
+    except DvaSimError as error:
+        print(f"dva-sim: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="dva_sim.console.web", description=__doc__)
+    parser.add_argument("--fd", type=int, required=True, help="socket to the simulation")
+    parser.add_argument("--pictures-fd", type=int, help="socket to who draws pictures")
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
+    parser.add_argument("--port", type=int, default=0, help="0 for any that is free")
+    parser.add_argument("--name", action="append", default=[], help="another name of this machine")
+    parser.add_argument("--no-token", action="store_true", help="everybody may drive")
+    return parser
+
+
+async def run(options: argparse.Namespace) -> None:
+    """Open all, say where, serve, end."""
+    # Ctrl-C reaches all processes of a terminal; the simulation says when it is over.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sock = listen(options.host, options.port)
+    port = sock.getsockname()[1]
+    tokens = Tokens() if options.no_token else Tokens.drawn()
+    access = rules(options.host, port, options.name, tokens)
+    simulation = Simulation()
+    hub = Hub(simulation)
+    cameras = Cameras(simulation, hub.clients.watched)
+    hub.watching = cameras.tell
+    ended = simulation.ended
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
+    await simulation.open(options.fd)
+    simulation.send(serving(access, options.host, port))
+    if options.pictures_fd is not None:
+        await cameras.open(options.pictures_fd)
+    telling = asyncio.ensure_future(cameras.keep_telling())
+    closing = asyncio.ensure_future(_close_when(ended, hub, simulation))
+    app = make_app(access, hub, cameras, StaticFiles())
+    await serve(make_server(app), sock, _after(closing))
+    telling.cancel()
+    cameras.close()
+    simulation.close()
+
+
+async def _close_when(ended: asyncio.Event, hub: Hub, simulation: Simulation) -> None:
+    await ended.wait()
+    await hub.close(simulation.why or "the console was ended")
+    await asyncio.sleep(FAREWELL)
+
+
+def _after(task: asyncio.Task[None]) -> asyncio.Event:
+    done = asyncio.Event()
+    task.add_done_callback(lambda _: done.set())
+    return done
+
+
+def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
+    """What the simulation is told first: where this console is, and its secrets."""
+    shown = "127.0.0.1" if access.any_address and ":" not in host else host
+    base = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/"
+    drive, look = (
+        f"{base}?token={t}" if t else base for t in (access.tokens.drive, access.tokens.look)
+    )
+    return {"do": "serving", "port": port, "base": base, "drive": drive, "look": look}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,244 @@
+"""What is answered under which address, and what stands before all of it: access, and headers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import (
+    HTMLResponse,
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
+
+from dva_sim.console.web.access import Asked, Entrance, Role
+from dva_sim.console.web.camera import Cameras, headers_of
+from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.rest import NOT_KEPT, Rest, TooStrange, problem
+from dva_sim.console.web.static_files import StaticFiles
+from dva_sim.console.web.streaming import PictureStream
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
+)
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+OPEN = "/healthz"
+_ROLE = "dva_sim.role"
+_WORDS = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>dva-sim console</title></head>
+<body><h1>This console asks for its token</h1>
+<p>Open the address that <code>dva-sim console</code> printed on the line that begins with
+<code>Console:</code>. It ends with <code>?token=</code> and the token.</p>
+<p>If you have just done so: <a href="/">go on</a>.</p></body></html>
+"""
+_NO_PAGE = "<!doctype html><title>dva-sim console</title><p>The pages are not installed.</p>"
+
+
+class Doorkeeper:
+    """Stands before the application: refuses, finds the role, and sets headers on each answer.
+
+    Args:
+        app: What is guarded.
+        access: The rules.
+    """
+
+    def __init__(self, app: ASGIApp, access: Entrance) -> None:
+        self._app, self._access = app, access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] in _STARTS:
+                message["headers"] = _with_headers(message.get("headers", ()))
+            await send(message)
+
+        answer = self._refusal(scope)
+        if answer is None:
+            await self._app(scope, receive, send_with_headers)
+        elif scope["type"] == "http":
+            await answer(scope, receive, send_with_headers)
+        else:
+            ws = WebSocket(scope, receive, send_with_headers)
+            await ws.send_denial_response(answer)
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        """The answer to whoever may not ask; else the role is noted in the scope."""
+        asking = HTTPConnection(scope)
+        headers = asking.headers
+        told = self._access.refusal(_asked(scope, headers))
+        if told is not None:
+            return PlainTextResponse(told[1] + "\n", told[0], headers=NOT_KEPT)
+        scope[_ROLE] = role = self._access.role(headers, asking.query_params)
+        if role is Role.NOBODY and scope["path"] != OPEN:
+            return _unknown(scope["path"])
+        return None
+
+
+_STARTS = ("http.response.start", "websocket.accept", "websocket.http.response.start")
+
+
+def _with_headers(headers: Any) -> list[tuple[bytes, bytes]]:
+    given = {name.lower() for name, _ in headers}
+    more = [(k.lower().encode(), v.encode()) for k, v in HEADERS.items()]
+    return [*headers, *(pair for pair in more if pair[0] not in given)]
+
+
+def _asked(scope: Scope, headers: Any) -> Asked:
+    hosts = headers.getlist("host")
+    is_http = scope["type"] == "http"
+    return Asked(
+        host=hosts[0] if len(hosts) == 1 else "",
+        origin=headers.get("origin"),
+        site=headers.get("sec-fetch-site", "").lower(),
+        mode=headers.get("sec-fetch-mode", "").lower(),
+        scheme="https" if scope.get("scheme") in ("https", "wss") else "http",
+        changes=not is_http or scope["method"] not in ("GET", "HEAD"),
+        is_page=scope["path"] == "/",
+    )
+
+
+def _unknown(path: str) -> Response:
+    if path == "/":
+        return HTMLResponse(_WORDS, 401, headers=NOT_KEPT)
+    if path.startswith("/api/"):
+        return problem(401, "this console asks for its token")
+    return PlainTextResponse("this console asks for its token\n", 401, headers=NOT_KEPT)
+
+
+class Pages:
+    """The page, its files, its pictures, and whether all is well.
+
+    Args:
+        access: Knows the cookie.
+        hub: Knows the simulation.
+        cameras: Pictures.
+        files: Of the page.
+    """
+
+    def __init__(self, access: Entrance, hub: Hub, cameras: Cameras, files: StaticFiles) -> None:
+        self._access, self._simulation, self._cameras = access, hub.simulation, cameras
+        self._files = files
+
+    async def index(self, request: Request) -> Response:
+        """`GET /`; a token in the address becomes a cookie and leaves the address."""
+        token = request.query_params.get("token")
+        if token is not None:
+            answer = RedirectResponse("/", 303, headers=NOT_KEPT)
+            role = self._access.tokens.role_of(token)
+            if self._access.tokens.are_asked and role is not Role.NOBODY:
+                answer.headers["Set-Cookie"] = self._access.cookie_for(role)
+            return answer
+        found = self._files.find("index.html")
+        return HTMLResponse(found.data if found else _NO_PAGE, headers=NOT_KEPT)
+
+    async def file(self, request: Request) -> Response:
+        """`GET /static/NAME`."""
+        found = self._files.find(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        headers = {"ETag": found.tag, "Cache-Control": "no-cache"}
+        if found.tag in request.headers.get("if-none-match", ""):
+            return Response(status_code=304, headers=headers)
+        return Response(found.data, headers=headers, media_type=found.kind)
+
+    async def health(self, _: Request) -> Response:
+        """`GET /healthz`: whether the simulation runs."""
+        runs = self._simulation.runs
+        body = {"status": "ok" if runs else "the simulation does not run"}
+        return JSONResponse(body, 200 if runs else 503, headers=NOT_KEPT)
+
+    async def stream(self, request: Request) -> Response:
+        """`GET /camera/LABEL.mjpg`."""
+        robot = self._robot(request)
+        if not self._cameras.draws:
+            return problem(503, "no picture: nobody draws")
+        if self._cameras.is_full():
+            return problem(503, "64 viewers are looking already")
+        return PictureStream(self._cameras, robot)
+
+    async def still(self, request: Request) -> Response:
+        """`GET /camera/LABEL.jpg`."""
+        robot = self._robot(request)
+        picture = None if self._cameras.is_full() else await self._cameras.one(robot)
+        if picture is None:
+            return problem(503, "no picture")
+        headers = headers_of(picture) | NOT_KEPT
+        return Response(picture.jpeg, headers=headers, media_type="image/jpeg")
+
+    def _robot(self, request: Request) -> int:
+        """The robot whose label is asked for: one of the scene's, or nothing is found."""
+        robot: int | None = self._simulation.labels.get(request.path_params["label"])
+        if robot is None:
+            raise HTTPException(404)
+        return robot
+
+
+async def _strange(_: Request, error: Exception) -> Response:
+    assert isinstance(error, TooStrange)
+    return problem(error.status, str(error))
+
+
+async def _status(_: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    text = f"{error.detail}\n".lower()
+    return PlainTextResponse(text, error.status_code, headers=dict(error.headers or {}) | NOT_KEPT)
+
+
+def _for_drivers(endpoint: Any) -> Any:
+    """An endpoint that acts, for those who may."""
+
+    async def guarded(request: Request) -> Response:
+        if request.scope[_ROLE] is not Role.DRIVE:
+            return problem(403, "this token may only look")
+        answer: Response = await endpoint(request)
+        return answer
+
+    return guarded
+
+
+def make_app(access: Entrance, hub: Hub, cameras: Cameras, files: StaticFiles) -> ASGIApp:
+    """The whole application."""
+    pages, rest = Pages(access, hub, cameras, files), Rest(hub)
+
+    async def see(ws: WebSocket) -> None:
+        await hub.see(ws, ws.scope[_ROLE])
+
+    async def drive(ws: WebSocket) -> None:
+        await hub.drive(ws, ws.scope[_ROLE])
+
+    routes = [
+        Route("/", pages.index),
+        Route("/static/{name:path}", pages.file),
+        Route(OPEN, pages.health),
+        Route("/camera/{label}.mjpg", pages.stream),
+        Route("/camera/{label}.jpg", pages.still),
+        Route("/api/state", rest.state),
+        Route("/api/site", rest.site),
+        Route("/api/story", rest.story),
+        Route("/api/actions", _for_drivers(rest.action), methods=["POST"]),
+        Route("/api/emergency", _for_drivers(rest.emergency), methods=["POST"]),
+        WebSocketRoute("/ws/state", see),
+        WebSocketRoute("/ws/drive", drive),
+    ]
+    handlers: Any = {TooStrange: _strange, HTTPException: _status}
+    return Doorkeeper(Starlette(routes=routes, exception_handlers=handlers), access)

@@ -1,0 +1,184 @@
+"""Pictures of robots' cameras as streams that any browser or player shows.
+
+A picture is drawn once, whoever looks; while nobody looks, nothing is drawn. A slow viewer gets
+the newest picture when it is ready for one, and never those between.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import AsyncGenerator, Callable, Iterable
+
+from dva_sim.console.frames import ALIVE, Picture, Unpacker
+from dva_sim.console.web.pipes import PipeEnd
+from dva_sim.console.web.simulation import Simulation
+
+BOUNDARY = "dva-sim-frame"
+LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
+SILENCE = 3.0  # of who draws, after which there is no picture [s]
+STARTING = 20.0  # before the first word [s]
+REPEATED = 1.0  # so often is said again who is watched [s]
+ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
+FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
+MOST_VIEWERS = 64
+
+
+class Cameras:
+    """The newest picture of each robot that is looked at.
+
+    Args:
+        simulation: The simulation, which is told who is watched.
+        said: Who is watched by pages that say so.
+
+    Attributes:
+        skipped: Pictures that viewers were too slow for.
+    """
+
+    def __init__(self, simulation: Simulation, said: Callable[[], Iterable[int]]) -> None:
+        self._simulation, self._said = simulation, said
+        self._pipe = PipeEnd(self._take, self._ended)
+        self._unpacker = Unpacker()
+        self._newest: dict[int, tuple[Picture, float]] = {}
+        self._drawn = asyncio.Condition()
+        self._viewers: Counter[int] = Counter()
+        self._told: frozenset[int] = frozenset()
+        self._deadline = 0.0
+        self._ok = True
+        self._notified: set[asyncio.Task[None]] = set()
+        self.skipped = 0
+
+    async def open(self, number: int) -> None:
+        """Use the pipe of that number."""
+        await self._pipe.open(number)
+        self._deadline = time.monotonic() + STARTING
+
+    # --- pictures in ---------------------------------------------------------------------
+
+    def _take(self, data: bytes) -> None:
+        now = time.monotonic()
+        self._deadline = max(self._deadline, now + SILENCE)
+        for picture in self._unpacker.feed(data):
+            if picture.robot != ALIVE:
+                self._newest[picture.robot] = picture, now
+        task = asyncio.ensure_future(self._notify())
+        self._notified.add(task)
+        task.add_done_callback(self._notified.discard)
+
+    async def _notify(self) -> None:
+        async with self._drawn:
+            self._drawn.notify_all()
+
+    def _ended(self) -> None:
+        """Who draws is gone; the stream says so by its silence."""
+
+    @property
+    def draws(self) -> bool:
+        """Whether somebody is there who draws."""
+        return self._pipe.is_open and time.monotonic() < self._deadline
+
+    # --- who looks -----------------------------------------------------------------------
+
+    async def keep_telling(self) -> None:
+        """Say again and again who is watched: whoever draws may have begun anew."""
+        while True:
+            self.tell(again=True)
+            if self.draws != self._ok:
+                self._ok = self.draws
+                text = "" if self._ok else "no picture: nobody draws"
+                line = {"k": "pictures", "ok": self._ok, "text": text}
+                self._simulation.changed(self._simulation.state.take(line), line)
+            await asyncio.sleep(REPEATED)
+
+    def tell(self, again: bool = False) -> None:
+        """Say who is watched, if that is new."""
+        robots = frozenset(self._viewers) | frozenset(self._said())
+        new = robots != self._told
+        if new:
+            self._told = robots
+            self._simulation.send({"do": "watch", "robots": sorted(robots)})
+        if new or (again and robots):
+            self._pipe.send({"do": "watch", "watch": sorted(robots)})
+
+    def _look(self, robot: int) -> None:
+        self._viewers[robot] += 1
+        self.tell()
+
+    def _look_away(self, robot: int) -> None:
+        asyncio.get_running_loop().call_later(LINGERS, self._away, robot)
+
+    def _away(self, robot: int) -> None:
+        self._viewers[robot] -= 1
+        if not self._viewers[robot]:
+            del self._viewers[robot]
+            self._newest.pop(robot, None)
+        self.tell()
+
+    def is_full(self) -> bool:
+        """Whether nobody more may look."""
+        return self._viewers.total() >= MOST_VIEWERS
+
+    # --- pictures out --------------------------------------------------------------------
+
+    async def stream(self, robot: int) -> AsyncGenerator[bytes, None]:
+        """Pictures of a robot as parts of a response, each newer than the one before."""
+        self._look(robot)
+        try:
+            yield f"--{BOUNDARY}\r\n".encode()
+            shown: Picture | None = None
+            while True:
+                picture = await self._after(robot, shown)
+                if shown is not None and picture.number > shown.number + 1:
+                    self.skipped += picture.number - shown.number - 1
+                shown = picture
+                yield part(picture)
+        finally:
+            self._look_away(robot)
+
+    async def one(self, robot: int) -> Picture | None:
+        """The newest picture of a robot; None if there is none for too long."""
+        known = self._newest.get(robot)
+        if known is not None and time.monotonic() - known[1] < FRESH:
+            return known[0]
+        self._look(robot)
+        try:
+            async with asyncio.timeout(ONE_WITHIN if self.draws else 0.0):
+                return await self._after(robot, known[0] if known else None)
+        except TimeoutError:
+            return None
+        finally:
+            self._look_away(robot)
+
+    async def _after(self, robot: int, shown: Picture | None) -> Picture:
+        """The newest picture once it is another one."""
+
+        def is_new() -> bool:
+            return robot in self._newest and self._newest[robot][0] is not shown
+
+        async with self._drawn:
+            await self._drawn.wait_for(is_new)
+        return self._newest[robot][0]
+
+    def close(self) -> None:
+        """Take no more pictures."""
+        self._pipe.close()
+
+
+def part(picture: Picture) -> bytes:
+    """A picture as a part of a multipart response, with the boundary behind it.
+
+    A viewer shows a picture when it knows that it is whole: the next boundary says so at once.
+    """
+    head = "".join(f"{name}: {value}\r\n" for name, value in headers_of(picture).items())
+    head += f"Content-Type: image/jpeg\r\nContent-Length: {len(picture.jpeg)}\r\n\r\n"
+    return head.encode() + picture.jpeg + f"\r\n--{BOUNDARY}\r\n".encode()
+
+
+def headers_of(picture: Picture) -> dict[str, str]:
+    """What a picture says about itself, in virtual time [ms]."""
+    return {
+        "X-Frame-Number": str(picture.number),
+        "X-Frame-Time-Ms": str(picture.captured_ms),
+        "X-Arrived-Ms": str(picture.arrived_ms),
+    }

@@ -1,0 +1,117 @@
+"""What one page gets next: never a queue, always the newest of what it does not have yet.
+
+Positions merge (a page that slept gets all who moved meanwhile, once), other kinds are replaced by
+their newest line, the story is a bounded list: who is too far behind gets a snapshot instead. What
+is meant for this page alone waits in a short list.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from dva_sim.console.web.state import LATEST, RunState, Versioned, body_of
+
+OWN_KEPT = 64  # lines for one page alone that may wait
+
+Sources = tuple[str, ...]
+SOURCES: Sources = ("seat", "d", *LATEST, "story", "others")
+
+
+class PageFeed:
+    """What a page has, and so what it lacks.
+
+    Args:
+        state: Of the run.
+        seat: Of this page; its lines come in full.
+    """
+
+    def __init__(self, state: RunState, seat: str) -> None:
+        self._state, self._seat = state, seat
+        self._own: deque[str] = deque()
+        self._count, self._turn = 0, 0
+        self._wants_snapshot = True
+        self._have: dict[str, int] = {}
+        self._have_seats: dict[str, int] = {}
+        self._have_places, self._have_story, self._have_scene = 0, 0, -1
+
+    def resync(self) -> None:
+        """Begin again with all there is."""
+        self._wants_snapshot = True
+
+    def put(self, line: dict[str, object]) -> bool:
+        """Add a line for this page alone; False if too many wait, as of a page that is not read."""
+        if len(self._own) >= OWN_KEPT:
+            return False
+        self._own.append(body_of(line))
+        return True
+
+    def next(self) -> str | None:
+        """The next message, as JSON; None if the page has everything."""
+        body = self._next_body()
+        if body is None:
+            return None
+        self._count += 1
+        return f'{{"s":{self._count},{body}'
+
+    def _next_body(self) -> str | None:
+        if self._own:
+            return self._own.popleft()
+        if self._wants_snapshot or self._have_scene != self._state.scene_version:
+            return self._snapshot()
+        # Each source has its turn, so that a fast one does not starve the others of a slow page.
+        for step in range(len(SOURCES)):
+            turn = (self._turn + step) % len(SOURCES)
+            if (body := self._from(SOURCES[turn])) is not None:
+                self._turn = (turn + 1) % len(SOURCES)
+                return body
+        return None
+
+    def _snapshot(self) -> str:
+        state = self._state
+        self._wants_snapshot, self._have_scene = False, state.scene_version
+        self._have = {kind: known.version for kind, known in state.latest.items()}
+        self._have_places, self._have_story = state.place_version, state.told
+        self._have_seats = {seat: known.version for seat, known in state.seats_short.items()}
+        self._have.pop("seat", None)
+        return state.snapshot()
+
+    def _from(self, source: str) -> str | None:
+        if source == "d":
+            return self._moved()
+        if source == "story":
+            return self._told()
+        if source == "others":
+            return self._others()
+        if source == "seat":
+            return self._newer("seat", self._state.seats.get(self._seat))
+        return self._newer(source, self._state.latest.get(source))
+
+    def _newer(self, kind: str, known: Versioned | None) -> str | None:
+        if known is None or known.version <= self._have.get(kind, 0):
+            return None
+        self._have[kind] = known.version
+        return known.body
+
+    def _moved(self) -> str | None:
+        state = self._state
+        if state.place_version <= self._have_places:
+            return None
+        since, self._have_places = self._have_places, state.place_version
+        return state.moved_since(since)
+
+    def _told(self) -> str | None:
+        state = self._state
+        missing = state.told - self._have_story
+        if missing <= 0:
+            return None
+        if missing > len(state.story):
+            return self._snapshot()
+        self._have_story += 1
+        return body_of(state.story[-missing])
+
+    def _others(self) -> str | None:
+        for seat, known in self._state.seats_short.items():
+            if seat != self._seat and known.version > self._have_seats.get(seat, 0):
+                self._have_seats[seat] = known.version
+                return known.body
+        return None

@@ -1,0 +1,212 @@
+"""The two WebSockets of a page: what it sees, and what it does.
+
+Seeing and driving have a socket each, so that a page that draws slowly still stops at once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from typing import Any
+
+from starlette.responses import PlainTextResponse
+from starlette.websockets import WebSocket
+
+from dva_sim.console.web.access import Role
+from dva_sim.console.web.actions import Bucket, Refused, asked_of, id_of, read, robots
+from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
+from dva_sim.console.web.simulation import Simulation
+from dva_sim.console.web.sockets import heard, say, wire_of
+from dva_sim.console.web.state import body_of, encode
+
+LOOKS_RATE, LOOKS_BURST = 20.0, 60  # messages of a page that looks [1/s]
+DRIVES_RATE, DRIVES_BURST = 150.0, 300  # of one that drives [1/s]
+TOO_MUCH, NONSENSE, STUCK, LEAVING = 1008, 1008, 1013, 1001
+
+Next = Callable[[], str | None]
+Hear = Callable[[str], Awaitable[None]]
+
+
+class Hub:
+    """All pages and their sockets.
+
+    Args:
+        simulation: The simulation.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self.clients = Clients(simulation.state)
+        self.watching: Callable[[], None] = lambda: None
+        self._open: set[WebSocket] = set()
+        self._later: set[asyncio.Task[None]] = set()
+        simulation.changed = self._changed
+
+    def _changed(self, kind: str, line: dict[str, Any]) -> None:
+        """Something is new: who drives gets the newest of its seat at once."""
+        if kind == "seat":
+            client = self.clients.find(str(line["seat"]))
+            if client is not None and client.driver is not None:
+                client.driver.seat("{" + body_of(line))
+        self.clients.wake()
+
+    # --- seeing --------------------------------------------------------------------------
+
+    async def see(self, ws: WebSocket, role: Role) -> None:
+        """Serve a state socket until it closes."""
+        if self.clients.is_full():
+            await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
+            return
+        client = self.clients.join(role, ws.query_params.get("client", ""))
+        visit = client.visit
+        await ws.accept()
+        client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
+
+        async def hear(text: str) -> None:
+            self._hear_looker(client, text)
+
+        def following() -> str | None:
+            return client.feed.next() if client.visit == visit else None
+
+        await self._serve(ws, client.wake, following, hear, Bucket(LOOKS_RATE, LOOKS_BURST))
+        if client.visit == visit:
+            self._leave(client)
+
+    def _hear_looker(self, client: Client, text: str) -> None:
+        said = read(text)
+        what = said.get("do")
+        if what == "ping":
+            line = {"k": "pong", "at": said.get("at"), "now": round(time.time() * 1000, 3)}
+            client.feed.put(line)
+        elif what == "resync":
+            client.feed.resync()
+        elif what == "watch":
+            client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
+            self.watching()
+        else:
+            raise Refused("no such message; there are: ping, resync, watch")
+        client.wake.set()
+
+    def _leave(self, client: Client) -> None:
+        """A page is gone: its robots stop, and after a while others may have them."""
+        self.clients.leave(client)
+        self.watching()
+        if client.role is Role.DRIVE:
+            self.simulation.send({"client": client.name, "do": "gone"})
+        task = asyncio.ensure_future(self._forget(client))
+        self._later.add(task)
+        task.add_done_callback(self._later.discard)
+
+    async def _forget(self, client: Client) -> None:
+        await asyncio.sleep(REMEMBERED)
+        if self.clients.forget(client) and client.role is Role.DRIVE:
+            self.simulation.send(
+                {"id": f"bye-{client.name}", "client": client.name, "do": "release"}
+            )
+            self.simulation.state.forget_seat(client.name)
+
+    # --- driving -------------------------------------------------------------------------
+
+    async def drive(self, ws: WebSocket, role: Role) -> None:
+        """Serve a driving socket until it closes; then its robots stop."""
+        client = self.clients.find(ws.query_params.get("client", ""))
+        if role is not Role.DRIVE or client is None or client.role is not Role.DRIVE:
+            why = "may only look" if role is Role.LOOK else "no page of that name is open"
+            await ws.send_denial_response(PlainTextResponse(why, 403))
+            return
+        self._replace(client)
+        driver = client.driver = Driver()
+        if known := self.simulation.state.seats.get(client.name):
+            driver.seat("{" + known.body)
+        await ws.accept()
+
+        async def hear(text: str) -> None:
+            self._hear_driver(client, driver, text)
+
+        try:
+            await self._serve(ws, driver.wake, driver.next, hear, Bucket(DRIVES_RATE, DRIVES_BURST))
+        finally:
+            if client.driver is driver:
+                client.driver = None
+                self.simulation.send({"client": client.name, "do": "gone"})
+
+    def _replace(self, client: Client) -> None:
+        """A page has one driving socket; the newest counts, and begins at rest."""
+        if client.driver is not None:
+            client.driver.replaced = True
+            client.driver.wake.set()
+            self.simulation.send({"client": client.name, "do": "gone"})
+
+    def _hear_driver(self, client: Client, driver: Driver, text: str) -> None:
+        if driver.replaced:
+            return
+        said = read(text)
+        name, key = said.pop("do", None), said.pop("id", None)
+        try:
+            asked = asked_of(name, said, self.simulation.labels, silent=True)
+            asked["client"] = client.name
+            if name in ("input", "gone"):
+                self.simulation.send(asked)
+                return
+            asked["id"] = id_of(key)
+            self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
+        except Refused as error:
+            line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
+            driver.answer(encode(line | {"text": str(error)}))
+
+    # --- both ----------------------------------------------------------------------------
+
+    async def _serve(
+        self, ws: WebSocket, wake: asyncio.Event, following: Next, hear: Hear, bucket: Bucket
+    ) -> None:
+        """Send and receive until one of both ends; nothing of it is left behind."""
+        self._open.add(ws)
+        tasks = [
+            asyncio.ensure_future(self._send(ws, wake, following)),
+            asyncio.ensure_future(self._receive(ws, hear, bucket)),
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._open.discard(ws)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _send(self, ws: WebSocket, wake: asyncio.Event, following: Next) -> None:
+        """One message at a time; the next one is chosen when there is room for it."""
+        with suppress(Exception):
+            while True:
+                wake.clear()
+                text = following()
+                if text is None:
+                    await wake.wait()
+                elif not await say(ws, text):
+                    wire_of(ws).drop(STUCK, "nothing was read for 5 s")
+                    return
+
+    async def _receive(self, ws: WebSocket, hear: Hear, bucket: Bucket) -> None:
+        """Messages of a page, as long as they make sense and are not too many."""
+        while (text := await heard(ws)) is not None:
+            if not bucket.takes(time.monotonic()):
+                wire_of(ws).drop(TOO_MUCH, "too many messages")
+                return
+            try:
+                await hear(text)
+            except Refused as error:
+                wire_of(ws).drop(NONSENSE, str(error)[:100])
+                return
+
+    async def close(self, why: str) -> None:
+        """Tell all pages that it is over."""
+        line = encode({"k": "bye", "why": why})
+        for ws in list(self._open):
+            wire = wire_of(ws)
+            if not wire.waiting:
+                with suppress(Exception):
+                    await ws.send_text(line)
+            wire.drop(LEAVING, "the console has ended")
+        for task in list(self._later):
+            task.cancel()

@@ -1,0 +1,197 @@
+"""State and actions for programs: what a page sees and does, by plain requests."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from typing import Any
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
+
+from dva_sim.console.web.actions import MOST_BYTES, Refused, asked_of, id_of, read
+from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.state import RunState
+from dva_sim.worlds.geo import GeoFrame
+
+NOT_KEPT = {"Cache-Control": "no-store"}
+PROGRAM = "rest"  # the client of all requests that come from no page
+
+
+def state_of(state: RunState, clients: int) -> dict[str, Any]:
+    """The newest of everything, with units in the names."""
+    rows = state.lines.get("rows", {})
+    told = {row["i"]: row for row in rows.get("robots", ())}
+    doing = {row["i"]: row for row in rows.get("people", ())}
+    robots, people = [], []
+    for thing in (state.scene or {}).get("things", ()):
+        place = _place(state, thing["i"])
+        about = {"label": thing["label"], "id": thing["id"], "kind": thing["kind"]}
+        more = told if thing["kind"] == "robot" else doing
+        entry = about | place | _without(more.get(thing["i"], {}), "i")
+        if thing["kind"] == "robot":
+            robots.append(entry)
+        elif thing["kind"] != "dva":
+            people.append(entry)
+    return {
+        "time_s": state.time / 1000,
+        "scenario": (state.scene or {}).get("scenario"),
+        "clock": rows.get("clock"),
+        "link": rows.get("link"),
+        "robots": robots,
+        "people": people,
+        "hazards": state.lines.get("hazards", {}).get("hazards", []),
+        "events": state.lines.get("events", {}).get("events", []),
+        "seats": state.seats_known(),
+        "clients": clients,
+        "dropped": rows.get("dropped", 0),
+    }
+
+
+def _place(state: RunState, index: int) -> dict[str, float]:
+    """Where somebody is; empty if off the site."""
+    row = state.places.get(index)
+    if row is None:
+        return {}
+    _, x_cm, y_cm, heading, speed = row
+    x, y = x_cm / 100, y_cm / 100
+    place = {"x_m": x, "y_m": y}
+    if (frame := frame_of(state)) is not None:
+        latitude, longitude = frame.to_latlon(x, y)
+        place |= {"latitude_deg": round(latitude, 8), "longitude_deg": round(longitude, 8)}
+    return place | {"heading_rad": heading / 1000, "speed_mps": speed / 1000}
+
+
+def frame_of(state: RunState) -> GeoFrame | None:
+    """Where on earth the site lies."""
+    origin = (state.scene or {}).get("site", {}).get("origin")
+    return GeoFrame(origin["latitude_deg"], origin["longitude_deg"]) if origin else None
+
+
+def _without(row: dict[str, Any], *names: str) -> dict[str, Any]:
+    return {key: value for key, value in row.items() if key not in names}
+
+
+class Rest:
+    """The requests of programs.
+
+    Args:
+        hub: Of the pages; knows the simulation.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub, self._simulation = hub, hub.simulation
+
+    async def state(self, _: Request) -> Response:
+        """`GET /api/state`."""
+        body = state_of(self._simulation.state, len(self._hub.clients.here()))
+        return JSONResponse(body, headers=NOT_KEPT)
+
+    async def site(self, request: Request) -> Response:
+        """`GET /api/site`: the plan, which does not change."""
+        scene = self._simulation.state.scene
+        if scene is None:
+            return problem(503, "the simulation has not begun")
+        response = JSONResponse(scene["site"])
+        tag = f'"{hashlib.sha256(response.body).hexdigest()[:32]}"'
+        headers = {"ETag": tag, "Cache-Control": "no-cache"}
+        if tag in request.headers.get("if-none-match", ""):
+            return Response(status_code=304, headers=headers)
+        response.headers.update(headers)
+        return response
+
+    async def story(self, request: Request) -> Response:
+        """`GET /api/story?from=N`: lines from a number on, as far as they are kept."""
+        state = self._simulation.state
+        asked = request.query_params.get("from", "0")
+        if not asked.isascii() or not asked.isdigit() or len(asked) > 9:
+            return problem(400, "from should be a whole number")
+        oldest = state.told - len(state.story)
+        first = min(max(int(asked), oldest), state.told)
+        lines = list(state.story)[first - oldest :]
+        body = {"from": first, "next": state.told, "lines": lines}
+        return JSONResponse(body, headers=NOT_KEPT)
+
+    async def action(self, request: Request) -> Response:
+        """`POST /api/actions`."""
+        try:
+            said = await body_of_request(request)
+            if said.get("action") == "gone":
+                return self._gone(said)
+            asked = asked_of(said.get("action"), said.get("arguments", {}), self._simulation.labels)
+            return await self._do(asked, said)
+        except Refused as error:
+            return problem(400, str(error))
+
+    async def emergency(self, request: Request) -> Response:
+        """`POST /api/emergency`: all robots, or some; before all else."""
+        try:
+            said = await body_of_request(request)
+            said.setdefault("id", secrets.token_hex(8))
+            given = {"robots": said.get("robots", "all")}
+            return await self._do(asked_of("emergency", given, self._simulation.labels), said)
+        except Refused as error:
+            return problem(400, str(error))
+
+    def _gone(self, said: dict[str, Any]) -> Response:
+        """A page says with its last breath that it goes; nothing is answered to that."""
+        self._simulation.send({"do": "gone", "client": self._client(said)})
+        return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
+
+    def _client(self, said: dict[str, Any]) -> str:
+        """Who asks: a page that is open, or a program.
+
+        Raises:
+            Refused: no such page.
+        """
+        name = said.get("client", PROGRAM)
+        if name != PROGRAM and (not isinstance(name, str) or self._hub.clients.find(name) is None):
+            raise Refused("client: no page of that name is open")
+        return str(name)
+
+    async def _do(self, asked: dict[str, Any], said: dict[str, Any]) -> Response:
+        """Ask the simulation, and wait until it has answered."""
+        asked["client"] = self._client(said)
+        asked["id"] = id_of(said.get("id"))
+        line = await self._simulation.answer(asked)
+        body = {"id": line["id"], "ok": bool(line.get("ok")), "text": line.get("text", "")}
+        return JSONResponse(body, 504 if line.get("late") else 200, headers=NOT_KEPT)
+
+
+async def body_of_request(request: Request) -> dict[str, Any]:
+    """The JSON object in a body that is not too long.
+
+    Raises:
+        Refused: it is something else.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != "application/json":
+        raise TooStrange(415, "the content type should be application/json")
+    length = request.headers.get("content-length", "0")
+    if length.isdigit() and int(length) > MOST_BYTES:
+        raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
+    data = bytearray()
+    try:
+        async for piece in request.stream():
+            data += piece
+            if len(data) > MOST_BYTES:
+                raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
+    except ClientDisconnect:
+        raise TooStrange(400, "the body is not whole") from None
+    try:
+        return read(bytes(data))
+    except Refused as error:
+        raise Refused(f"the body {error}") from None
+
+
+class TooStrange(Exception):
+    """A request that is answered by its status; not for want of sense in what it asks."""
+
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+def problem(status: int, text: str) -> Response:
+    """An answer that says in one line why nothing was done."""
+    return JSONResponse({"ok": False, "text": text}, status, headers=NOT_KEPT)

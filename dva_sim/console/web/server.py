@@ -1,0 +1,110 @@
+"""The server: its socket, its limits, its silence, and its end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import Iterator
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from dva_sim.console.web.actions import MOST_BYTES
+from dva_sim.console.web.sockets import WireProtocol
+from dva_sim.kernel.errors import ConfigError
+
+WAITING = 128  # connections that are not accepted yet
+MOST_CONNECTIONS = 400
+SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
+SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
+PING = 10.0  # [s]
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A listening socket, so that its port is known before anything is served.
+
+    Raises:
+        ConfigError: the address is not of this machine, or taken.
+    """
+    try:
+        found = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
+        family, kind, protocol, _, address = found[0]
+        sock = socket.socket(family, kind, protocol)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(address)
+    except OSError as error:
+        raise ConfigError(f"cannot listen on {host} port {port}: {error.strerror}") from error
+    # Connections inherit these.
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_MS)
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.listen(WAITING)
+    sock.setblocking(False)
+    return sock
+
+
+class Server(uvicorn.Server):
+    """A server that is ended by whoever started it, not by signals of its own."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave signals to the process."""
+        yield
+
+
+def make_server(app: ASGIApp) -> Server:
+    """The server of an application."""
+    logger = logging.getLogger("uvicorn.error")
+    logger.handlers, logger.propagate = [_OneLine()], False
+    logger.setLevel(logging.WARNING)
+    config = uvicorn.Config(
+        app,
+        http="h11",
+        ws=WireProtocol,
+        ws_max_size=MOST_BYTES,
+        ws_ping_interval=PING,
+        ws_ping_timeout=PING,
+        ws_per_message_deflate=False,
+        lifespan="off",
+        loop="asyncio",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        limit_concurrency=MOST_CONNECTIONS,
+        timeout_keep_alive=15,
+        timeout_graceful_shutdown=0,
+        h11_max_incomplete_event_size=MOST_BYTES,
+    )
+    return Server(config)
+
+
+class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]
+    """A mistake of ours in full; what a client sent, and what a server says at its end, not."""
+
+    NOISE = (
+        "Invalid",
+        "Cancel",
+        "Exceeded",
+        "Unsupported",
+        "No supported",
+        "ASGI callable returned",
+    )
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not record.getMessage().startswith(self.NOISE):
+            super().emit(record)
+
+
+async def serve(server: Server, sock: socket.socket, ended: asyncio.Event) -> None:
+    """Serve until the end."""
+    serving = asyncio.ensure_future(server.serve(sockets=[sock]))
+    waiting = asyncio.ensure_future(ended.wait())
+    await asyncio.wait({serving, waiting}, return_when=asyncio.FIRST_COMPLETED)
+    server.should_exit = True
+    waiting.cancel()
+    await serving

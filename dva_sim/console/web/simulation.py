@@ -1,0 +1,127 @@
+"""What the web process knows of the simulation, and asks of it: state, and answers to come.
+
+An answer belongs to the id of its question. Whoever repeats a question waits for the same answer;
+the simulation does what is asked once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.console.web.actions import Labels
+from dva_sim.console.web.outbox import Asked
+from dva_sim.console.web.pipes import Lines, PipeEnd
+from dva_sim.console.web.state import RunState
+
+PATIENCE = 5.0  # for an answer [s]
+SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
+MOST_PENDING = 256  # questions without an answer
+
+Answer = dict[str, Any]
+Told = Callable[[Answer], object]
+
+
+class Simulation:
+    """The simulation, as seen from here.
+
+    Attributes:
+        state: The newest of everything.
+        ended: Set when the simulation has ended.
+        why: Why it did.
+        labels: Of the robots, with their indices in the scene.
+        kinds: Called with each line's kind when the state has changed.
+    """
+
+    def __init__(self) -> None:
+        self.state = RunState()
+        self.ended = asyncio.Event()
+        self.why = ""
+        self.labels: Labels = {}
+        self.changed: Callable[[str, dict[str, Any]], None] = lambda kind, line: None
+        self._lines = Lines()
+        self._pipe = PipeEnd(self._take, self._end)
+        self._heard = time.monotonic()
+        self._pending: dict[str, list[Told]] = {}
+
+    async def open(self, number: int) -> None:
+        """Use the pipe of that number."""
+        await self._pipe.open(number)
+
+    @property
+    def runs(self) -> bool:
+        """Whether the simulation is there and, once it has begun, still speaks."""
+        speaks = self.state.scene is None or time.monotonic() - self._heard < SILENCE
+        return self._pipe.is_open and not self.ended.is_set() and speaks
+
+    # --- what it says --------------------------------------------------------------------
+
+    def _take(self, data: bytes) -> None:
+        self._heard = time.monotonic()
+        try:
+            for text in self._lines.feed(data):
+                self._take_line(json.loads(text))
+        except (ValueError, KeyError, TypeError, IndexError) as error:
+            self.why = f"the simulation said what nobody understands: {error}"
+            self._end()
+
+    def _take_line(self, line: dict[str, Any]) -> None:
+        kind = line.get("k")
+        if kind == "done":
+            self._answer(line)
+            return
+        if kind == "bye":
+            self.why = str(line.get("why", ""))
+            self._end()
+            return
+        kind = self.state.take(line)
+        if kind == "scene":
+            things = line.get("things", ())
+            self.labels = {str(t["label"]): t["i"] for t in things if t["kind"] == "robot"}
+        self.changed(kind, line)
+
+    def _end(self) -> None:
+        self.why = self.why or "the simulation has ended"
+        self.ended.set()
+
+    def _answer(self, line: Answer) -> None:
+        for told in self._pending.pop(str(line.get("id")), ()):
+            told(line)
+
+    # --- what it is asked for ------------------------------------------------------------
+
+    def send(self, asked: Asked) -> bool:
+        """Ask for something that has no answer: False if it cannot be said."""
+        return self._pipe.send(asked)
+
+    def ask(self, asked: Asked, told: Told) -> None:
+        """Ask for something; `told` gets the answer, which may be that there is no room."""
+        key = asked["id"]
+        waiting = self._pending.get(key)
+        if waiting is not None and len(waiting) < 4:
+            waiting.append(told)
+            return
+        full = waiting is not None or len(self._pending) >= MOST_PENDING
+        if full or not self._pipe.send(asked):
+            told({"k": "done", "id": key, "ok": False, "text": "too much is asked at once"})
+            return
+        self._pending[key] = [told]
+        asyncio.get_running_loop().call_later(PATIENCE, self._give_up, key, told)
+
+    def _give_up(self, key: str, told: Told) -> None:
+        if told in self._pending.get(key, ()):
+            text = f"no answer within {PATIENCE:g} s"
+            self._answer({"k": "done", "id": key, "ok": False, "text": text, "late": True})
+
+    async def answer(self, asked: Asked) -> Answer:
+        """Ask for something and wait for the answer."""
+        found: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
+        self.ask(asked, lambda line: None if found.done() else found.set_result(line))
+        return await found
+
+    def close(self) -> None:
+        """Ask for nothing more."""
+        self._pipe.close()

@@ -1,0 +1,162 @@
+"""The newest state of a run, as its lines tell it; older state is not kept, but for the story.
+
+Each change has a version. Who knows the version of what a page got last knows what is new to it,
+however long it slept: nothing is queued for anybody.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from typing import Any, NamedTuple
+
+Line = dict[str, Any]
+
+STORY_KEPT = 1000  # lines
+STORY_SHOWN = 200  # of them in a snapshot
+LATEST = ("rows", "hazards", "events", "pictures")  # kinds of which only the newest counts
+SHORT = ("seat", "phase", "order", "label")  # what others may know of a seat
+MOST_SEATS = 256  # of which anything is remembered
+
+
+class Versioned(NamedTuple):
+    """The newest line of a kind: since which version, and as JSON without its first brace."""
+
+    version: int
+    body: str
+
+
+def encode(line: Line) -> str:
+    """A line as compact JSON."""
+    return json.dumps(line, separators=(",", ":"))
+
+
+def body_of(line: Line) -> str:
+    """A line as JSON without its first brace, so that a number can be put before it."""
+    return encode(line)[1:]
+
+
+class RunState:
+    """What is known of a run.
+
+    Attributes:
+        version: Counts changes.
+        time: Of the newest line [ms].
+        scene: What does not change; None until it is told.
+        latest: The newest line by its kind.
+        places: Where everybody is, by index: a row of `pos`.
+        seats: What each seat's holder knows, and what others may.
+    """
+
+    def __init__(self) -> None:
+        self.version, self.time = 0, 0
+        self.scene: Line | None = None
+        self.scene_text = "null"
+        self.scene_version = 0
+        self.lines: dict[str, Line] = {}
+        self.latest: dict[str, Versioned] = {}
+        self.places: dict[int, list[int]] = {}
+        self._moved: dict[int, int] = {}
+        self._left: dict[int, int] = {}
+        self.place_version, self.place_time = 0, 0
+        self.story: deque[Line] = deque(maxlen=STORY_KEPT)
+        self.told = 0
+        self.seats: dict[str, Versioned] = {}
+        self.seats_short: dict[str, Versioned] = {}
+        self._deltas: dict[int, str] = {}
+        self._snapshot: tuple[int, str] = -1, ""
+
+    def take(self, line: Line) -> str:
+        """Learn from a line; its kind."""
+        kind = str(line.get("k", ""))
+        self.version += 1
+        if isinstance(when := line.get("t"), int):
+            self.time = when
+        if kind == "scene":
+            self._take_scene(line)
+        elif kind == "pos":
+            self._take_places(line)
+        elif kind == "seat":
+            self._take_seat(line)
+        elif kind == "story":
+            self.told += 1
+            self.story.append(line)
+        elif kind in LATEST:
+            self.lines[kind] = line
+            self.latest[kind] = Versioned(self.version, body_of(line))
+        return kind
+
+    # --- lines by their kind -------------------------------------------------------------
+
+    def _take_scene(self, line: Line) -> None:
+        self.scene = {key: value for key, value in line.items() if key not in ("k", "t")}
+        self.scene_text, self.scene_version = encode(self.scene), self.version
+
+    def _take_places(self, line: Line) -> None:
+        here = {row[0]: row for row in line["p"]}
+        for index, row in here.items():
+            if self.places.get(index) != row:
+                self._moved[index] = self.version
+            self._left.pop(index, None)
+        for index in self.places.keys() - here.keys():
+            self._left[index] = self.version
+            self._moved.pop(index, None)
+        self.places = here
+        self.place_version, self.place_time = self.version, line.get("t", 0)
+        self._deltas.clear()
+
+    def _take_seat(self, line: Line) -> None:
+        seat = str(line["seat"])
+        if seat not in self.seats and len(self.seats) >= MOST_SEATS:
+            self.forget_seat(next(iter(self.seats)))
+        self.seats[seat] = Versioned(self.version, body_of(line))
+        short = body_of(short_seat(line))
+        known = self.seats_short.get(seat)
+        if known is None or known.body != short:
+            self.seats_short[seat] = Versioned(self.version, short)
+
+    def forget_seat(self, seat: str) -> None:
+        """Whoever had it is gone for good."""
+        self.seats.pop(seat, None)
+        self.seats_short.pop(seat, None)
+
+    def seats_known(self) -> list[Line]:
+        """What everybody may know of all seats."""
+        return [json.loads("{" + seat.body) for seat in self.seats_short.values()]
+
+    # --- what a page gets ----------------------------------------------------------------
+
+    def moved_since(self, version: int) -> str:
+        """Who moved or left after a version, as JSON without its first brace.
+
+        The same text serves all pages that are equally far.
+        """
+        if version not in self._deltas:
+            rows = [self.places[i] for i, at in self._moved.items() if at > version]
+            line: Line = {"k": "d", "t": self.place_time, "p": rows}
+            if left := [index for index, at in self._left.items() if at > version]:
+                line["gone"] = left
+            self._deltas[version] = body_of(line)
+        return self._deltas[version]
+
+    def snapshot(self) -> str:
+        """All there is, as JSON without its first brace; the same text for all who ask at once."""
+        if self._snapshot[0] != self.version:
+            state = {
+                "pos": list(self.places.values()),
+                "story": list(self.story)[-STORY_SHOWN:],
+                "story_from": self.told - min(STORY_SHOWN, len(self.story)),
+                "seats": self.seats_known(),
+                **self.lines,
+            }
+            head = f'"k":"snap","t":{self.time},"scene":{self.scene_text},"state":'
+            self._snapshot = self.version, f"{head}{encode(state)}}}"
+        return self._snapshot[1]
+
+
+def short_seat(line: Line) -> Line:
+    """What everybody may know of a seat: that it is held, of which robots, and in which phase."""
+    short: Line = {"k": "seat", "short": True}
+    short.update({key: line[key] for key in SHORT if key in line})
+    short["robots"] = [drive.get("i") for drive in line.get("drives") or ()]
+    return short

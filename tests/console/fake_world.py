@@ -1,0 +1,394 @@
+"""A world that is not one, for work on the pages: `python tests/console/fake_world.py --no-token`.
+
+It runs the web process as its child, moves invented robots over a real site, grows invented
+hazards, paints numbers instead of camera pictures, and obeys whoever takes control, roughly.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import math
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import deque
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from PIL import Image, ImageDraw
+
+sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
+
+from fake_scene import LINK, Scene, Walker  # noqa: E402
+
+from dva_sim.console.frames import ALIVE, Picture, pack  # noqa: E402
+
+STEP = 0.02  # [s]
+
+
+class Seat:
+    """Somebody's control over some robots."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.robots, self.phase = name, list[Walker](), "free"
+        self.wanted, self.heard, self.n, self.sent = (0.0, 0.0), 0.0, 0, 0
+        self.alert = ""
+        self.late: deque[tuple[float, int, float, float]] = deque()
+        self.command = (0.0, 0.0)
+        self.applied = {"n": 0, "at_ms": 0.0}
+
+    def line(self, world: FakeWorld) -> dict[str, Any]:
+        """The line `seat`."""
+        age = 1000 * world.link["delay_s"] + 60 + 20 * math.sin(world.t)
+        return {
+            "k": "seat",
+            "seat": self.name,
+            "phase": self.phase,
+            "order": None,
+            "alert": self.alert,
+            "drives": [
+                {
+                    "i": robot.index,
+                    "pattern": robot.pattern,
+                    "phase": self.phase,
+                    "mode": robot.mode,
+                    "session": 1,
+                    "wanted": self.wanted,
+                    "command": self.command,
+                    "sent": self.sent,
+                    "answered": self.sent,
+                    "timeouts": 0,
+                    "refused": 0,
+                    "superseded": 0,
+                    "command_age_ms": round(age, 1),
+                    "round_trip_ms": round(2 * age, 1),
+                    "picture_ms": world.ms - round(1000 * world.link["delay_s"]),
+                    "loop_ms": round(age + 30, 1),
+                    "input": self.applied,
+                }
+                for robot in self.robots
+            ],
+        }
+
+
+class FakeWorld:
+    """The fake itself.
+
+    Args:
+        options: Of the command line.
+    """
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.scene = Scene(options.site, options.robots, options.people, options.hostile)
+        self.t, self.factor, self.paused = 0.0, 1.0, False
+        self.link = dict(LINK)
+        self.seats: dict[str, Seat] = {}
+        self.watched: set[int] = set()
+        self.done: dict[str, dict[str, Any]] = {}
+        self.pictures = not options.no_pictures
+        self.socket, theirs = socket.socketpair()
+        self.painter, their_painter = socket.socketpair()
+        words = [sys.executable, "-m", "dva_sim.console.web", "--fd", str(theirs.fileno())]
+        words += ["--pictures-fd", str(their_painter.fileno()), "--port", str(options.port)]
+        words += ["--no-token"] if options.no_token else []
+        numbers = theirs.fileno(), their_painter.fileno()
+        folder = Path(__file__).parents[2]
+        self.child = subprocess.Popen(words, pass_fds=numbers, cwd=folder)
+        theirs.close()
+        their_painter.close()
+        self.rest, self.out, self.frame_number = b"", b"", 0
+
+    @property
+    def ms(self) -> int:
+        """Virtual time [ms]."""
+        return round(self.t * 1000)
+
+    # --- lines -------------------------------------------------------------------------
+
+    def say(self, line: dict[str, Any]) -> None:
+        """Write a line, whatever that takes; the real world never waits here."""
+        line.setdefault("t", self.ms)
+        self.socket.sendall(json.dumps(line, separators=(",", ":")).encode() + b"\n")
+
+    def listen(self, wait: float) -> bool:
+        """Obey what arrives within some seconds: False if nobody is there any more."""
+        ready, _, _ = select.select([self.socket, self.painter], [], [], wait)
+        if self.painter in ready:
+            self.painter.recv(65536)  # who is watched, which the world was told, too
+        if self.socket in ready:
+            data = self.socket.recv(65536)
+            if not data:
+                return False
+            *lines, self.rest = (self.rest + data).split(b"\n")
+            for line in lines:
+                self.obey(json.loads(line))
+        return True
+
+    def obey(self, asked: dict[str, Any]) -> None:
+        """Do as asked, once, and say so."""
+        what, key = asked["do"], asked.get("id")
+        if key in self.done:
+            self.say(self.done[key])
+            return
+        ok, text = True, "done"
+        try:
+            text = getattr(self, f"do_{what}")(asked) or text
+        except (KeyError, ValueError, AttributeError) as error:
+            ok, text = False, str(error)
+        if key is not None:
+            self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text}
+            self.say(self.done[key])
+
+    # --- actions -----------------------------------------------------------------------
+
+    def do_serving(self, asked: dict[str, Any]) -> None:
+        print(f"Console: {asked['drive']}", flush=True)
+        print(f"Look only: {asked['look']}", flush=True)
+        self.say(self.scene.line())
+
+    def do_watch(self, asked: dict[str, Any]) -> None:
+        self.watched = set(asked["robots"])
+
+    def do_take(self, asked: dict[str, Any]) -> str:
+        seat = self.seats.setdefault(asked["client"], Seat(asked["client"]))
+        robots = [self.scene.all[i] for i in asked["robots"]]
+        for other in self.seats.values():
+            if other is not seat and set(other.robots) & set(robots):
+                raise ValueError(f"BUSY: held by {other.name}")
+        seat.robots, seat.phase = robots, "held"
+        for robot in robots:
+            robot.wanted = (0.0, 0.0)
+        self.tell(seat)
+        return "control taken"
+
+    def seat_of(self, asked: dict[str, Any]) -> Seat:
+        return self.seats.get(asked["client"]) or Seat(asked["client"])
+
+    def tell(self, seat: Seat) -> None:
+        self.say(seat.line(self))
+        self.say(self.rows())
+
+    def do_release(self, asked: dict[str, Any]) -> None:
+        seat = self.seat_of(asked)
+        self.halt(seat, "free")
+        for robot in seat.robots:
+            robot.wanted = None
+        seat.robots = []
+        self.tell(seat)
+
+    def halt(self, seat: Seat, phase: str) -> None:
+        seat.phase, seat.wanted, seat.command = phase, (0.0, 0.0), (0.0, 0.0)
+        seat.late.clear()
+        for robot in seat.robots:
+            robot.mode, robot.wanted = "Idle", (0.0, 0.0)
+
+    def do_start(self, asked: dict[str, Any]) -> None:
+        seat = self.seat_of(asked)
+        if not seat.robots:
+            raise ValueError("take control of a robot first")
+        seat.phase, seat.alert, seat.heard = "driving", "", time.monotonic()
+        for robot in seat.robots:
+            robot.mode = "Teleoperation"
+        self.tell(seat)
+
+    def do_stop(self, asked: dict[str, Any]) -> None:
+        seat = self.seat_of(asked)
+        self.halt(seat, "held" if seat.robots else "free")
+        self.tell(seat)
+
+    def do_gone(self, asked: dict[str, Any]) -> None:
+        seat = self.seat_of(asked)
+        if seat.phase == "driving":
+            seat.alert = "stopped: the page went away"
+            self.do_stop(asked)
+
+    def do_emergency(self, asked: dict[str, Any]) -> str:
+        for seat in self.seats.values():
+            if asked["robots"] == "all" or {r.index for r in seat.robots} & set(asked["robots"]):
+                seat.alert = "emergency stop"
+                self.halt(seat, "held" if seat.robots else "free")
+                self.tell(seat)
+        self.say({"k": "story", "who": "console", "what": "emergency stop", "kind": "emergency"})
+        return "robots stop"
+
+    def do_input(self, asked: dict[str, Any]) -> None:
+        seat = self.seat_of(asked)
+        seat.heard, seat.n = time.monotonic(), asked["n"]
+        if seat.phase == "driving":
+            wanted = (asked["speed"], asked["turn"]) if asked["held"] else (0.0, 0.0)
+            seat.wanted = wanted[0] * 0.5, wanted[1] * 0.5236
+            due = time.monotonic() + self.link["delay_s"]
+            seat.late.append((due, asked["n"], *seat.wanted))
+
+    def do_link(self, asked: dict[str, Any]) -> None:
+        self.link.update({key: value for key, value in asked.items() if key in LINK})
+        self.say(self.rows())
+
+    def do_pattern(self, asked: dict[str, Any]) -> None:
+        self.scene.all[asked["robot"]].pattern = asked["name"]
+        self.say(self.rows())
+
+    def do_pace(self, asked: dict[str, Any]) -> None:
+        self.factor = asked.get("factor", self.factor)
+        self.paused = asked.get("paused", self.paused)
+        self.say(self.rows())
+
+    def do_confirm(self, asked: dict[str, Any]) -> str:
+        raise ValueError("no order is in hand")
+
+    do_refute = do_decline = do_confirm
+
+    # --- what is told regularly ----------------------------------------------------------
+
+    def rows(self) -> dict[str, Any]:
+        holders = {robot.index: seat for seat in self.seats.values() for robot in seat.robots}
+        clock = {"factor": self.factor, "paused": self.paused, "lag_s": 0.004}
+        return {
+            "k": "rows",
+            "t": self.ms,
+            "clock": clock | {"held_by_lag": False},
+            "link": {**self.link, "kind": "modelled", "trace": None},
+            "dropped": 0,
+            "robots": [self._row(robot, holders.get(robot.index)) for robot in self.scene.robots],
+            "people": [{"i": p.index, "doing": "walks"} for p in self.scene.people],
+        }
+
+    def _row(self, robot: Walker, seat: Seat | None) -> dict[str, Any]:
+        left = 3.0 - (time.monotonic() - seat.heard) if seat and seat.phase == "driving" else None
+        return {
+            "i": robot.index,
+            "mode": robot.mode,
+            "pattern": robot.pattern,
+            "battery": round(robot.battery, 3),
+            "holder": seat.name if seat else None,
+            "holder_label": f"console {seat.name}" if seat else None,
+            "session_age_s": 1.0 if seat else None,
+            "watchdog_left_s": None if left is None else round(max(0.0, left), 2),
+            "stands": "nobody has started it" if seat and robot.mode == "Idle" else "",
+            "set_speed_mps": round(robot.speed, 3),
+            "set_turn_rate_radps": 0.0,
+            "queue": 0,
+            "lost": 0,
+            "commands_hz": 10.0 if left is not None else 0.0,
+            "refused": 0,
+        }
+
+    # --- time ----------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """Go on by a step of real time."""
+        now = time.monotonic()
+        for seat in self.seats.values():
+            self._apply(seat, now)
+        if self.paused:
+            return
+        dt = STEP * self.factor
+        self.t += dt
+        for walker in self.scene.all:
+            walker.step(dt)
+
+    def _apply(self, seat: Seat, now: float) -> None:
+        if seat.phase != "driving":
+            return
+        if now - seat.heard > 0.3 and (seat.wanted != (0.0, 0.0)):
+            seat.alert = "stopped: no input for 300 ms"
+            self.halt(seat, "held")
+            self.tell(seat)
+            return
+        while seat.late and seat.late[0][0] <= now:
+            _, n, *command = seat.late.popleft()
+            seat.command, seat.sent = (command[0], command[1]), seat.sent + 1
+            seat.applied = {"n": n, "at_ms": time.time() * 1000}
+            for robot in seat.robots:
+                robot.wanted = seat.command
+
+    def paint(self) -> None:
+        """Numbers instead of pictures."""
+        self.frame_number += 1
+        for index in sorted(self.watched):
+            picture = self._picture(self.scene.all[index])
+            captured = self.ms - round(1000 * self.link["delay_s"])
+            self._send(Picture(index, self.frame_number, captured, self.ms, picture))
+        self._send(Picture(ALIVE, 0, self.ms, self.ms, b""))
+
+    def _picture(self, robot: Walker) -> bytes:
+        image = Image.new("RGB", (320, 240), "#4a5561")
+        draw = ImageDraw.Draw(image)
+        draw.rectangle((0, 120, 320, 240), fill="#8b8478")
+        x = 160 - math.degrees(robot.heading) * 3 % 640 + 160
+        draw.rectangle((x - 20, 60, x + 20, 180), fill="#d1332e")
+        draw.text((8, 8), f"{robot.label}\nframe {self.frame_number}\n{self.t:.2f} s", fill="white")
+        data = io.BytesIO()
+        image.save(data, "JPEG", quality=80)
+        return data.getvalue()
+
+    def _send(self, picture: Picture) -> None:
+        self.painter.setblocking(False)
+        try:
+            while self.out:
+                self.out = self.out[self.painter.send(self.out) :]
+            self.out = pack(picture)
+            self.out = self.out[self.painter.send(self.out) :]
+        except BlockingIOError:
+            pass
+
+    def run(self) -> None:
+        """Until nobody listens any more."""
+        ticks, due = 0, time.monotonic()
+        while True:
+            if not self.listen(max(0.0, due - time.monotonic())):
+                return
+            if time.monotonic() < due:
+                continue
+            due, ticks = max(due + STEP, time.monotonic() - 1), ticks + 1
+            self.step()
+            if ticks % 5 == 0:
+                self.say({"k": "pos", "p": [walker.row() for walker in self.scene.all]})
+                if self.pictures:
+                    self.paint()
+            self._regularly(ticks)
+
+    def _regularly(self, ticks: int) -> None:
+        if ticks % 25 == 1:
+            self.say(self.rows())
+        if ticks % 50 == 2:
+            self.say(self.scene.hazards(self.t) | {"t": self.ms})
+        if ticks % 100 == 3:
+            self.say(self.scene.events(self.t) | {"t": self.ms})
+            who = self.scene.all[ticks % len(self.scene.all)].label
+            self.say({"k": "story", "who": who, "what": "looks around", "kind": "event"})
+        for seat in self.seats.values():
+            if seat.robots and ticks % 3 == 0:
+                self.say(seat.line(self))
+
+
+def main() -> None:
+    """Run until Ctrl-C."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--port", type=int, default=0)
+    parser.add_argument("--no-token", action="store_true")
+    parser.add_argument("--no-pictures", action="store_true")
+    parser.add_argument("--robots", type=int, default=10)
+    parser.add_argument("--people", type=int, default=100)
+    parser.add_argument("--site", default="caparica", help="or office-block, campus, ...")
+    parser.add_argument("--hostile", action="store_true", help="a robot is called <script>")
+    world = FakeWorld(parser.parse_args())
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        world.run()
+    except (KeyboardInterrupt, ConnectionError):
+        pass
+    finally:
+        with suppress(OSError):
+            world.say({"k": "bye", "why": "Ctrl-C"})
+        world.child.wait(5)
+
+
+if __name__ == "__main__":
+    main()
