@@ -51,7 +51,7 @@ export function Latency({ robots }) {
     <h2>Latency <${Floor} /></h2>
     <div class="charts">${KINDS.map(
       (kind, n) => html`<div title=${kind.hint}>
-        <${Chart} title=${kind.title} unit="ms" lines=${lines} height=${84}
+        <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
           read=${() => histories[n].read()} />
         <${Figures} history=${histories[n]} robots=${robots} />
       </div>`,
