@@ -148,6 +148,12 @@ class AgentDevice:
 
         requester.request(encode(message), answered, on_failure)
 
+    def be_patient(self, timeout: float) -> None:
+        """From now on wait so long for each answer [s]."""
+        self.timeout = timeout
+        for requester in self._requesters.values():
+            requester.timeout = timeout
+
     def forget(self, peer: str) -> None:
         """A peer is there no more: what it was asked has failed."""
         for key in [(peer, False), (peer, True)]:

@@ -169,7 +169,7 @@ class DvaSimProgram(PanelGroup):
 _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
     "Studies": (studies.demo, studies.run, studies.new, studies.register, studies.tune),
     "Results": (results.report, results.show, results.export, results.compare),
-    "Single runs": (runs.episode, runs.replay, runs.live, runs.keys),
+    "Single runs": (runs.episode, runs.replay, runs.live, runs.console, runs.keys),
     "Names, files and evidence": (
         files.list_,
         files.plugins,

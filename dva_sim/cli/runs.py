@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,7 @@ import typer
 from typer import Argument, Option
 
 from dva_sim.cli.options import (
+    SCENARIOS,
     At,
     Camera,
     Inset,
@@ -161,6 +163,59 @@ def live(
             live_screen.run_all(options)
         else:
             live_screen.run_one(only, options, which)
+
+
+def console(
+    scenario: Annotated[
+        str,
+        Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path."),
+    ] = "hands-on",
+    port: Annotated[
+        int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)
+    ] = 8765,
+    host: Annotated[
+        str, Option(metavar="HOST", help="Address of this machine to listen on.")
+    ] = "127.0.0.1",
+    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
+    no_token: Annotated[
+        bool, Option("--no-token", help="Let everybody in who reaches the page.")
+    ] = False,
+    record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
+    seed: RunSeed = 1,
+    set_: Sets = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run a scenario in real time on a page in the browser, and drive its robots.
+
+    Examples:
+        dva-sim console  # two robots, two guards, a fire and a leak
+        dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
+        dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
+    """
+    from dva_sim.console.options import ConsoleOptions
+    from dva_sim.console.supervisor import Supervisor
+    from dva_sim.testing.file_kinds import mistakes_of
+
+    changes = tuple(set_ or ())
+    options = ConsoleOptions(
+        scenario=scenario,
+        seed=seed,
+        changes=changes,
+        host=host,
+        port=port,
+        token=not no_token,
+        open=not no_open,
+        record=record,
+    )
+    with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):
+        Supervisor(options, _say_at_once).run()
+
+
+def _say_at_once(line: str) -> None:
+    """A line for whoever waits for it, also through a pipe."""
+    typer.echo(line)
+    sys.stdout.flush()
 
 
 def keys(

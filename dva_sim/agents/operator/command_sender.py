@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from dva_sim.agents.device import HOLDER, AgentDevice, command_topic
 from dva_sim.agents.operator.refusals import Refusals
-from dva_sim.agents.tilt import Phone, TiltCommand
+from dva_sim.agents.tilt import TiltApp, TiltCommand
 from dva_sim.kernel.plugins import FAILURES, said
 from dva_sim.kernel.recorder import DriveLog, Issued
 from dva_sim.network.messaging import Requester, Subscription
@@ -32,7 +32,7 @@ class CommandSender:
         pattern: This drive's.
         drive: Log of this drive; names the robot.
         session: Session of this drive.
-        phone: The tilt phone.
+        phone: What makes commands of the tilt.
         rate_hz: Wanted commands per second.
         timeout: Of a command that is to be answered [s].
         attempts: Of the same.
@@ -55,7 +55,7 @@ class CommandSender:
         pattern: Pattern,
         drive: DriveLog,
         session: int,
-        phone: Phone,
+        phone: TiltApp,
         rate_hz: float,
         timeout: float,
         attempts: int,

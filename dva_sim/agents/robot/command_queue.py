@@ -113,6 +113,8 @@ class CommandQueue:
             Without it all is taken as bytes, and only emergencies are read.
 
     Attributes:
+        service: As given; may be replaced at any time.
+        latest_wins: The same.
         flow: Where published commands come from, if it can be told to wait: then a full inbox
             takes nothing more until half of it is done. What cannot wait is dropped.
     """
@@ -126,14 +128,17 @@ class CommandQueue:
         limit: int = LIMIT,
         read: Read | None = None,
     ) -> None:
-        self._clock, self._service, self._handle = clock, service, handle
-        self._latest_wins, self._limit, self._read = latest_wins, limit, read
+        self._clock, self.service, self._handle = clock, service, handle
+        self.latest_wins, self._limit, self._read = latest_wins, limit, read
         self.flow: Flow | None = None
         self._paused = False
         self._emergencies, self._control = FairQueue(limit), FairQueue(limit)
         self._commands = FairQueue(limit)
         self._busy = False
         self.longest = self.superseded = self.overflowed = 0
+
+    def __len__(self) -> int:
+        return len(self._emergencies) + len(self._control) + len(self._commands)
 
     def request(self, request: Request) -> None:
         """A request has arrived; somebody waits for the answer."""
@@ -151,7 +156,7 @@ class CommandQueue:
 
     def published(self, data: bytes, message: Message | None = None) -> None:
         """A command has arrived that nobody waits to be answered; who has read it, says so."""
-        if self._latest_wins:
+        if self.latest_wins:
             self.superseded += self.forget_published()
         self._put(self._commands, Letter(data, self._clock.now, None, message))
         if self.flow is not None and len(self._commands) >= self._limit:
@@ -177,7 +182,7 @@ class CommandQueue:
             letter = queue.pop()
             if self._paused:
                 self._take_more()
-            duration = self._service()
+            duration = self.service()
             if duration > 0.0:
                 self._clock.call_after(duration, self._done, letter)
                 return

@@ -9,11 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
-from dva_sim.agents.observation import CameraFrame, Observation
+from dva_sim.agents.observation import FRAME, CameraFrame, Observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
 from dva_sim.agents.robot.controller import (
     ENDS,
+    STAND,
     Decision,
     Mission,
     Mode,
@@ -153,7 +154,6 @@ class MissionLoop:
             self._on_news()
 
 
-FRAME = "frame|"  # topic of the camera
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
@@ -213,6 +213,8 @@ class RobotAgent:
         refused: Messages that were refused.
         picture_age: How old the picture behind the last command was when it took effect [s],
             by the robot's own clock.
+        set_point: What it was told last, and until when.
+        filmed: Told of each frame that it takes, with its id.
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
     """
@@ -233,6 +235,8 @@ class RobotAgent:
         self._drive_of = drive_of
         self.applied = self.refused = 0
         self.picture_age: float | None = None
+        self.set_point = STAND
+        self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
         self._fared, self._held_since = m.OK, 0.0
@@ -250,6 +254,7 @@ class RobotAgent:
         )
         self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
+        self._pattern = setup.pattern
         self._commands: Subscription | None = None
         self._encoding = False
         around = Surrounded(device.clock, world, body, planner)
@@ -275,6 +280,32 @@ class RobotAgent:
         speed, turn_rate = self.body.speed, self.body.turn_rate
         tick = self.controller.tick(now)
         return Observation(tick, *at, speed, turn_rate, hazards, visibility)
+
+    def expect(self, pattern: Pattern) -> None:
+        """From the next drive on, commands come by another pattern.
+
+        Raises:
+            RuntimeError: it is driven now.
+        """
+        if self.controller.mode is Mode.TELEOPERATION:
+            raise RuntimeError(f"{self.device.label} is driven")
+        self._pattern = pattern
+        self.inbox.latest_wins = pattern.newest_wins or self._setup.conflates
+
+    @property
+    def stale(self) -> bool:
+        """Whether the newest command of its holder came too late to be obeyed."""
+        return self._fared == m.STALE
+
+    @property
+    def charge(self) -> float:
+        """Share of the battery's charge that is left."""
+        return self._setup.charge()
+
+    @property
+    def holder(self) -> tuple[str | None, float]:
+        """Who may act on it, by id, and for how long already [s]."""
+        return self._holder, self.device.clock.now - self._held_since
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
@@ -418,6 +449,7 @@ class RobotAgent:
             recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
     def _move(self, set_point: TimedSetPoint) -> None:
+        self.set_point = set_point
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
             self._guarded.take(set_point)
             return
@@ -431,7 +463,7 @@ class RobotAgent:
             self._commands.close()
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
-        if mode is Mode.TELEOPERATION and self._setup.pattern.published:
+        if mode is Mode.TELEOPERATION and self._pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
                 me, source, command_topic(me), self._published
@@ -447,6 +479,8 @@ class RobotAgent:
         if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
             return
         frame = CameraFrame(self.observe(), self.device.clock.now)
+        if self.filmed is not None:
+            self.filmed(me, frame)
         if self._setup.encode > 0.0:
             self._encoding = True
             self.device.clock.call_after(self._setup.encode, self._encoded, frame)

@@ -50,28 +50,28 @@ async def run(options: argparse.Namespace) -> None:
     port = sock.getsockname()[1]
     tokens = Tokens() if options.no_token else Tokens.drawn()
     access = rules(options.host, port, options.name, tokens)
-    world = Simulation()
-    hub = Hub(world)
-    cameras = Cameras(world, hub.clients.watched)
+    simulation = Simulation()
+    hub = Hub(simulation)
+    cameras = Cameras(simulation, hub.clients.watched)
     hub.watching = cameras.tell
-    ended = world.ended
+    ended = simulation.ended
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
-    await world.open(options.fd)
-    world.send(serving(access, options.host, port))
+    await simulation.open(options.fd)
+    simulation.send(serving(access, options.host, port))
     if options.pictures_fd is not None:
         await cameras.open(options.pictures_fd)
     telling = asyncio.ensure_future(cameras.keep_telling())
-    closing = asyncio.ensure_future(_close_when(ended, hub, world))
+    closing = asyncio.ensure_future(_close_when(ended, hub, simulation))
     app = make_app(access, hub, cameras, StaticFiles())
     await serve(make_server(app), sock, _after(closing))
     telling.cancel()
     cameras.close()
-    world.close()
+    simulation.close()
 
 
-async def _close_when(ended: asyncio.Event, hub: Hub, world: Simulation) -> None:
+async def _close_when(ended: asyncio.Event, hub: Hub, simulation: Simulation) -> None:
     await ended.wait()
-    await hub.close(world.why or "the console was ended")
+    await hub.close(simulation.why or "the console was ended")
     await asyncio.sleep(FAREWELL)
 
 

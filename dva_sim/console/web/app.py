@@ -136,7 +136,7 @@ class Pages:
     """
 
     def __init__(self, access: Entrance, hub: Hub, cameras: Cameras, files: StaticFiles) -> None:
-        self._access, self._world, self._cameras = access, hub.world, cameras
+        self._access, self._simulation, self._cameras = access, hub.simulation, cameras
         self._files = files
 
     async def index(self, request: Request) -> Response:
@@ -163,7 +163,7 @@ class Pages:
 
     async def health(self, _: Request) -> Response:
         """`GET /healthz`: whether the simulation runs."""
-        runs = self._world.runs
+        runs = self._simulation.runs
         body = {"status": "ok" if runs else "the simulation does not run"}
         return JSONResponse(body, 200 if runs else 503, headers=NOT_KEPT)
 
@@ -187,7 +187,7 @@ class Pages:
 
     def _robot(self, request: Request) -> int:
         """The robot whose label is asked for: one of the scene's, or nothing is found."""
-        robot = self._world.labels.get(request.path_params["label"])
+        robot: int | None = self._simulation.labels.get(request.path_params["label"])
         if robot is None:
             raise HTTPException(404)
         return robot

@@ -18,6 +18,7 @@ from dva_sim.console.web.simulation import Simulation
 BOUNDARY = "dva-sim-frame"
 LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
 SILENCE = 3.0  # of who draws, after which there is no picture [s]
+STARTING = 20.0  # before the first word [s]
 REPEATED = 1.0  # so often is said again who is watched [s]
 ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
 FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
@@ -28,23 +29,22 @@ class Cameras:
     """The newest picture of each robot that is looked at.
 
     Args:
-        world: The simulation, which is told who is watched.
+        simulation: The simulation, which is told who is watched.
         said: Who is watched by pages that say so.
 
     Attributes:
         skipped: Pictures that viewers were too slow for.
     """
 
-    def __init__(self, world: Simulation, said: Callable[[], Iterable[int]]) -> None:
-        self._world, self._said = world, said
+    def __init__(self, simulation: Simulation, said: Callable[[], Iterable[int]]) -> None:
+        self._simulation, self._said = simulation, said
         self._pipe = PipeEnd(self._take, self._ended)
         self._unpacker = Unpacker()
         self._newest: dict[int, tuple[Picture, float]] = {}
         self._drawn = asyncio.Condition()
         self._viewers: Counter[int] = Counter()
         self._told: frozenset[int] = frozenset()
-        self._heard = -SILENCE
-        self._since = time.monotonic()
+        self._deadline = 0.0
         self._ok = True
         self._notified: set[asyncio.Task[None]] = set()
         self.skipped = 0
@@ -52,11 +52,13 @@ class Cameras:
     async def open(self, number: int) -> None:
         """Use the pipe of that number."""
         await self._pipe.open(number)
+        self._deadline = time.monotonic() + STARTING
 
     # --- pictures in ---------------------------------------------------------------------
 
     def _take(self, data: bytes) -> None:
-        self._heard = now = time.monotonic()
+        now = time.monotonic()
+        self._deadline = max(self._deadline, now + SILENCE)
         for picture in self._unpacker.feed(data):
             if picture.robot != ALIVE:
                 self._newest[picture.robot] = picture, now
@@ -74,10 +76,7 @@ class Cameras:
     @property
     def draws(self) -> bool:
         """Whether somebody is there who draws."""
-        if not self._pipe.is_open:
-            return False
-        started = max(self._heard, self._since)
-        return not self._told or time.monotonic() - started < SILENCE
+        return self._pipe.is_open and time.monotonic() < self._deadline
 
     # --- who looks -----------------------------------------------------------------------
 
@@ -89,7 +88,7 @@ class Cameras:
                 self._ok = self.draws
                 text = "" if self._ok else "no picture: nobody draws"
                 line = {"k": "pictures", "ok": self._ok, "text": text}
-                self._world.changed(self._world.state.take(line), line)
+                self._simulation.changed(self._simulation.state.take(line), line)
             await asyncio.sleep(REPEATED)
 
     def tell(self, again: bool = False) -> None:
@@ -97,10 +96,8 @@ class Cameras:
         robots = frozenset(self._viewers) | frozenset(self._said())
         new = robots != self._told
         if new:
-            if not self._told:
-                self._since = time.monotonic()
             self._told = robots
-            self._world.send({"do": "watch", "robots": sorted(robots)})
+            self._simulation.send({"do": "watch", "robots": sorted(robots)})
         if new or (again and robots):
             self._pipe.send({"do": "watch", "watch": sorted(robots)})
 

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterable
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.feed import OWN_KEPT, Feed
+from dva_sim.console.web.feed import OWN_KEPT, PageFeed
 from dva_sim.console.web.state import RunState
 
 MOST_CLIENTS = 64
@@ -65,7 +65,7 @@ class Client:
 
     def __init__(self, name: str, role: Role, state: RunState) -> None:
         self.name, self.role = name, role
-        self.feed = Feed(state, name)
+        self.feed = PageFeed(state, name)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
         self.driver: Driver | None = None
@@ -97,7 +97,7 @@ class Clients:
         known = self._all.get(name)
         if known is not None and known.role is role:
             known.is_here, known.visit = True, known.visit + 1
-            known.feed = Feed(self._state, known.name)
+            known.feed = PageFeed(self._state, known.name)
             known.wake.set()
             return known
         self._count += 1

@@ -17,7 +17,7 @@ Sources = tuple[str, ...]
 SOURCES: Sources = ("seat", "d", *LATEST, "story", "others")
 
 
-class Feed:
+class PageFeed:
     """What a page has, and so what it lacks.
 
     Args:

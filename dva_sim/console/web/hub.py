@@ -33,16 +33,16 @@ class Hub:
     """All pages and their sockets.
 
     Args:
-        world: The simulation.
+        simulation: The simulation.
     """
 
-    def __init__(self, world: Simulation) -> None:
-        self.world = world
-        self.clients = Clients(world.state)
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self.clients = Clients(simulation.state)
         self.watching: Callable[[], None] = lambda: None
         self._open: set[WebSocket] = set()
         self._later: set[asyncio.Task[None]] = set()
-        world.changed = self._changed
+        simulation.changed = self._changed
 
     def _changed(self, kind: str, line: dict[str, Any]) -> None:
         """Something is new: who drives gets the newest of its seat at once."""
@@ -83,7 +83,7 @@ class Hub:
         elif what == "resync":
             client.feed.resync()
         elif what == "watch":
-            client.watches = frozenset(robots(said.get("robots"), self.world.labels))
+            client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
             self.watching()
         else:
             raise Refused("no such message; there are: ping, resync, watch")
@@ -94,7 +94,7 @@ class Hub:
         self.clients.leave(client)
         self.watching()
         if client.role is Role.DRIVE:
-            self.world.send({"client": client.name, "do": "gone"})
+            self.simulation.send({"client": client.name, "do": "gone"})
         task = asyncio.ensure_future(self._forget(client))
         self._later.add(task)
         task.add_done_callback(self._later.discard)
@@ -102,8 +102,10 @@ class Hub:
     async def _forget(self, client: Client) -> None:
         await asyncio.sleep(REMEMBERED)
         if self.clients.forget(client) and client.role is Role.DRIVE:
-            self.world.send({"id": f"bye-{client.name}", "client": client.name, "do": "release"})
-            self.world.state.forget_seat(client.name)
+            self.simulation.send(
+                {"id": f"bye-{client.name}", "client": client.name, "do": "release"}
+            )
+            self.simulation.state.forget_seat(client.name)
 
     # --- driving -------------------------------------------------------------------------
 
@@ -116,7 +118,7 @@ class Hub:
             return
         self._replace(client)
         driver = client.driver = Driver()
-        if known := self.world.state.seats.get(client.name):
+        if known := self.simulation.state.seats.get(client.name):
             driver.seat("{" + known.body)
         await ws.accept()
 
@@ -128,14 +130,14 @@ class Hub:
         finally:
             if client.driver is driver:
                 client.driver = None
-                self.world.send({"client": client.name, "do": "gone"})
+                self.simulation.send({"client": client.name, "do": "gone"})
 
     def _replace(self, client: Client) -> None:
         """A page has one driving socket; the newest counts, and begins at rest."""
         if client.driver is not None:
             client.driver.replaced = True
             client.driver.wake.set()
-            self.world.send({"client": client.name, "do": "gone"})
+            self.simulation.send({"client": client.name, "do": "gone"})
 
     def _hear_driver(self, client: Client, driver: Driver, text: str) -> None:
         if driver.replaced:
@@ -143,13 +145,13 @@ class Hub:
         said = read(text)
         name, key = said.pop("do", None), said.pop("id", None)
         try:
-            asked = asked_of(name, said, self.world.labels, silent=True)
+            asked = asked_of(name, said, self.simulation.labels, silent=True)
             asked["client"] = client.name
             if name in ("input", "gone"):
-                self.world.send(asked)
+                self.simulation.send(asked)
                 return
             asked["id"] = id_of(key)
-            self.world.ask(asked, lambda line: driver.answer(encode(line)))
+            self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
         except Refused as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
             driver.answer(encode(line | {"text": str(error)}))

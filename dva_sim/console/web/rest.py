@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import secrets
 from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
@@ -14,6 +15,7 @@ from dva_sim.console.web.state import RunState
 from dva_sim.worlds.geo import GeoFrame
 
 NOT_KEPT = {"Cache-Control": "no-store"}
+PROGRAM = "rest"  # the client of all requests that come from no page
 
 
 def state_of(state: RunState, clients: int) -> dict[str, Any]:
@@ -78,16 +80,16 @@ class Rest:
     """
 
     def __init__(self, hub: Hub) -> None:
-        self._hub, self._world = hub, hub.world
+        self._hub, self._simulation = hub, hub.simulation
 
     async def state(self, _: Request) -> Response:
         """`GET /api/state`."""
-        body = state_of(self._world.state, len(self._hub.clients.here()))
+        body = state_of(self._simulation.state, len(self._hub.clients.here()))
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def site(self, request: Request) -> Response:
         """`GET /api/site`: the plan, which does not change."""
-        scene = self._world.state.scene
+        scene = self._simulation.state.scene
         if scene is None:
             return problem(503, "the simulation has not begun")
         response = JSONResponse(scene["site"])
@@ -100,7 +102,7 @@ class Rest:
 
     async def story(self, request: Request) -> Response:
         """`GET /api/story?from=N`: lines from a number on, as far as they are kept."""
-        state = self._world.state
+        state = self._simulation.state
         asked = request.query_params.get("from", "0")
         if not asked.isascii() or not asked.isdigit() or len(asked) > 9:
             return problem(400, "from should be a whole number")
@@ -114,7 +116,9 @@ class Rest:
         """`POST /api/actions`."""
         try:
             said = await body_of_request(request)
-            asked = asked_of(said.get("action"), said.get("arguments", {}), self._world.labels)
+            if said.get("action") == "gone":
+                return self._gone(said)
+            asked = asked_of(said.get("action"), said.get("arguments", {}), self._simulation.labels)
             return await self._do(asked, said)
         except Refused as error:
             return problem(400, str(error))
@@ -123,20 +127,33 @@ class Rest:
         """`POST /api/emergency`: all robots, or some; before all else."""
         try:
             said = await body_of_request(request)
+            said.setdefault("id", secrets.token_hex(8))
             given = {"robots": said.get("robots", "all")}
-            return await self._do(asked_of("emergency", given, self._world.labels), said)
+            return await self._do(asked_of("emergency", given, self._simulation.labels), said)
         except Refused as error:
             return problem(400, str(error))
 
+    def _gone(self, said: dict[str, Any]) -> Response:
+        """A page says with its last breath that it goes; nothing is answered to that."""
+        self._simulation.send({"do": "gone", "client": self._client(said)})
+        return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
+
+    def _client(self, said: dict[str, Any]) -> str:
+        """Who asks: a page that is open, or a program.
+
+        Raises:
+            Refused: no such page.
+        """
+        name = said.get("client", PROGRAM)
+        if name != PROGRAM and (not isinstance(name, str) or self._hub.clients.find(name) is None):
+            raise Refused("client: no page of that name is open")
+        return str(name)
+
     async def _do(self, asked: dict[str, Any], said: dict[str, Any]) -> Response:
         """Ask the simulation, and wait until it has answered."""
-        name = said.get("client")
-        client = self._hub.clients.find(name) if isinstance(name, str) else None
-        if name is not None and client is None:
-            return problem(400, "no page of that name is open")
-        asked["client"] = client.name if client else "rest"
+        asked["client"] = self._client(said)
         asked["id"] = id_of(said.get("id"))
-        line = await self._world.answer(asked)
+        line = await self._simulation.answer(asked)
         body = {"id": line["id"], "ok": bool(line.get("ok")), "text": line.get("text", "")}
         return JSONResponse(body, 504 if line.get("late") else 200, headers=NOT_KEPT)
 

@@ -209,7 +209,7 @@ def add_operator(
         raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
     command = scenario.command
     setup = OperatorSetup(
-        pattern=stage.pattern,
+        pattern=stage.pattern_for,
         window=command.window,
         heeds=command.heeds,
         rate_hz=command.rate_hz,
@@ -217,6 +217,7 @@ def add_operator(
         attempts=command.attempts,
         truth=truth if needs_truth else None,
         guarded=scenario.control == "coordinated",
+        topic=stage.cameras.topic,
     )
     seat = DriverSeat(
         device,

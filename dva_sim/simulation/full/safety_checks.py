@@ -158,6 +158,12 @@ class SafetyAudit:
         self._witnesses: dict[str, Witness] = {}
         recorder.on_accepted = self.accepted
 
+    def expect(self, processing: float) -> None:
+        """From now on a message takes a robot's computer so long on average [s]."""
+        self._obeys_within = OBEYS_WITHIN + 10 * processing
+        for witness in self._witnesses.values():
+            witness.obeys_within = max(witness.obeys_within, self._obeys_within)
+
     def witness(self, robot: str) -> Witness:
         """What is known of a robot."""
         known = self._witnesses.get(robot)
