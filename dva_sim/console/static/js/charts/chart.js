@@ -7,22 +7,22 @@ import { colours } from '../shell/theme.js';
 
 /**
  * @param {{title: string, unit: string, lines: Line[], read: () => number[][], span?: number,
- *   height?: number, least?: number, sync?: string}} props
+ *   least?: number, sync?: string}} props
  *   `read` gives times [s] and one list of values for each line; `least` is the smallest top
  */
-export function Chart({ title, unit, lines, read, span = 30, height = 90, least = 100, sync }) {
+export function Chart({ title, unit, lines, read, span = 30, least = 100, sync }) {
   const box = useRef(/** @type {HTMLElement | null} */ (null));
   const palette = colours.value;
-  const look = lines.map((line) => line.label + line.colour).join() + palette.page + height;
+  const look = lines.map((line) => line.label + line.colour).join() + palette.page;
   useEffect(() => {
     const element = box.current;
     if (!element) return undefined;
     const plot = new uPlot(
-      options({ width: element.clientWidth, height, lines, palette, span, least, sync }),
+      { ...sizeOf(element), ...options({ lines, palette, span, least, sync }) },
       /** @type {any} */ (read()),
       element,
     );
-    const sizes = new ResizeObserver(() => plot.setSize({ width: element.clientWidth, height }));
+    const sizes = new ResizeObserver(() => plot.setSize(sizeOf(element)));
     sizes.observe(element);
     const timer = window.setInterval(() => {
       if (!document.hidden) plot.setData(/** @type {any} */ (read()));
@@ -37,8 +37,11 @@ export function Chart({ title, unit, lines, read, span = 30, height = 90, least 
     <div class="plot" ref=${box} aria-hidden="true"></div></div>`;
 }
 
+/** @param {HTMLElement} element */
+const sizeOf = (element) => ({ width: element.clientWidth, height: element.clientHeight });
+
 /** @param {any} o */
-function options({ width, height, lines, palette, span, least, sync }) {
+function options({ lines, palette, span, least, sync }) {
   const axis = {
     stroke: palette.soft,
     grid: { stroke: palette.line, width: 1 },
@@ -46,11 +49,9 @@ function options({ width, height, lines, palette, span, least, sync }) {
     font: '11px system-ui, sans-serif',
   };
   return {
-    width,
-    height,
     legend: { show: false },
     cursor: sync ? { sync: { key: sync }, y: false, points: { show: false } } : { show: false },
-    padding: [6, 6, 0, 0],
+    padding: [6, 14, 0, 0],
     scales: {
       x: {
         time: false,
@@ -61,8 +62,8 @@ function options({ width, height, lines, palette, span, least, sync }) {
       },
     },
     axes: [
-      { ...axis, size: 20, splits: (/** @type {any} */ u) => [3, 2, 1, 0].map((n) => u.scales.x.max - (n * span) / 3), values: (/** @type {any} */ u, /** @type {number[]} */ at) => at.map((t) => ago(t - u.scales.x.max)) },
-      { ...axis, size: 46 },
+      { ...axis, size: 20, splits: (/** @type {any} */ u) => [1, 0.5, 0].map((n) => u.scales.x.max - n * span), values: (/** @type {any} */ u, /** @type {number[]} */ at) => at.map((t) => ago(t - u.scales.x.max)) },
+      { ...axis, size: 44 },
     ],
     series: [
       {},

@@ -50,7 +50,7 @@ function Age({ robot, trouble }) {
   const look = !known || age > limit ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
   const text = known ? `${secondsTo(age)} old` : pictures.value || trouble || 'waiting for the first picture';
   return html`<div class=${`veil ${look}`}></div>
-    <figcaption><b>${robot.label}</b><span class=${`picture-age ${look}`}>${text}</span></figcaption>`;
+    <figcaption><span class=${`picture-age ${look}`}>${text}</span></figcaption>`;
 }
 
 /** @param {number} age [s] */

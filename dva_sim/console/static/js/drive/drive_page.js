@@ -31,7 +31,6 @@ export function DrivePage() {
   const two = robots.length > 1;
   return html`<main class=${two ? 'page drive-page two' : 'page drive-page'} id="main" tabindex="-1">
     <h1 class="hidden">Drive</h1>
-    <${Alert} />
     <section class="camera-region" aria-label="Camera">
       ${robots.map(
         (robot, n) => html`<div class="cockpit" key=${robot.i}>
@@ -43,9 +42,8 @@ export function DrivePage() {
       <${MapBox} cones=${() => driven.peek().map((robot) => robot.i)} keyboard=${false}
         follows=${() => driven.peek()[0]?.i ?? null} goals=${tourGoals} />
     </section>
-    <div class="hands"><${OrderInHand} /><${Controls} robots=${robots} /></div>
+    <div class="side"><${Alert} /><${OrderInHand} /><${Controls} robots=${robots} /><${LinkPanel} /></div>
     <${Latency} robots=${robots} />
-    <${LinkPanel} />
   </main>`;
 }
 

@@ -51,7 +51,7 @@ export function Latency({ robots }) {
     <h2>Latency <${Floor} /></h2>
     <div class="charts">${KINDS.map(
       (kind, n) => html`<div title=${kind.hint}>
-        <${Chart} title=${kind.title} unit="ms" lines=${lines} height=${84}
+        <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
           read=${() => histories[n].read()} />
         <${Figures} history=${histories[n]} robots=${robots} />
       </div>`,
@@ -71,7 +71,7 @@ function Floor() {
   const setting = link.value;
   if (!setting) return null;
   const floor = 1000 * (setting.delay_s + setting.processing_s);
-  return html`<span class="count">the link and the robot take at least ${msText(floor)} for a command</span>`;
+  return html`<span class="count">a command takes at least ${msText(floor)}</span>`;
 }
 
 /** @param {{history: History, robots: Thing[]}} props */
@@ -79,6 +79,6 @@ function Figures({ history, robots }) {
   useEvery(500);
   return html`<p class="figures">${robots.map(
     (robot, n) => html`<span><i class=${`line line-${n} pattern-${rowOf(robot.i)?.pattern}`}></i>
-      ${robot.label} <b>${msText(history.last(n))}</b> <span class="soft">p95 ${msText(history.p95(n))}</span></span>`,
+      ${robot.label} <b>${msText(history.last(n))}</b> <span class="soft p95">p95 ${msText(history.p95(n))}</span></span>`,
   )}</p>`;
 }

@@ -29,7 +29,8 @@ export function Stick({ disabled }) {
     letGo('stick');
   };
   const { speed, turn } = wish.value;
-  const at = { left: `${50 - 100 * REACH * turn}%`, top: `${50 - 100 * REACH * speed}%` };
+  const shown = (100 * REACH) / Math.max(1, Math.hypot(speed, turn));
+  const at = { left: `${50 - shown * turn}%`, top: `${50 - shown * speed}%` };
   return html`<div class=${disabled ? 'stick off' : 'stick'} ref=${pad} aria-hidden="true"
     onPointerDown=${down} onPointerMove=${move} onPointerUp=${up} onPointerCancel=${up}
     onLostPointerCapture=${up}>

@@ -12,7 +12,7 @@ const STATES = ['pending', 'assigned', 'on scene', 'confirmed', 'contained', 're
 export function Legend() {
   return html`<details class="legend">
     <summary>Legend</summary>
-    <div class="legend-body">
+    <div class="legend-body" tabindex="0" role="group" aria-label="Marks and colours">
       <ul>
         ${MODES.map((mode) => html`<li><${ModeMark} mode=${mode} />robot: ${mode.toLowerCase()}</li>`)}
         <li><span class="dot guard"></span>guard</li>

@@ -19,15 +19,16 @@ const ms = (/** @type {number} */ value) => `${Math.round(value)} ms`;
 
 /** @type {Knob[]} */
 const KNOBS = [
-  { name: 'Delay', key: 'delay_s', unit: 1000, step: 10, limits: [0, 5], text: ms, hint: 'one way' },
-  { name: 'Jitter', key: 'jitter_s', unit: 1000, step: 5, limits: [0, 1], text: ms, hint: '' },
+  { name: 'Delay', key: 'delay_s', unit: 1000, step: 10, limits: [0, 5], text: ms, hint: 'Between console and robots, one way' },
+  { name: 'Jitter', key: 'jitter_s', unit: 1000, step: 5, limits: [0, 1], text: ms,
+    hint: 'How much the delay varies' },
   {
-    name: 'Loss', key: 'loss', unit: 100, step: 0.5, limits: [0, 0.5], hint: 'of packets',
+    name: 'Loss', key: 'loss', unit: 100, step: 0.5, limits: [0, 0.5], hint: 'Share of packets that are lost',
     text: (value) => `${Number(value.toFixed(1))} %`,
   },
   {
     name: 'Processing time', key: 'processing_s', unit: 1000, step: 10, limits: [0, 3], text: ms,
-    hint: 'robot, per command',
+    hint: 'What the robot’s computer takes for each command',
   },
 ]; // prettier-ignore
 
@@ -84,14 +85,15 @@ function Bandwidth() {
   const at = Math.round((EACH * Math.log10(told / least)) / decades);
   const [value, set] = useOwn(at, (step) => act('link', { rate_bps: Math.round(rateOf(step)) }));
   return html`<${Slider} name="Bandwidth" min=${0} max=${EACH} step=${1} value=${value}
-    text=${(/** @type {number} */ step) => rateText(rateOf(step))} disabled=${!maySteer.value} onInput=${set} />`;
+    text=${(/** @type {number} */ step) => rateText(rateOf(step))} hint="Of the link, in each direction"
+    disabled=${!maySteer.value} onInput=${set} />`;
 }
 
 function TimeFactor() {
   const [value, set] = useOwn(clock.value.factor, (factor) => act('pace', { factor }));
   return html`<${Slider} name="Time factor" min=${1} max=${FASTEST} step=${1} value=${value}
     text=${(/** @type {number} */ factor) => `× ${Number(factor.toFixed(1))}`}
-    hint="times real time" disabled=${!maySteer.value} onInput=${set} />`;
+    hint="How many times faster than real time the world runs" disabled=${!maySteer.value} onInput=${set} />`;
 }
 
 const PRESETS = [0, 100, 250, 500, 1000];
@@ -100,6 +102,6 @@ function Presets() {
   const now = Math.round(1000 * (link.value?.delay_s ?? 0));
   return html`<div class="presets" role="group" aria-label="Usual delays">${PRESETS.map(
     (delay) => html`<button type="button" aria-pressed=${now === delay} disabled=${!maySteer.value}
-      onClick=${() => act('link', { delay_s: delay / 1000 })}>${delay} ms</button>`,
+      onClick=${() => act('link', { delay_s: delay / 1000 })}>${delay < 1000 ? `${delay} ms` : `${delay / 1000} s`}</button>`,
   )}</div>`;
 }

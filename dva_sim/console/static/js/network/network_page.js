@@ -98,7 +98,7 @@ function Charts() {
     )}</p>
     ${KINDS.map(
       (kind, n) => html`<${Chart} title=${kind.title} unit=${kind.unit} lines=${lines} span=${SPAN_S}
-        least=${kind.least} height=${104} sync="network" read=${() => histories[n].read()} />`,
+        least=${kind.least} sync="network" read=${() => histories[n].read()} />`,
     )}
   </section>`;
 }
