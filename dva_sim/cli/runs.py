@@ -187,6 +187,7 @@ def console(
         bool, Option("--no-token", help="Let everybody in who reaches the page.")
     ] = False,
     record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
+    overwrite: Overwrite = False,
     seed: RunSeed = 1,
     set_: Sets = None,
     quiet: Quiet = False,
@@ -199,9 +200,9 @@ def console(
         dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
     """
-    from dva_sim.console.options import ConsoleOptions
-    from dva_sim.console.supervisor import Supervisor
-    from dva_sim.testing.file_kinds import mistakes_of
+    from dva_sim.console.options import ConsoleOptions  # late: start-up
+    from dva_sim.console.supervisor import Supervisor  # late: start-up
+    from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
 
     changes = tuple(set_ or ())
     options = ConsoleOptions(
@@ -213,6 +214,7 @@ def console(
         token=not no_token,
         open=not no_open,
         record=record,
+        overwrite=overwrite,
     )
     with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):
         Supervisor(options, _say_at_once).run()

@@ -17,7 +17,9 @@ PAGES = {"map": "Map", "drive": "Drive", "network": "Network"}
 def faults(page: Page) -> list[str]:
     """What axe-core holds to be serious, or worse."""
     page.evaluate(AXE)
-    options = json.dumps({"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]})
+    options = json.dumps(
+        {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}
+    )
     found = page.evaluate(f"axe.run(document, {options})")["violations"]
     grave = [fault for fault in found if fault["impact"] in {"serious", "critical"}]
     return [f"{fault['id']}: {node['html'][:160]}" for fault in grave for node in fault["nodes"]]
@@ -152,5 +154,3 @@ def test_every_page_obeys_its_content_security_policy(fake, visit) -> None:
         expect(page.get_by_role("heading", name=name, level=1)).to_be_attached()
 
     assert visit.errors == []  # a blocked script or style says so in the console
-
-
