@@ -28,8 +28,10 @@ from dva_sim.experiments.report.episode import (
 from dva_sim.experiments.report.figures.trial import name_and_unit
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import resolved
+from dva_sim.recordings import check_target
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.moments import story
+from dva_sim.recordings.writing import PART
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
@@ -49,7 +51,6 @@ DRIVES = {
     "refused": "ended, the robot obeyed no more",
 }
 EVENTS = 30  # of a shift in its table; the lines below it count them all
-PART = ".part"  # what a live run leaves whose supervisor was killed
 TRIALS = 20  # of a task in its table; likewise
 EVENT_HEADS = ("detected", "kind", "where", "outcome", "looked", "after", "acted")
 COLUMNS = {
@@ -384,6 +385,7 @@ def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = con
         from dva_sim.live.recording import finish  # late: start-up
 
         file, part = file.with_suffix(""), file
+        check_target(file, way=f"rename it, or {part}")
         finish(part, file, own_code=False)
         where.print(f"{file} made of {part}", soft_wrap=True)
     opened = open_recording(file, pictures)

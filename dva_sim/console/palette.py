@@ -15,7 +15,7 @@ from pathlib import Path
 
 from dva_sim.experiments.report.figures.palette import INK, look_of
 from dva_sim.network.patterns import PATTERNS
-from dva_sim.recordings.pictures.style import FIRE, GAS, KINDS, ROBOT_MODES, SMOKE, WATER
+from dva_sim.recordings.pictures.colours import FIRE, GAS, KINDS, ROBOT_MODES, SMOKE, WATER
 from dva_sim.worlds import view
 from dva_sim.worlds.hazards import KINDS as HAZARDS
 

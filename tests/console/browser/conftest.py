@@ -124,7 +124,9 @@ class Visit:
         tab.on("pageerror", lambda error: self.errors.append(str(error)))
         tab.on("console", lambda said: self._note(said.type, said.text))
         tab.goto(f"{address}#/{page}")
-        expect(tab.get_by_role("region", name="Map").or_(tab.locator(".network-page"))).to_be_visible()
+        expect(
+            tab.get_by_role("region", name="Map").or_(tab.locator(".network-page"))
+        ).to_be_visible()
         return tab
 
     def _note(self, kind: str, text: str) -> None:

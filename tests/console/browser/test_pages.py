@@ -16,7 +16,9 @@ PAGES = {"map": "Map", "drive": "Drive", "network": "Network"}
 def faults(page: Page) -> list[str]:
     """What axe-core holds to be serious, or worse."""
     page.evaluate(AXE)
-    options = json.dumps({"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]})
+    options = json.dumps(
+        {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}
+    )
     found = page.evaluate(f"axe.run(document, {options})")["violations"]
     grave = [fault for fault in found if fault["impact"] in {"serious", "critical"}]
     return [f"{fault['id']}: {node['html'][:160]}" for fault in grave for node in fault["nodes"]]
