@@ -65,12 +65,10 @@ function Age() {
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/map" aria-label=${Object.entries(counts)
-    .map(([rank, count]) => `${count} ${rank}`)
-    .join(', ')} title="Events that nobody has dealt with yet, by severity">
+  return html`<a class="item alarms" href="#/map" title="Events that nobody has dealt with yet, by severity">
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
-        <${SeverityMark} severity=${rank} quiet=${!count} />${count}</span>`,
+        <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
     )}</a>`;
 }
 
