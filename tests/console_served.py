@@ -157,7 +157,7 @@ class Served:
         """A WebSocket of a page."""
         own = f"http://127.0.0.1:{self.port}"
         headers = {"Cookie": f"dva_sim_{self.port}={token}"} if token else {}
-        return connect(
+        connection = connect(
             f"ws://127.0.0.1:{self.port}{path}",
             origin=own if origin == "own" else origin,  # type: ignore[arg-type]
             additional_headers=headers | more,
@@ -165,6 +165,7 @@ class Served:
             compression=None,
             max_size=None,
         )
+        return connection.__enter__()  # it is closed by whoever asked for it
 
     def page(self, token: str = "", **more: Any) -> Page:
         """A page that is open and has its first snapshot."""
