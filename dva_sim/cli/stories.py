@@ -135,12 +135,16 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
     counts = f"{row['messages']} messages, {row['violations']} safety rules broken"
     counts += f" ({CHECKED_IN_SHORT})"
     lines.append(f"{row['simulated_s']:.0f} s {how}, {counts}")
-    if failures := row["plugin_failures"]:
-        lines.append(
-            f"{failures} times a class of yours (policy, operator, filter, ...) gave no answer"
-        )
+    lines += _failed(row)
     print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)
+
+
+def _failed(row: Row) -> list[str]:
+    """What classes of the user's got wrong, if they did."""
+    times = row.get("plugin_failures", row.get("policy_failed"))
+    whose = "a class of yours (policy, operator, filter, ...)"
+    return [f"{times} times {whose} gave no answer, or none that is allowed"] if times else []
 
 
 def tell_full(run: Played, console: Console) -> None:
@@ -192,7 +196,8 @@ def tell_shift(run: Played, console: Console) -> None:
     console.rule(f"{scenario.dispatch.policy}, seed {run.seed}")
     if recording.columns:
         console.print(_first_events(recording))
-    print_lines(_shift_lines(recording), console)
+    row = run.tables["runs"][0]
+    print_lines([*_shift_lines(recording), *_failed(row)], console)
     broken = sum(recording.violations.values())
     console.print(
         f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages} messages, "
@@ -200,7 +205,7 @@ def tell_shift(run: Played, console: Console) -> None:
         soft_wrap=True,
     )
     if is_verbose() and scenario.keep == "events":
-        tell_measures(run.tables["runs"][0], _columns(run))
+        tell_measures(row, _columns(run))
 
 
 def _first_events(recording: TimedRecording) -> Table:
@@ -259,7 +264,7 @@ def tell_session(run: Played, console: Console) -> None:
     assert isinstance(scenario, TransportScenario)
     console.rule(f"{scenario.transport.kind}, {scenario.operator.strategy}, seed {run.seed}")
     console.print(_flows(run.tables["flows"]))
-    print_lines(_session_lines(row), console)
+    print_lines([*_session_lines(row), *_failed(row)], console)
     console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
     tell_measures(row, _columns(run))
 
@@ -313,9 +318,7 @@ def tell_task(run: Played, console: Console) -> None:
     if len(trials) > TRIALS:
         console.print(f"... and {len(trials) - TRIALS} more")
     console.print(f"{_count(row['trials'])}: {', '.join(_task_lines(row))}", soft_wrap=True)
-    if row["plugin_failures"]:
-        failures = row["plugin_failures"]
-        console.print(f"{failures} times a class of yours gave no answer")
+    print_lines(_failed(row), console)
     console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
     tell_measures(row, _columns(run))
 
