@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 Point = tuple[float, float]
 
 CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
+FRAME = "frame|"  # that topic
 IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
 MATCH_WITHIN = 4.0  # a hazard so near the place of an event is the one reported there [m]
 KEEP_OFF = 1.2  # from here the place of an event is looked at, by whoever drives [m]
@@ -108,6 +110,27 @@ def _hazard(kind: object, *numbers: float) -> SeenHazard:
     if not math.isfinite(sum(values)):
         raise ValueError("not a number")
     return SeenHazard(str(kind), *values)
+
+
+class Cameras(NamedTuple):
+    """Where the pictures of robots are to be had, and where an operator's screen looks for them.
+
+    Attributes:
+        url: Of a robot's camera, by its label and address.
+        topic: On which its frames are published, by that URL; None: it shows nothing of use.
+    """
+
+    url: Callable[[str, str], str]
+    topic: Callable[[str], str | None]
+
+
+def topic_in(url: str) -> str | None:
+    """The topic of frames that a URL of ours ends with."""
+    return url.rpartition("/")[2] if url.startswith(CAMERA_SCHEME) else None
+
+
+OVER_ZMQ = Cameras(lambda label, address: f"{CAMERA_SCHEME}{address}/{FRAME}", topic_in)
+"""Frames alone, as everywhere but in a console, whose pictures a browser can show."""
 
 
 def no_smoke(a: Point, b: Point) -> float:

@@ -33,7 +33,7 @@ _MEANINGS: Final = {
     ExitCode.MISTAKE: "a mistake in the call or in a file, or what cannot be read or written",
     ExitCode.RUNS_FAILED: "runs failed, which the same command tries again, or a class of yours",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",
-    ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live` ends with 0)",
+    ExitCode.INTERRUPTED: "stopped by Ctrl-C; what is finished is kept (`live`, `console`: 0)",
     ExitCode.READER_GONE: "whoever read the output has gone, as in `| head`",
 }
 

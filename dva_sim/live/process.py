@@ -138,7 +138,7 @@ def _run_part(
         clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
         lasts = scenario.horizon_s if options.duration is None else options.duration
         patience = lasts if name == "dva" else min(PATIENCE, lasts)
-        with _ending(clock, supervised) as ending:
+        with ending_when_asked(clock, supervised) as ending:
             if not supervised:
                 clock.run(patience)
                 _refuse_to_be_alone(name, part, network.address(DVA), patience, ending)
@@ -152,7 +152,7 @@ def _run_part(
 
 
 def _refuse_to_be_alone(
-    name: str, part: LivePart, dva: str | None, waited: float, ending: _ending
+    name: str, part: LivePart, dva: str | None, waited: float, ending: ending_when_asked
 ) -> None:
     if ending.is_asked or part.has_company():
         return
@@ -218,7 +218,7 @@ class _Reporter:
         )
 
 
-class _ending:  # noqa: N801 - reads as a statement
+class ending_when_asked:  # noqa: N801 - reads as a statement
     """Stop the clock on SIGINT, SIGTERM, or the end of standard input.
 
     A signal interrupts no poll by itself; it writes to a socket that the poller watches.
@@ -229,7 +229,7 @@ class _ending:  # noqa: N801 - reads as a statement
         self.is_asked = False
         self._reader, self._writer = socket.socketpair()
 
-    def __enter__(self) -> _ending:
+    def __enter__(self) -> ending_when_asked:
         self._writer.setblocking(False)
         self._before = signal.set_wakeup_fd(self._writer.fileno())
         self._handlers = {

@@ -139,7 +139,7 @@ class Requester:
     ) -> None:
         self._transport, self._clock = transport, transport.clock
         self.node, self.peer = node, peer
-        self._timeout, self._attempts, self._window = timeout, attempts, window
+        self.timeout, self._attempts, self._window = timeout, attempts, window
         self._queue: deque[_Asked] = deque()
         self._open: dict[int, _Asked] = {}
         self._deadlines: deque[tuple[float, int, int]] = deque()  # when [s], tag, attempt
@@ -198,7 +198,7 @@ class Requester:
     def _attempt(self, asked: _Asked) -> None:
         """Send a request, over a new connection if there is none."""
         asked.attempts += 1
-        self._deadlines.append((self._clock.now + self._timeout, asked.tag, asked.attempts))
+        self._deadlines.append((self._clock.now + self.timeout, asked.tag, asked.attempts))
         if len(self._deadlines) == 1:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
         self.open()

@@ -159,3 +159,114 @@ class LiveClock(Clock):
 
     def _real(self) -> int:
         return time.monotonic_ns() // 1000 - self._origin
+
+
+MOST_BEHIND = 1.0  # so far a paced clock runs after the wall clock; what is more is given up [s]
+FASTEST = 20.0  # that a paced clock goes, as a multiple of real time
+
+
+class PacedClock(LiveClock):
+    """Virtual time at the pace of the wall clock, or a multiple of it, which can be halted.
+
+    A callback that takes too long makes it lag; it then runs after the wall clock, event by event
+    and in order, and what it lags by more than `MOST_BEHIND` is given up for good.
+
+    Args:
+        factor: How many virtual seconds go by in a real one.
+
+    Attributes:
+        on_late: Told by how much real time an event came too late [s]; asked for each that does.
+        given_up: Real time that was never made up for, in all [s].
+    """
+
+    def __init__(self, factor: float = 1.0) -> None:
+        self._factor, self._halted = factor, False
+        self._base, self._since = 0, time.monotonic_ns() // 1000
+        self._pulses: list[_Pulse] = []
+        self.on_late: Callable[[float], object] = lambda _: None
+        self.given_up, self._worst = 0.0, 0.0
+        super().__init__()
+
+    @property
+    def factor(self) -> float:
+        """How many virtual seconds go by in a real one."""
+        return self._factor
+
+    @property
+    def paused(self) -> bool:
+        """Whether virtual time stands."""
+        return self._halted
+
+    def pace(self, factor: float | None = None, paused: bool | None = None) -> None:
+        """Go faster or slower from now on, halt, or go on."""
+        self._rebase(self._real())
+        self._factor = self._factor if factor is None else factor
+        self._halted = self._halted if paused is None else paused
+
+    def go(self) -> None:
+        """Virtual time goes on from where it is, whatever real time has passed: it begins now."""
+        self._rebase(int(self.env._now))
+        self._worst = 0.0
+
+    def worst_lag(self) -> float:
+        """By how much an event has come too late at most since the last time of asking [s]."""
+        worst, self._worst = self._worst, 0.0
+        return worst
+
+    def pulse(self, period: float, action: Callable[[], object]) -> None:
+        """Run `action()` each `period` of real time [s], also while virtual time stands.
+
+        What is missed while a callback takes long is left out.
+        """
+        self._pulses.append(_Pulse(period, action))
+
+    def _rebase(self, virtual: int) -> None:
+        self._base, self._since = virtual, time.monotonic_ns() // 1000
+
+    def _real(self) -> int:
+        if self._halted:
+            return self._base
+        return self._base + round((time.monotonic_ns() // 1000 - self._since) * self._factor)
+
+    def _wait(self, end: float) -> None:
+        """See `LiveClock`; pulses have their turn between events and messages."""
+        wait = LONGEST_WAIT
+        if not self._halted:
+            wait = (min(self.env.peek(), end) - self._real()) / US / self._factor
+        if self._pulses:
+            wait = min(wait, min(pulse.due for pulse in self._pulses) - time.monotonic())
+        ready = self._poller.poll(max(0.0, min(LONGEST_WAIT, wait)))
+        self._catch_up(end)
+        for pulse in self._pulses:
+            pulse.beat(time.monotonic())
+        for source in ready:
+            handler = self._handlers.get(source)
+            if handler is not None:
+                handler()
+
+    def _catch_up(self, end: float) -> None:
+        """See `LiveClock`; whoever heeds the lag hears of it before what comes too late happens."""
+        due = self.env.peek()
+        behind = (self._real() - due) / US / self._factor
+        if behind > 0.0 and due < math.inf:
+            self._worst = max(self._worst, behind)
+            self.on_late(behind)
+            if behind > MOST_BEHIND:
+                self.given_up += behind - MOST_BEHIND
+                self._rebase(int(due + MOST_BEHIND * self._factor * US))
+        super()._catch_up(end)
+
+
+class _Pulse:
+    """Something to be done again and again by the wall clock."""
+
+    def __init__(self, period: float, action: Callable[[], object]) -> None:
+        self._period, self._action = period, action
+        self.due = time.monotonic()
+
+    def beat(self, now: float) -> None:
+        """Do it if it is time."""
+        if now >= self.due:
+            missed = (now - self.due) // self._period
+            self.due += (missed + 1.0) * self._period
+            self._action()

@@ -13,7 +13,7 @@ from PIL import Image, ImageColor
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import TrackPoint
-from dva_sim.recordings.pictures import Wanted, style
+from dva_sim.recordings.pictures import Wanted, colours, style
 from dva_sim.recordings.pictures.film import Film, write_film
 from dva_sim.recordings.pictures.layers import DrawnBody
 from dva_sim.recordings.pictures.moments import Moments, verdicts
@@ -159,7 +159,7 @@ def test_a_side_that_has_ended_stays_as_it_was_at_its_end_with_its_robot_there(r
     assert np.array_equal(ended, still_ended)
     assert not np.array_equal(goes_on, last)
     for side in (last, still_ended):
-        assert pixels_of(side, style.ROBOT_MODES["Teleoperation"]) > 40
+        assert pixels_of(side, colours.ROBOT_MODES["Teleoperation"]) > 40
 
 
 def test_a_film_stands_long_enough_at_its_end_to_be_read(film):
@@ -219,7 +219,7 @@ def test_the_film_of_the_first_page_is_small_and_as_wide_as_the_page_and_ends_wi
         assert gif.width == 840
         gif.seek(gif.n_frames - 1)
         for side in halves(np.asarray(gif.convert("RGB"))):
-            assert pixels_of(side, style.ROBOT_MODES["Teleoperation"]) > 40
+            assert pixels_of(side, colours.ROBOT_MODES["Teleoperation"]) > 40
 
 
 # --- what a picture shows ------------------------------------------------------------------

@@ -20,7 +20,7 @@ from typing import Protocol
 import numpy as np
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.agents.observation import Observation
+from dva_sim.agents.observation import Observation, topic_in
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
 from dva_sim.agents.population import Person
@@ -157,7 +157,7 @@ class OperatorSetup:
     """How an operator works, beside who it is.
 
     Attributes:
-        pattern: Makes what carries the commands of a drive.
+        pattern: Makes what carries the commands of a drive of a robot, by its id.
         window: How many commands may be unanswered at once, where the pattern allows several.
         rate_hz: Wanted commands per second.
         timeout: Of a request [s].
@@ -165,9 +165,10 @@ class OperatorSetup:
         truth: The true state of a robot by id, if the strategy is the oracle; else None.
         guarded: Whether a collision guard may hold a robot back.
         heeds: Whether the app acts on being refused; see `CommandSender`.
+        topic: On which a camera's frames are published, by its URL; see `Cameras`.
     """
 
-    pattern: Callable[[], Pattern]
+    pattern: Callable[[str], Pattern]
     window: int
     rate_hz: float
     timeout: float
@@ -175,6 +176,7 @@ class OperatorSetup:
     truth: Callable[[str], Truth[Observation]] | None = None
     guarded: bool = False
     heeds: bool = True
+    topic: Callable[[str], str | None] = topic_in
 
 
 class DriverSeat:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from dva_sim.agents.device import HOLDER, AgentDevice, command_topic
 from dva_sim.agents.operator.refusals import Refusals
-from dva_sim.agents.tilt import Phone, TiltCommand
+from dva_sim.agents.tilt import TiltApp, TiltCommand
 from dva_sim.kernel.plugins import FAILURES, said
 from dva_sim.kernel.recorder import DriveLog, Issued
 from dva_sim.network.messaging import Requester, Subscription
@@ -32,7 +32,7 @@ class CommandSender:
         pattern: This drive's.
         drive: Log of this drive; names the robot.
         session: Session of this drive.
-        phone: The tilt phone.
+        phone: What makes commands of the tilt.
         rate_hz: Wanted commands per second.
         timeout: Of a command that is to be answered [s].
         attempts: Of the same.
@@ -55,7 +55,7 @@ class CommandSender:
         pattern: Pattern,
         drive: DriveLog,
         session: int,
-        phone: Phone,
+        phone: TiltApp,
         rate_hz: float,
         timeout: float,
         attempts: int,
@@ -134,13 +134,18 @@ class CommandSender:
     def _answered(self, command: Message, data: bytes) -> None:
         """A reply has come: what it says is heard whatever the pattern makes of it."""
         reply = self._device.reply_to(command, data)
-        self._heed(self.refusals.answered(None if reply is None else reply.code))
+        code = None if reply is None else reply.code
+        self._heed(self.refusals.answered(code, self.clock.now))
 
     def _on_holder(self, data: bytes) -> None:
         """The robot says who holds it, for those whom nobody answers."""
         message = self._device.read(data, self.drive.robot) if self._on else None
         if message is not None and isinstance(body := message.body, RobotHolder):
-            self._heed(self.refusals.held(body.holder, body.code))
+            now, sent, was_late = self.clock.now, self.drive.sent, self.refusals.late
+            self._heed(self.refusals.held(body.holder, body.code, now, sent))
+            if self._on and self.refusals.late and not was_late:
+                self._device.recorder.counters["alerts: every command comes late"] += 1
+                self._device.tell("is told that every command comes late", "drive")
 
     def _heed(self, why: str) -> None:
         if why and self._on and self._heeds:

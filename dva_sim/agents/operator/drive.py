@@ -209,7 +209,7 @@ class Teleoperation(Work):
         setup = self._seat.setup
         return CommandSender(
             self._device,
-            pattern=setup.pattern(),
+            pattern=setup.pattern(self.robot),
             drive=self.log,
             session=self.session,
             phone=self._seat.phone,

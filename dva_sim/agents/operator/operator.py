@@ -8,18 +8,18 @@ are driven, all but one stand until it is their turn.
 
 from __future__ import annotations
 
-from dva_sim.agents.observation import CAMERA_SCHEME
+from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.attention import DriverSeat
 from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.refusals import ASK_AGAIN
+from dva_sim.agents.operator.steps import START_AGAIN
 from dva_sim.agents.operator.supervision import REFUSED, Work
 from dva_sim.kernel.recorder import DriveLog
+from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 ASK_LATER = 2.0  # when the robot is held by somebody else [s]
 ASK_BEFORE, ASK_AFTER = 3, 1  # how often, for one order: before a drive has begun, and after
-START_TRIES = 20
-START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
 STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
 TOLD = {
     "lost link": "takes the link for lost",
@@ -190,38 +190,37 @@ class OperatorAgent:
         self.device.ask(self.device.dva, body, answered, unreachable)
 
     def _turn_on_picture(self, drive: Work) -> None:
-        """Ask the robot where its camera is, and watch it."""
 
-        def answered(reply: m.Reply) -> None:
-            if drive.over:
-                return
-            url = reply.content.camera_url if isinstance(reply.content, m.SensorInfo) else ""
-            if not url.startswith(CAMERA_SCHEME):
-                drive.end("gave up", f"no camera to watch at {url!r}")
-                return
-            topic = url.rpartition("/")[2]
-            drive.picture = self.device.network.subscribe(
-                self.device.id_tag, drive.robot, topic, drive.on_frame
-            )
+        def seen(picture: Subscription) -> None:
+            drive.picture = picture
 
-        self.device.ask(drive.robot, m.GetSensorInfo(), answered, session=drive.session)
+        steps.watch(
+            self.device,
+            drive.robot,
+            drive.session,
+            topic=self._seat.setup.topic,
+            on_frame=drive.on_frame,
+            seen=seen,
+            blind=lambda url: drive.end("gave up", f"no camera to watch at {url!r}"),
+            wanted=lambda: not drive.over,
+        )
 
-    def _start(self, drive: Work, tries: int = 1) -> None:
-        def answered(reply: m.Reply) -> None:
-            if drive.over:
-                return
-            if reply.code == m.OK:
-                self.device.progress(drive.order.event_id, "departed")
-                self.device.tell(f"{drive.verb} {self.device.label_of(drive.robot)}", "drive")
-                drive.begin()
-            elif tries < START_TRIES and reply.code in (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION):
-                self.device.clock.call_after(START_AGAIN, self._start, drive, tries + 1)
-            else:
-                drive.end("gave up", reply.text)
+    def _start(self, drive: Work) -> None:
+        def begun() -> None:
+            self.device.progress(drive.order.event_id, "departed")
+            self.device.tell(f"{drive.verb} {self.device.label_of(drive.robot)}", "drive")
+            drive.begin()
 
-        if not drive.over:
-            body = drive.beginning()
-            self.device.ask(drive.robot, body, answered, drive.link_lost, drive.session)
+        steps.start(
+            self.device,
+            drive.robot,
+            drive.beginning(),
+            lambda: drive.session,
+            wanted=lambda: not drive.over,
+            begun=begun,
+            refused=lambda why: drive.end("gave up", why),
+            lost=drive.link_lost,
+        )
 
     def _finish(self, drive: Work, outcome: str, why: str) -> None:
         """A drive is over: stop the robot, tell the DVA, be free again."""
@@ -253,8 +252,7 @@ class OperatorAgent:
     def _give_back(self, robot: str, session: int) -> None:
         """A permission is needed no longer, unless what is next is of the same robot."""
         if session and robot not in {order.device for order in self._orders}:
-            body = m.PermissionRevocation(robot, self.device.id_tag, session)
-            self.device.ask(self.device.dva, body)
+            steps.give_back(self.device, robot, session)
 
     def _be_free(self, drive: Work) -> None:
         """The robot was told to stop: what is next?"""

@@ -9,11 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
-from dva_sim.agents.observation import CameraFrame, Observation
+from dva_sim.agents.observation import FRAME, CameraFrame, Observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
-from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
+from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (
     ENDS,
+    STAND,
     Decision,
     Mission,
     Mode,
@@ -153,7 +154,8 @@ class MissionLoop:
             self._on_news()
 
 
-FRAME = "frame|"  # topic of the camera
+HOLDERS_ONLY = m.StartTeleOp | m.StopTeleOp | m.SetTeleOp | Mission | m.CancelMission
+DVAS_ONLY = m.PermissionGrant | m.PermissionRevocation | m.TaskAnnouncement | m.TaskAward
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
@@ -213,6 +215,8 @@ class RobotAgent:
         refused: Messages that were refused.
         picture_age: How old the picture behind the last command was when it took effect [s],
             by the robot's own clock.
+        set_point: What it was told last, and until when.
+        filmed: Told of each frame that it takes, with its id.
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
     """
@@ -233,6 +237,8 @@ class RobotAgent:
         self._drive_of = drive_of
         self.applied = self.refused = 0
         self.picture_age: float | None = None
+        self.set_point = STAND
+        self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
         self._fared, self._held_since = m.OK, 0.0
@@ -247,9 +253,13 @@ class RobotAgent:
             setup.pattern.newest_wins or setup.conflates,
             setup.limit,
             self._admit,
+            self._standing,
+            self._is_driven,
+            self._turn_away,
         )
         self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
+        self._pattern = setup.pattern
         self._commands: Subscription | None = None
         self._encoding = False
         around = Surrounded(device.clock, world, body, planner)
@@ -276,6 +286,32 @@ class RobotAgent:
         tick = self.controller.tick(now)
         return Observation(tick, *at, speed, turn_rate, hazards, visibility)
 
+    def expect(self, pattern: Pattern) -> None:
+        """From the next drive on, commands come by another pattern.
+
+        Raises:
+            RuntimeError: it is driven now.
+        """
+        if self.controller.mode is Mode.TELEOPERATION:
+            raise RuntimeError(f"{self.device.label} is driven")
+        self._pattern = pattern
+        self.inbox.latest_wins = pattern.newest_wins or self._setup.conflates
+
+    @property
+    def stale(self) -> bool:
+        """Whether the newest command of its holder came too late to be obeyed."""
+        return self._fared == m.STALE
+
+    @property
+    def charge(self) -> float:
+        """Share of the battery's charge that is left."""
+        return self._setup.charge()
+
+    @property
+    def holder(self) -> tuple[str | None, float]:
+        """Who may act on it, by id, and for how long already [s]."""
+        return self._holder, self.device.clock.now - self._held_since
+
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
         if on is not self.body.powered:
@@ -285,8 +321,41 @@ class RobotAgent:
     # --- messages ----------------------------------------------------------------------
 
     def _admit(self, request: Request) -> m.Message | None:
-        """A request that is worth waiting for; without power it hears none."""
-        return None if self.device.silent else self.device.admit(request)
+        """A request that is worth waiting for; without power it hears none.
+
+        While somebody drives, what only that one may say is refused to strangers before it costs
+        any processing, unless a word of the DVA waits that may make one of them the holder.
+        """
+        message = None if self.device.silent else self.device.admit(request)
+        if message is None or not isinstance(body := message.body, HOLDERS_ONLY | DVAS_ONLY):
+            return message
+        standing, now = self._standing_of(message), self.device.clock.now
+        unknown = not self._is_driven() or self.inbox.hears_the_dva
+        if standing is not Standing.STRANGER or (unknown and isinstance(body, HOLDERS_ONLY)):
+            return message
+        self.device.conclude(request, message, lambda one: self._reply(one, now), at_once=True)
+        return None
+
+    def _standing_of(self, message: m.Message) -> Standing:
+        if self.controller.knows(message):
+            return Standing.HOLDER
+        return Standing.DVA if message.source == self.controller.dva else Standing.STRANGER
+
+    def _standing(self, letter: Letter) -> Standing:
+        """Who publishes commands is the holder: the robot has subscribed to it."""
+        if letter.request is None or letter.message is None:
+            return Standing.HOLDER
+        return self._standing_of(letter.message)
+
+    def _is_driven(self) -> bool:
+        return self.controller.mode is Mode.TELEOPERATION
+
+    def _turn_away(self, letter: Letter) -> None:
+        """There is no room for a letter."""
+        if letter.request is not None and not self.device.silent:
+            answers = letter.message.message_id if letter.message is not None else 0
+            refusal = m.Reply(answers, m.BUSY, "too many of your messages wait")
+            self.device.turn_away(letter.request, letter.message, refusal)
 
     def _published(self, data: bytes) -> None:
         """A command has arrived of the one who drives; what is none takes no time."""
@@ -305,12 +374,12 @@ class RobotAgent:
         if letter.request is None:
             self._decide(letter.message, letter.arrived)
             return
+        arrived = letter.arrived
+        self.device.conclude(letter.request, letter.message, lambda one: self._reply(one, arrived))
 
-        def decide(message: m.Message) -> m.Reply:
-            decision = self._decide(message, letter.arrived)
-            return m.Reply(message.message_id, decision.code, decision.text, decision.content)
-
-        self.device.conclude(letter.request, letter.message, decide)
+    def _reply(self, message: m.Message, arrived: float) -> m.Reply:
+        decision = self._decide(message, arrived)
+        return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
         now = self.device.clock.now
@@ -418,6 +487,7 @@ class RobotAgent:
             recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
     def _move(self, set_point: TimedSetPoint) -> None:
+        self.set_point = set_point
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
             self._guarded.take(set_point)
             return
@@ -431,7 +501,7 @@ class RobotAgent:
             self._commands.close()
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
-        if mode is Mode.TELEOPERATION and self._setup.pattern.published:
+        if mode is Mode.TELEOPERATION and self._pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
                 me, source, command_topic(me), self._published
@@ -447,6 +517,8 @@ class RobotAgent:
         if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
             return
         frame = CameraFrame(self.observe(), self.device.clock.now)
+        if self.filmed is not None:
+            self.filmed(me, frame)
         if self._setup.encode > 0.0:
             self._encoding = True
             self.device.clock.call_after(self._setup.encode, self._encoded, frame)

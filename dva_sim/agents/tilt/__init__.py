@@ -5,8 +5,10 @@ It knows persons, and neither robots nor networks: what it gives is a command, a
 """
 
 from dva_sim.agents.tilt.accelerometer import Accelerometer, AccelerometerPart, load_part
+from dva_sim.agents.tilt.app import TiltApp
 from dva_sim.agents.tilt.calibration import Calibration
 from dva_sim.agents.tilt.filters import Filter, known_filters, load_filter
+from dva_sim.agents.tilt.given import GivenTilt
 from dva_sim.agents.tilt.hand import Hand
 from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
 from dva_sim.agents.tilt.phone import Phone, PhoneProfile, TiltCommand, try_phone
@@ -16,10 +18,12 @@ __all__ = [
     "AccelerometerPart",
     "Calibration",
     "Filter",
+    "GivenTilt",
     "Hand",
     "Mapping",
     "Phone",
     "PhoneProfile",
+    "TiltApp",
     "TiltCommand",
     "known_filters",
     "known_mappings",

@@ -50,19 +50,54 @@ class Link:
         direction: Direction = "up",
     ) -> None:
         way = config.toward(direction)
-        replay = _make_replay(way, direction, streams, name)
         self.name, self.rate_bps, self.room = name, serialiser.rate_bps, way.queue_bytes
-        self.delay, self._base = way.moments()[0], way.delay_s
+        self._line, self._streams, self._direction = serialiser, streams, direction
         if way.queue_packets is not None:
             serialiser = PacketQueue(serialiser, way.queue_packets)
             self.room = way.queue_packets * SMALLEST_PACKET
         self._serialiser, self._offer = serialiser, serialiser.offer
-        self._fates = _make_fates(way, streams, name, replay)
-        self._wobble = replay.deviation if replay else _make_wobble(way, streams, name)
-        self._may_overtake, self._last_arrival = way.reorder, 0.0
-        self._is_steady = not self._fates and self._wobble is None
-        self._takes_trains = self._is_steady and way.queue_packets is None
+        self._counts_packets, self._last_arrival = way.queue_packets is not None, 0.0
+        self._take(way)
         self.offered = self.lost = self.dropped = self.bytes = 0
+
+    def _take(self, way: LinkConfig) -> None:
+        """Be like this from now on, but for the queue."""
+        replay = _make_replay(way, self._direction, self._streams, self.name)
+        self.delay, self._base = way.moments()[0], way.delay_s
+        self._fates = _make_fates(way, self._streams, self.name, replay)
+        self._wobble = replay.deviation if replay else _make_wobble(way, self._streams, self.name)
+        self._may_overtake = way.reorder
+        self._is_steady = not self._fates and self._wobble is None
+        self._takes_trains = self._is_steady and not self._counts_packets
+
+    def change(self, now: float, config: LinkConfig) -> None:
+        """Be like another link from `now` on [s]: delay, its law, loss and rate.
+
+        What is under way keeps its fate, what waits in the queue keeps its place and leaves at
+        the new rate from now on where the rate is constant, and nothing overtakes what was sent
+        before the change, unless the link may reorder. The room of the queue stays.
+
+        Raises:
+            ConfigError: a recorded delay cannot be read.
+        """
+        way = config.toward(self._direction)
+        before = self._newest_arrival(now)
+        self._take(way)
+        if isinstance(self._line, ConstantRate):
+            self._line.change_rate(now, way.rate_bps)
+            self.rate_bps = way.rate_bps
+        if not self._may_overtake:
+            self._last_arrival = max(self._last_arrival, before)
+            self._wobble = self._wobble or _no_deviation
+            self._is_steady = self._takes_trains = False
+
+    def _newest_arrival(self, now: float) -> float:
+        """When the last packet arrives at the latest that is still under way [s]."""
+        if self._wobble is not None:
+            return self._last_arrival
+        waiting = self._serialiser.backlog_bytes(now)
+        rate = self.rate_bps
+        return now + self._base + (8.0 * waiting / rate if rate else 0.0)
 
     def is_ideal(self) -> bool:
         """Whether it loses, spreads and reorders nothing by itself, and its rate is constant."""
@@ -121,6 +156,11 @@ class Link:
     def backlog_bytes(self, now: float) -> float:
         """Bytes that wait before the link at `now` [B]."""
         return self._serialiser.backlog_bytes(now)
+
+
+def _no_deviation(now: float) -> float:
+    """Of a constant delay, where the order of packets has to be looked at all the same."""
+    return 0.0
 
 
 def make_serialiser(
@@ -295,14 +335,18 @@ class RadioLink(Link):
         direction: Direction,
         reception: Callable[[], Reception | None],
     ) -> None:
+        self._deviation = 0.0  # of the last packet, by the link's law
         super().__init__(config, serialiser, streams, name, direction)
         way = config.toward(direction)
         self._reception = reception
         self._luck = Weather(streams, f"{name}/radio")
         self._air, self._air_room = ConstantRate(way.rate_bps), way.queue_bytes
         self._newest = 0.0
+
+    def _take(self, way: LinkConfig) -> None:
+        """See `Link`."""
+        super()._take(way)
         self._law = None if way.jitter_s else self._wobble
-        self._deviation = 0.0  # of the last packet, by this law
         if self._law is not None:
             self._wobble = self._noted
 

@@ -21,8 +21,9 @@ from matplotlib.patches import Circle, Wedge
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from dva_sim.recordings.pictures import style
-from dva_sim.recordings.pictures.moments import BYSTANDER, FRESH, ROBOT, Moments, kind_of
+from dva_sim.recordings.pictures import colours, style
+from dva_sim.recordings.pictures.colours import BYSTANDER, ROBOT
+from dva_sim.recordings.pictures.moments import FRESH, Moments, kind_of
 from dva_sim.worlds.hazards import Hazard, Raster
 
 LARGER = 1.25  # bodies are drawn a little larger than they are
@@ -172,8 +173,8 @@ class DrawnFields:
         self._paints = {what: paint for what, paint in paints.items() if what in moments.shown}
         gas = tuple(level * lower for level in style.GAS_LEVELS)
         self._contours = {
-            "heat": _Contours(ax, style.HEAT_LEVELS, style.FIRE),
-            "gas": _Contours(ax, gas, style.GAS),
+            "heat": _Contours(ax, style.HEAT_LEVELS, colours.FIRE),
+            "gas": _Contours(ax, gas, colours.GAS),
         }
         self._image = ax.imshow(
             np.zeros((1, 1, 4), np.uint8), origin="lower", interpolation="bilinear",
@@ -271,23 +272,23 @@ def _tinted(colour: str, cover: NDArray[Any]) -> NDArray[Any]:
 
 
 def _smoke(extinction: NDArray[Any]) -> NDArray[Any]:
-    return _tinted(style.SMOKE, THICKEST * (1.0 - np.exp(-SMOKE_PATH * extinction)))
+    return _tinted(colours.SMOKE, THICKEST * (1.0 - np.exp(-SMOKE_PATH * extinction)))
 
 
 def _water(depth: NDArray[Any]) -> NDArray[Any]:
     deep = np.clip(depth / DEEP, 0.0, 1.0)
-    return _tinted(style.WATER, np.where(depth > WET, 0.25 + 0.5 * deep, 0.0))
+    return _tinted(colours.WATER, np.where(depth > WET, 0.25 + 0.5 * deep, 0.0))
 
 
 def _gas(share: NDArray[Any]) -> NDArray[Any]:
     """By share of the lower explosive limit: above it, it could explode."""
     cover = np.interp(share, (0.0, 0.02, *style.GAS_LEVELS), (0.0, 0.0, 0.12, 0.2, 0.34, 0.55))
-    return _tinted(style.GAS, cover)
+    return _tinted(colours.GAS, cover)
 
 
 def _heat(flux: NDArray[Any]) -> NDArray[Any]:
     """From yellow to red as it gets hotter."""
     strong = np.clip(np.log10(np.maximum(flux, LEAST_HEAT) / LEAST_HEAT) / 1.5, 0.0, 1.0)
-    picture = _tinted(style.FIRE, 0.55 * np.sqrt(strong))
+    picture = _tinted(colours.FIRE, 0.55 * np.sqrt(strong))
     picture[..., 1] += (1 - strong) * 0.5
     return picture

@@ -15,13 +15,13 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.patterns import PATTERNS
+from dva_sim.recordings.pictures.colours import ROBOT
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.worlds.camera import Camera, Figure, SmokeView
 from dva_sim.worlds.camera.picture import Picture
 from dva_sim.worlds.geo import Pose
 
-ROBOT, GUARD, BYSTANDER = "robot", "guard", "bystander"
 GONE = 1.0  # so long after the end of the track of somebody who left [s]
 PERSON = 0.25  # radius of somebody on foot, seen from above [m]
 FRESH = 3.0  # an older picture is not looked at any more [s]

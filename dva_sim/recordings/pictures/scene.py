@@ -17,8 +17,9 @@ from matplotlib.spines import Spine
 
 from dva_sim.kernel.recorder import Moment
 from dva_sim.recordings.pictures import style
+from dva_sim.recordings.pictures.colours import BYSTANDER, GUARD, ROBOT
 from dva_sim.recordings.pictures.layers import LAYER, DrawnBody, DrawnFields
-from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, RunVerdict
+from dva_sim.recordings.pictures.moments import Moments, RunVerdict
 from dva_sim.worlds.view import draw_site
 from dva_sim.worlds.view_marks import points_per_metre
 

@@ -16,7 +16,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from dva_sim.recordings.pictures.moments import BYSTANDER, GUARD, ROBOT, Moments, pattern_name
+from dva_sim.recordings.pictures.colours import (
+    ACTIVITIES,
+    BYSTANDER,
+    FIRE,
+    GAS,
+    GUARD,
+    KINDS,
+    ROBOT,
+    ROBOT_MODES,
+    SMOKE,
+    WATER,
+)
+from dva_sim.recordings.pictures.moments import Moments, pattern_name
 from dva_sim.simulation.full import Playback
 from dva_sim.worlds.view import limits, set_limits
 
@@ -30,23 +42,6 @@ AHEAD, BEHIND, FAILED = ENDS = "#1b7a3d", "#59606a", "#a03030"  # how a run ende
 SMALLEST = {ROBOT: 8.5, GUARD: 7.5, BYSTANDER: 4.5}  # diameters, however large the site [points]
 TRAIL_S = 40.0  # a trail's colour falls to a third in that time [s]
 
-# What somebody is doing; what is not listed has the colour of its kind.
-ROBOT_MODES = {"Idle": "#8b95a1", "Mission": "#2f7fd0", "Teleoperation": "#7d2fb8"}
-ACTIVITIES = {
-    "waiting": "#9cc49e",
-    "getting ready": "#6fae74",
-    "walking": "#2f7d32",
-    "looking": "#c9a400",
-    "containing": "#c2571a",
-    "standing by": "#6b8f71",
-    "withdrawing": "#e08a4a",
-    "hurt": "#a03030",
-    "working": "#b7aa9c",
-    "alarmed": "#e3b100",
-    "evacuating": "#d9641e",
-    "incapacitated": "#1c1c1c",
-}
-KINDS = {ROBOT: "#2f7fd0", GUARD: "#2f7d32", BYSTANDER: "#8c6d5a"}
 SHAPES = {ROBOT: "s", GUARD: "o", BYSTANDER: "o"}
 
 # Outlines of bodies of diameter 1 that head east: a box with a bow, a disc with a beak.
@@ -61,7 +56,6 @@ OUTLINES = {
 }
 LENGTHS = {ROBOT: 1.6, GUARD: 1.64, BYSTANDER: 1.64}  # of the marker box, twice the bow
 
-FIRE, GAS, WATER, SMOKE = "#d1332e", "#b59a00", "#2a7fb8", "#55585e"  # over the floor
 SMALL = (*ROBOT_MODES.values(), *ACTIVITIES.values(), FIRE, GAS, WATER, GHOST, *ENDS)
 GAS_LEVELS = (0.1, 0.2, 0.5, 1.0)  # of the lower explosive limit
 HEAT_LEVELS = (1.0, 2.5, 10.0)  # [kW/m2]; skin bears 2.5 for long

@@ -6,9 +6,11 @@ What carries the messages of a scenario, and what they ask of a robot's link, is
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
 from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.kernel.clock import Clock
@@ -24,13 +26,13 @@ from dva_sim.network.link import (
 )
 from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.virtual_network import VirtualNetwork
-from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.control_room import add_dva, add_operator, at_event_m
 from dva_sim.simulation.full.disturbance import Disturbance
-from dva_sim.simulation.full.physical_world import Field, is_dangerous
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import SafetyAudit
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
-from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.scenario import Scenario, request_timeout_s
 
 # Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
 OTHERS_HZ = 20.0
@@ -81,6 +83,25 @@ def rehearse(scenario: Scenario, seed: int) -> None:
     Run(scenario, seed)
 
 
+@dataclass(frozen=True)
+class Watched:
+    """How a run goes that somebody else lets pass, and where people may take part.
+
+    Attributes:
+        clock: Its time.
+        recorder: Told what happens.
+        cameras: Where the robots' pictures are.
+        seats: So many operators are people, the last ones.
+        keeps: Whether all that happens is kept to be measured; without, a run may last for ever.
+    """
+
+    clock: Clock
+    recorder: Recorder
+    cameras: Cameras = OVER_ZMQ
+    seats: int = 0
+    keeps: bool = True
+
+
 class Run:
     """Everybody in place on the virtual network, at time zero.
 
@@ -88,23 +109,32 @@ class Run:
         scenario: What the run consists of.
         seed: Decides all luck but the persons'.
         keep_traffic: Keep messages and the operators' views, for pictures.
+        watched: What people give a run who watch it, and take part.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, keep_traffic: bool = False) -> None:
-        self.scenario, self.clock, self.recorder = scenario, Clock(), Recorder(keep_traffic)
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        keep_traffic: bool = False,
+        watched: Watched | None = None,
+    ) -> None:
+        watched = watched or Watched(Clock(), Recorder(keep_traffic))
+        self.scenario, self.clock, self.recorder = scenario, watched.clock, watched.recorder
         self._listeners: tuple[SafetyAudit, ...] = ()  # the audit, once all are in place
         self.network = VirtualNetwork(
             self.clock, self._link_between, self._sent, connector_of(scenario), self._delivered
         )
-        self.stage = Stage(scenario, seed, self.network, self.recorder)
+        self.stage = Stage(scenario, seed, self.network, self.recorder, cameras=watched.cameras)
         check_partitions(scenario.link.partitions, self.stage.labels.values())
         self.links = self._make_links()
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
         self._lan = lan, lan
-        self.dva = add_dva(self.stage)
+        self.dva = add_dva(self.stage, keep_events=watched.keeps)
         self.field = Field(self.stage)
         self.field.populate()
-        for number in range(1, scenario.operator.count + 1):
+        simulated = scenario.operator.count - watched.seats
+        for number in range(1, max(0, simulated) + 1):
             add_operator(self.stage, number, self.field.truth)
         self.field.schedule_incidents()
         self.audit = SafetyAudit(
@@ -117,12 +147,16 @@ class Run:
                 (mean_of(robot.processing_s) for robot in self.stage.robots), default=0.0
             ),
             dva=DVA,
+            place_of=self.field.place_of,
+            at_event=at_event_m(scenario),
+            tick=PHYSICS_TICK,
         )
         self._listeners = (self.audit,)
         Disturbance(self.stage, self.dva, self.field)
         self.dva.start()
         self.clock.every(WATCH_PERIOD, self._watch)
-        self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
+        if watched.keeps:
+            self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
 
     def run(self) -> Recording:
         """Let time pass until all is settled or the horizon is reached."""
@@ -180,6 +214,11 @@ class Run:
                 if i.detected < math.inf
             )
         )
+
+    def be_patient(self, scenario: Scenario) -> None:
+        """From now on everybody waits for answers as long as another scenario's link needs."""
+        for device in self.stage.devices:
+            device.be_patient(request_timeout_s(scenario))
 
     # --- the network -------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.kernel.clock import Clock
@@ -20,7 +21,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.messaging import Transport
-from dva_sim.network.patterns import load_pattern
+from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.protocol.exchange import NOON
 from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of
 from dva_sim.worlds.geo import Pose
@@ -28,7 +29,7 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
-_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4}
+_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -59,7 +60,14 @@ def address_of(kind: str, number: int) -> str:
     return f"192.168.{_ROOMS[kind] or 1}.{number % 250 + 1}"
 
 
-TYPES = {"dva": "DVA", "robot": ROBOT, "guard": GUARD, "operator": OPERATOR, "detector": DETECTOR}
+TYPES = {
+    "dva": "DVA",
+    "robot": ROBOT,
+    "guard": GUARD,
+    "operator": OPERATOR,
+    "detector": DETECTOR,
+    "console": OPERATOR,
+}
 
 
 @dataclass
@@ -73,6 +81,9 @@ class Stage:
         recorder: Told what happens.
         address: Gives a new device its address, by kind and number.
         time_of_day: See `AgentDevice`.
+        cameras: Where the robots' pictures are.
+        devices: All that were made.
+        pattern_names: What carries the commands for a robot, by its id, where that was changed.
 
     Raises:
         ConfigError: a map that cannot be read, or that the team does not fit on.
@@ -85,6 +96,9 @@ class Stage:
     address: Callable[[str, int], str] = address_of
     time_of_day: tuple[float, bool] = (NOON, False)
     labels: dict[str, str] = field(default_factory=dict)
+    cameras: Cameras = OVER_ZMQ
+    devices: list[AgentDevice] = field(default_factory=list)
+    pattern_names: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.streams = Streams(self.seed)
@@ -113,6 +127,11 @@ class Stage:
         """The clock that everybody shares."""
         return self.network.clock
 
+    def pattern_for(self, robot: str) -> Pattern:
+        """What carries the commands of the next drive of a robot, by its id."""
+        name = self.pattern_names.get(robot, self.scenario.pattern)
+        return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
+
     def reach(self, robot: str) -> Reach:
         """What a robot can do, by its id, as its operator has been taught."""
         spec = self._specs[robot]
@@ -120,7 +139,7 @@ class Stage:
 
     def device(self, kind: str, number: int) -> AgentDevice:
         """A new device: its identity and ways to talk."""
-        return AgentDevice(
+        device = AgentDevice(
             id_tag=id_of(kind, number),
             label=label_of(kind, number),
             device_type=TYPES[kind],
@@ -134,6 +153,8 @@ class Stage:
             labels=self.labels,
             time_of_day=self.time_of_day,
         )
+        self.devices.append(device)
+        return device
 
 
 @lru_cache(maxsize=4)

@@ -11,7 +11,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.observation import CAMERA_SCHEME
 from dva_sim.agents.people.bystander import BystanderAgent, draw_places
 from dva_sim.agents.people.evacuation import AirAt, clean_air, refuges_of
 from dva_sim.agents.people.guard import GuardAgent
@@ -23,7 +22,7 @@ from dva_sim.agents.robot.command_queue import service_times
 from dva_sim.agents.robot.controller import Limits, RobotController
 from dva_sim.agents.robot.field_of_view import FieldOfView
 from dva_sim.agents.robot.profile import RobotProfile
-from dva_sim.agents.robot.robot import FRAME, RobotAgent, RobotSetup
+from dva_sim.agents.robot.robot import RobotAgent, RobotSetup
 from dva_sim.agents.robot.sensors import make_ports, sources_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
@@ -86,7 +85,7 @@ class TeamBuilder:
             device.id_tag,
             DVA,
             Limits(config.watchdog_s, config.max_age_s),
-            camera_url=f"{CAMERA_SCHEME}{device.address}/{FRAME}",
+            camera_url=stage.cameras.url(device.label, device.address),
             clock_offset=float(stage.streams[f"{device.label}/clock"].uniform(10.0, 100_000.0)),
         )
         power = Power(profile, config.charge, body, base, stage.clock)
@@ -147,7 +146,7 @@ class TeamBuilder:
             self._failures[device.label] = failures
             if not known:
                 device.tell(
-                    f"brakes, as its drive fails: {robot.body.motors.first_failure}", "mode"
+                    f"is held back, as its drive fails: {robot.body.motors.first_failure}", "mode"
                 )
 
     def add_guard(self, number: int) -> GuardAgent:

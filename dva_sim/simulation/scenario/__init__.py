@@ -4,6 +4,7 @@ from dva_sim.simulation.scenario.contradictions import (
     TRIPS_OF_A_START,
     command_timeout_s,
     contradictions,
+    mean_processing_s,
     request_timeout_s,
     time_out_s,
 )
@@ -35,6 +36,7 @@ __all__ = [
     "guard_profile",
     "load",
     "locate_files",
+    "mean_processing_s",
     "phone_profile",
     "population",
     "request_timeout_s",

@@ -1,0 +1,336 @@
+"""A robot in the hands of a person at a console: permission, picture, and drives one by one.
+
+It takes the steps that a simulated operator takes, by the same messages; when, the person says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.observation import CameraFrame
+from dva_sim.agents.operator import steps
+from dva_sim.agents.operator.attention import OperatorSetup
+from dva_sim.agents.operator.command_sender import CommandSender
+from dva_sim.agents.operator.strategies import Reach
+from dva_sim.agents.operator.supervision import BLIND_AFTER
+from dva_sim.agents.tilt import GivenTilt, PhoneProfile
+from dva_sim.kernel.recorder import DriveLog, Shown
+from dva_sim.network.messaging import Subscription
+from dva_sim.protocol import messages as m
+
+HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
+MOST_INPUTS = 4096  # that are remembered until they act
+
+Said = Callable[[bool, str], object]  # whether it was done, and what there is to say of it
+
+
+class Input(NamedTuple):
+    """What a person wants: its number, when it came [s], and shares of the robot's limits."""
+
+    number: int
+    time: float
+    speed: float
+    turn: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Console:
+    """What persons at a console work with.
+
+    Attributes:
+        setup: Pattern, rate, time-outs, as of simulated operators.
+        phone: Turns what a person wants into commands.
+        reach: What a robot can do, by its id.
+    """
+
+    setup: OperatorSetup
+    phone: PhoneProfile
+    reach: Callable[[str], Reach]
+
+
+class HeldRobot:
+    """One robot that a person asked for.
+
+    Args:
+        device: The person's.
+        robot: By its id.
+        console: What the person works with by now.
+        alert: Told what the person has to know.
+        let_go: Told that the robot is in these hands no longer.
+
+    Attributes:
+        phase: Where it stands.
+        session: Of the permission; 0: none.
+        log: Of the newest drive.
+        frame: The newest picture that has arrived.
+        arrived: When it did [s].
+        event: What the next drives are for; 0: no event.
+        last: The newest input.
+    """
+
+    def __init__(
+        self,
+        device: AgentDevice,
+        robot: str,
+        console: Callable[[], Console],
+        alert: Callable[[str], object],
+        let_go: Callable[[HeldRobot], object],
+    ) -> None:
+        self.device, self.robot, self._console = device, robot, console
+        self._alert, self._let_go = alert, let_go
+        self.phase: HeldPhase = "asking"
+        self.session, self.event = 0, 0
+        self.log: DriveLog | None = None
+        self.frame: CameraFrame | None = None
+        self.arrived = 0.0
+        self.last = Input(0, 0.0, 0.0, 0.0)
+        self.app = GivenTilt(console().phone)
+        self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
+        self._sender: CommandSender | None = None
+        self._picture: Subscription | None = None
+        self._stopped_at = -math.inf
+        self.on_frame: Callable[[HeldRobot, CameraFrame], object] = lambda *_: None
+
+    @property
+    def label(self) -> str:
+        """The robot's, for people."""
+        return self.device.label_of(self.robot)
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether the robot has been asked to be driven, and not to stop."""
+        return self.phase in ("starting", "driving")
+
+    # --- permission ----------------------------------------------------------------------
+
+    def ask(self, said: Said) -> None:
+        """Ask the DVA for the robot."""
+
+        def answered(reply: m.Reply) -> None:
+            if self.phase == "gone":
+                if isinstance(reply.content, m.Permission):
+                    steps.give_back(self.device, self.robot, reply.content.session)
+                said(False, "given back meanwhile")
+            elif isinstance(reply.content, m.Permission):
+                self.session, self.phase = reply.content.session, "held"
+                self._watch()
+                said(True, f"{self.label} is yours")
+            else:
+                self._be_gone()
+                said(False, f"{self.label}: {_why(reply)}")
+
+        def unreachable() -> None:
+            self._be_gone()
+            said(False, f"{self.label}: the DVA does not answer")
+
+        body = m.PermissionRequest(self.robot, "teleoperation")
+        self.device.ask(self.device.dva, body, answered, unreachable)
+
+    def give_back(self) -> None:
+        """The person needs the robot no longer: it is stopped first."""
+        if self.phase == "gone":
+            return
+        self.stop("gave up" if self.is_driven else "")
+        if self.session:
+            steps.give_back(self.device, self.robot, self.session)
+        self._be_gone()
+
+    def revoked(self, session: int) -> None:
+        """The DVA says that a session is over; the robot has been told, too."""
+        if self.phase != "gone" and session == self.session:
+            self.end("gave up")
+            self._alert(f"{self.label}: the permission was revoked")
+            self._be_gone()
+
+    def _be_gone(self) -> None:
+        self.phase = "gone"
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
+        self._let_go(self)
+
+    def _watch(self) -> None:
+        def seen(picture: Subscription) -> None:
+            self._picture = picture
+
+        steps.watch(
+            self.device,
+            self.robot,
+            self.session,
+            topic=self._console().setup.topic,
+            on_frame=self._on_frame,
+            seen=seen,
+            blind=lambda url: self._alert(f"{self.label}: no camera to watch at {url!r}"),
+            wanted=lambda: self.phase != "gone",
+        )
+
+    def _on_frame(self, shown: CameraFrame | bytes) -> None:
+        frame = shown if isinstance(shown, CameraFrame) else CameraFrame.unpack(shown)
+        if frame is None or self.phase == "gone":
+            return
+        now = self.device.clock.now
+        self.frame, self.arrived = frame, now
+        if self.log is not None and self.log.ended is None:
+            self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))
+        self.on_frame(self, frame)
+
+    # --- drives --------------------------------------------------------------------------
+
+    def start(self, said: Said) -> None:
+        """Ask the robot to be driven."""
+        if self.phase != "held":
+            said(False, f"{self.label}: {_NOT_NOW.get(self.phase, self.phase)}")
+            return
+        now = self.device.clock.now
+        self.phase = "starting"
+        self.log = log = DriveLog(self.robot, self.device.id_tag, self.event, now)
+        log.taken_up = now
+        self.device.recorder.drive_ordered(log)
+
+        def refused(why: str) -> None:
+            self.end("gave up")
+            said(False, f"{self.label}: {why}")
+
+        def lost() -> None:
+            self.end("lost link")
+            said(False, f"{self.label} does not answer")
+
+        def begun() -> None:
+            self._begin(log)
+            said(True, f"{self.label} is driven")
+
+        steps.start(
+            self.device,
+            self.robot,
+            m.StartTeleOp(),
+            lambda: self.session,
+            wanted=lambda: self.phase == "starting" and self.log is log,
+            begun=begun,
+            refused=refused,
+            lost=lost,
+        )
+
+    def _begin(self, log: DriveLog) -> None:
+        setup, device = self._console().setup, self.device
+        self.phase, log.started = "driving", device.clock.now
+        if self.event:
+            device.progress(self.event, "departed")
+        device.tell(f"drives {self.label}", "drive")
+        self._inputs.clear()
+        self._sender = CommandSender(
+            device,
+            pattern=setup.pattern(self.robot),
+            drive=log,
+            session=self.session,
+            phone=self.app,
+            rate_hz=setup.rate_hz,
+            timeout=setup.timeout,
+            attempts=setup.attempts,
+            window=setup.window,
+            seen_tick=lambda: None if self.frame is None else self.frame.observation.tick,
+            on_lost=self._lost,
+            on_refused=self._refused,
+            heeds=setup.heeds,
+        )
+        self._sender.start()
+        device.clock.every(1.0, lambda: self._look_at_picture(log), start=device.clock.now + 1.0)
+
+    def want(self, number: int, speed: float, turn: float) -> None:
+        """What the person wants from now on, as shares of what the robot can do."""
+        now, reach = self.device.clock.now, self._console().reach(self.robot)
+        self.last = Input(number, now, speed, turn)
+        if self.phase == "driving":
+            self._inputs.append(self.last)
+            self.app.ask(now, speed * reach.speed, turn * reach.turn_rate)
+
+    def acted(self, made: float, sample_age: float) -> Input | None:
+        """The newest input behind a command made then [s], of samples so old on average [s]."""
+        newest = None
+        while self._inputs and self._inputs[0].time <= made - sample_age:
+            newest = self._inputs.popleft()
+        return newest
+
+    def stop(self, outcome: str = "stopped", said: Said | None = None) -> None:
+        """Stop the robot in good order; no drive that has ended goes on by itself."""
+        if not self.is_driven:
+            if said is not None:
+                said(True, f"{self.label} is not driven")
+            return
+        self.end(outcome)
+        self.phase = "stopping"
+
+        def stopped(reply: m.Reply | None = None) -> None:
+            if self.phase == "stopping":
+                self.phase = "held"
+            if said is not None:
+                done = reply is not None and reply.code == m.OK
+                said(done, f"{self.label} {'is told to stop' if done else 'does not answer'}")
+
+        self.device.ask(self.robot, m.StopTeleOp(), stopped, stopped, self.session)
+
+    def emergency(self, said: Said) -> None:
+        """Stop at once, by the way that waits for nothing."""
+        self.end("emergency")
+        ask_emergency(self.device, self.robot, self.session, said)
+
+    def _look_at_picture(self, log: DriveLog) -> bool:
+        """No picture for too long: the link is lost, whatever the pattern."""
+        goes_on = self.log is log and self.phase == "driving"
+        newest = max(self.arrived, log.started or 0.0)
+        if goes_on and self.device.clock.now - newest > max(BLIND_AFTER, self.device.timeout):
+            self._lost("no picture")
+        return goes_on
+
+    def _lost(self, why: str) -> None:
+        """Nobody answers: whatever still gets through shall stop the robot."""
+        self.end("lost link")
+        self._alert(f"{self.label}: the link counts as lost: {why}")
+        self.device.ask(self.robot, m.Emergency(), session=self.session)
+
+    def _refused(self, why: str) -> None:
+        self.end("refused")
+        self._alert(f"{self.label}: {why}")
+
+    def end(self, outcome: str) -> None:
+        """A drive is over, however it ended."""
+        if self._sender is not None:
+            self._sender.stop()
+            self._sender = None
+        log = self.log
+        if log is not None and log.ended is None:
+            log.ended = self.device.clock.now
+            log.outcome = log.outcome if log.outcome in FOUND else outcome or "stopped"
+            self.device.tell(f"ends the drive of {self.label}: {log.outcome}", "drive")
+        if self.phase in ("starting", "driving"):
+            self.phase = "held"
+
+
+FOUND = ("confirmed", "refuted")
+_NOT_NOW = {
+    "asking": "the DVA has not answered yet",
+    "starting": "it is being started",
+    "driving": "it is driven already",
+    "stopping": "it has not stopped yet",
+    "gone": "it is not yours",
+}
+
+
+def ask_emergency(device: AgentDevice, robot: str, session: int, said: Said) -> None:
+    """Send a robot an emergency, which it obeys whoever sends it."""
+    label = device.label_of(robot)
+    device.ask(
+        robot,
+        m.Emergency(),
+        lambda reply: said(reply.code == m.OK, f"{label} has stopped"),
+        lambda: said(False, f"{label} does not answer"),
+        session,
+    )
+
+
+def _why(reply: m.Reply) -> str:
+    return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))

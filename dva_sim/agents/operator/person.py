@@ -1,0 +1,277 @@
+"""A person at a console: a device like any other operator's, whose decisions are somebody's own.
+
+It registers, takes orders of the DVA and says what was found; it holds one robot or two and drives
+them by the same input. It obeys revocations and requests to hand over, as simulated operators do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.observation import CameraFrame
+from dva_sim.agents.operator.held_robot import Console, HeldRobot, Said, ask_emergency
+from dva_sim.protocol import messages as m
+
+MOST_ROBOTS = 2  # that one person drives by the same input
+DECLINED_AFTER = 30.0  # an order to a seat in which nobody sits [s]
+THERE = 3.0  # so near the place of an event a robot has arrived [m]
+
+
+class PersonAgent:
+    """A seat of a console, with or without somebody in it.
+
+    Args:
+        device: Who it is on the wire.
+        console: What it works with.
+
+    Attributes:
+        console: As given; another counts from the next drive on.
+        attended: Whether somebody sits there.
+        order: The newest order of the DVA, until it is settled or declined.
+        robots: What is in hand, by id.
+        alert: What the person has to know, in words.
+        on_robot: Told of each robot that is taken, to be watched.
+    """
+
+    def __init__(self, device: AgentDevice, console: Console) -> None:
+        self.device, self.console = device, console
+        self.attended = False
+        self.order: m.Order | None = None
+        self.robots: dict[str, HeldRobot] = {}
+        self.alert = ""
+        self.on_robot: Callable[[HeldRobot], object] = lambda _: None
+        self._arrived = False
+        device.serve(self._on_request)
+
+    @property
+    def activity(self) -> str:
+        """What the person is doing, in words."""
+        driven = [held.label for held in self.robots.values() if held.is_driven]
+        if driven:
+            return f"drives {' and '.join(driven)}"
+        if self.robots:
+            return f"holds {' and '.join(held.label for held in self.robots.values())}"
+        return "waiting" if self.attended else "nobody there"
+
+    # --- what the person does ------------------------------------------------------------
+
+    def sit_down(self) -> None:
+        """Somebody takes the seat."""
+        self.attended, self.alert = True, ""
+
+    def take(self, robots: Sequence[str], said: Said) -> None:
+        """Ask for robots: all of them, or none is kept."""
+        wanted = [robot for robot in robots if robot not in self.robots]
+        if len(self.robots) + len(wanted) > MOST_ROBOTS:
+            said(False, f"one person drives {MOST_ROBOTS} robots at most")
+            return
+        if not wanted:
+            said(True, "they are yours already")
+            return
+        answers = Gathered(len(wanted), said)
+        taken = []
+        for robot in wanted:
+            held = HeldRobot(self.device, robot, lambda: self.console, self._alert, self._let_go)
+            held.on_frame = self._on_frame
+            self.robots[robot] = held
+            taken.append(held)
+            self.on_robot(held)
+
+        def give_all_back() -> None:
+            for held in taken:
+                held.give_back()
+
+        answers.failed = give_all_back
+        for held in taken:
+            self._note_event(held)
+            held.ask(answers)
+
+    def release(self, said: Said) -> None:
+        """Stop what is driven, give everything back, and leave the seat."""
+        for held in list(self.robots.values()):
+            held.give_back()
+        if self.order is not None:
+            self._put_down("failed" if self._arrived else "declined")
+        self.attended = False
+        said(True, "released")
+
+    def start(self, said: Said) -> None:
+        """Begin to drive all robots in hand."""
+        self._each(lambda held, each: held.start(each), said)
+
+    def stop(self, said: Said, why: str = "") -> None:
+        """Stop all robots in hand."""
+        if why and any(held.is_driven for held in self.robots.values()):
+            self._alert(why)
+        self._each(lambda held, each: held.stop("stopped", each), said)
+
+    def emergency(self, robots: Sequence[str], said: Said) -> None:
+        """Stop robots at once, whoever drives them."""
+        answers = Gathered(len(robots), said)
+        for robot in robots:
+            held = self.robots.get(robot)
+            if held is None:
+                ask_emergency(self.device, robot, 0, answers)
+            else:
+                held.emergency(answers)
+
+    def ended_by_others(self, robots: Sequence[str]) -> None:
+        """Somebody else at this console sends these robots an emergency."""
+        for robot in robots:
+            held = self.robots.get(robot)
+            if held is not None and held.is_driven:
+                held.end("emergency")
+                self._alert(f"{held.label}: somebody has pressed the emergency stop")
+
+    def want(self, number: int, speed: float, turn: float) -> None:
+        """What the person wants of all robots alike: shares of their limits, turns to the left."""
+        for held in self.robots.values():
+            held.want(number, speed, turn)
+
+    def report(self, finding: str, said: Said) -> None:
+        """Say what was found where the order has led: `confirmed` or `refuted`."""
+        order = self.order
+        if order is None:
+            said(False, "there is no order in hand")
+            return
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                said(False, reply.text)
+                return
+            held = self.robots.get(order.device or "")
+            if held is not None and held.log is not None and held.log.event == order.event_id:
+                held.log.outcome = finding
+            self.device.tell(f"{finding} event {order.event_id}", "event")
+            if self.order is order:
+                self._put_down("done")
+            said(True, f"event {order.event_id} is {finding}")
+
+        unreachable = lambda: said(False, "the DVA does not answer")  # noqa: E731
+        body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, finding)
+        self.device.ask(self.device.dva, body, answered, unreachable)
+
+    def decline(self, said: Said) -> None:
+        """Give the order back."""
+        if self.order is None:
+            said(False, "there is no order in hand")
+            return
+        number = self.order.event_id
+        self._put_down("declined")
+        said(True, f"event {number} is declined")
+
+    def _each(self, act: Callable[[HeldRobot, Said], object], said: Said) -> None:
+        if not self.robots:
+            said(False, "no robot is in hand")
+            return
+        answers = Gathered(len(self.robots), said)
+        for held in list(self.robots.values()):
+            act(held, answers)
+
+    # --- what the DVA says ---------------------------------------------------------------
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        if message.source != self.device.dva:
+            return m.Reply(message.message_id, m.NOT_PERMITTED, "only the DVA gives orders")
+        match message.body:
+            case m.PermissionRevocation(device=robot, session=session):
+                if robot in self.robots:
+                    self.robots[robot].revoked(session)
+            case m.Order(device=str(), task="confirm") as order:
+                self._on_order(order)
+            case m.OrderProgress(event_id=event, state="done"):
+                self._on_recall(event)
+            case m.HandoverRequest(device=robot, label=asker):
+                held = self.robots.get(robot)
+                if held is not None and held.is_driven:
+                    self._alert(f"{asker} asks for {held.label}")
+                    return m.Reply(message.message_id, m.BUSY, "at work with it")
+            case _:
+                return m.Reply(message.message_id, m.NOT_SUPPORTED, "a person drives robots")
+        return m.Reply(message.message_id, m.OK, "")
+
+    def _on_order(self, order: m.Order) -> None:
+        known = self.order
+        if known is not None and (known.event_id, known.device) == (order.event_id, order.device):
+            return  # the DVA says again what it has said before
+        self.order, self._arrived = order, False
+        robot = self.device.label_of(order.device or "")
+        self.device.tell(f"shall drive {robot} to event {order.event_id}", "order")
+        for held in self.robots.values():
+            self._note_event(held)
+        self.device.clock.call_after(DECLINED_AFTER, self._decline_alone, order)
+
+    def _note_event(self, held: HeldRobot) -> None:
+        order = self.order
+        held.event = order.event_id if order is not None and order.device == held.robot else 0
+        if held.event and held.phase == "driving":
+            self.device.progress(held.event, "departed")
+
+    def _decline_alone(self, order: m.Order) -> None:
+        """Nobody sits here: others shall go."""
+        if self.order is order and not self.attended:
+            self.device.tell(f"declines event {order.event_id}: nobody sits here", "order")
+            self._put_down("declined")
+
+    def _on_recall(self, event: int) -> None:
+        if self.order is not None and self.order.event_id == event:
+            self.order = None
+            self._forget_event()
+            self._alert(f"event {event} is settled, or another's")
+
+    def _put_down(self, state: str) -> None:
+        assert self.order is not None
+        self.device.progress(self.order.event_id, state)
+        self.order = None
+        self._forget_event()
+
+    def _forget_event(self) -> None:
+        for held in self.robots.values():
+            held.event = 0
+
+    def _on_frame(self, held: HeldRobot, frame: CameraFrame) -> None:
+        """The app says by itself when the robot is where it was sent."""
+        order, seen = self.order, frame.observation
+        if order is None or self._arrived or not (held.event and held.phase == "driving"):
+            return
+        goal = self.device.frame.to_xy(order.position.latitude, order.position.longitude)
+        if math.dist((seen.x, seen.y), goal) < THERE:
+            self._arrived = True
+            self.device.progress(order.event_id, "arrived")
+
+    def _alert(self, what: str) -> None:
+        self.alert = what
+        self.device.tell(what, "link")
+
+    def _let_go(self, held: HeldRobot) -> None:
+        if self.robots.get(held.robot) is held:
+            del self.robots[held.robot]
+
+
+class Gathered:
+    """One answer made of several: all must be good.
+
+    Args:
+        count: How many are to come.
+        said: Told once all have.
+
+    Attributes:
+        failed: Called before, if one was not good.
+    """
+
+    def __init__(self, count: int, said: Said) -> None:
+        self._left, self._said, self._good = count, said, True
+        self._texts: list[str] = []
+        self.failed: Callable[[], object] = lambda: None
+
+    def __call__(self, done: bool, text: str) -> None:
+        """One of them has come."""
+        self._left -= 1
+        self._good = self._good and done
+        self._texts.append(text)
+        if self._left == 0:
+            if not self._good:
+                self.failed()
+            self._said(self._good, "; ".join(dict.fromkeys(self._texts)))

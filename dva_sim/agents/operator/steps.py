@@ -1,0 +1,113 @@
+"""What whoever drives a robot has to go through, person or simulated: picture, start, giving back.
+
+Pure of any judgement: each step says how it went, and whoever takes it decides what follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.network.messaging import Subscription
+from dva_sim.protocol import messages as m
+
+START_TRIES = 20
+START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
+NOT_YET = (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION)  # what is then answered
+
+
+def watch(
+    device: AgentDevice,
+    robot: str,
+    session: int,
+    *,
+    topic: Callable[[str], str | None],
+    on_frame: Callable[[Any], object],
+    seen: Callable[[Subscription], object],
+    blind: Callable[[str], object],
+    wanted: Callable[[], bool],
+) -> None:
+    """Ask a robot where its camera is, and watch it.
+
+    Args:
+        device: Whose screen it is.
+        robot: By its id.
+        session: Of the permission.
+        topic: On which the frames of a URL are published; see `Cameras`.
+        on_frame: Takes each frame.
+        seen: Told once it is watched.
+        blind: Told the URL, if there is nothing to see there.
+        wanted: Whether it still is.
+    """
+
+    def answered(reply: m.Reply) -> None:
+        if not wanted():
+            return
+        url = reply.content.camera_url if isinstance(reply.content, m.SensorInfo) else ""
+        found = topic(url)
+        if found is None:
+            blind(url)
+        else:
+            seen(device.network.subscribe(device.id_tag, robot, found, on_frame))
+
+    device.ask(robot, m.GetSensorInfo(), answered, session=session)
+
+
+def start(
+    device: AgentDevice,
+    robot: str,
+    body: m.Body,
+    session: Callable[[], int],
+    *,
+    wanted: Callable[[], bool],
+    begun: Callable[[], object],
+    refused: Callable[[str], object],
+    lost: Callable[[], object],
+    tries: int = 1,
+) -> None:
+    """Ask a robot to begin, again and again while it may not know of the permission yet.
+
+    Args:
+        device: Who asks.
+        robot: By its id.
+        body: What is asked.
+        session: Of the permission, as it is by then.
+        wanted: Whether it still is.
+        begun: Told that the robot agrees.
+        refused: Told why it does not.
+        lost: Told that it does not answer.
+        tries: Which one this is.
+    """
+    if not wanted():
+        return
+
+    def again() -> None:
+        start(
+            device,
+            robot,
+            body,
+            session,
+            wanted=wanted,
+            begun=begun,
+            refused=refused,
+            lost=lost,
+            tries=tries + 1,
+        )
+
+    def answered(reply: m.Reply) -> None:
+        if not wanted():
+            return
+        if reply.code == m.OK:
+            begun()
+        elif tries < START_TRIES and reply.code in NOT_YET:
+            device.clock.call_after(START_AGAIN, again)
+        else:
+            refused(reply.text)
+
+    device.ask(robot, body, answered, lost, session())
+
+
+def give_back(device: AgentDevice, robot: str, session: int) -> None:
+    """Tell the DVA that a permission is needed no longer."""
+    device.ask(device.dva, m.PermissionRevocation(robot, device.id_tag, session))

@@ -1,0 +1,229 @@
+"""The phone's app: samples of an accelerometer go in with their times, commands come out.
+
+Calibration -> filter -> mapping -> a rule for when something is sent. It is the same app whoever
+tilts the phone: a simulated hand, a person whose input is turned into tilt, or a real phone that
+tells what its own part measures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Final, NamedTuple
+
+from dva_sim.agents.tilt.accelerometer import Triple
+from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration, Reading
+from dva_sim.agents.tilt.filters import BATCH, Filter, load_guarded_filter
+from dva_sim.agents.tilt.mappings import load_guarded_mapping
+from dva_sim.agents.tilt.profile import PhoneProfile
+
+TIE: Final = 1e-9  # moments nearer than this are the same [s]
+_TICK: Final = 1e-6  # who looks by a clock that rounds may come so much too soon [s]
+
+
+def calibrated(profile: PhoneProfile, reference: Triple) -> Calibration:
+    """The app's calibration by a reference pose: x, y, z [m/s^2]."""
+    return Calibration(
+        reference,
+        speed_step=profile.speed_step_mps2,
+        turn_step=profile.turn_step_mps2,
+        max_delay=profile.max_delay_s,
+    )
+
+
+class TiltCommand(NamedTuple):
+    """What the phone sends.
+
+    Attributes:
+        speed: [m/s]
+        turn_rate: [rad/s]
+        sample_age: Mean age of the information in the reading that the command was made of:
+            from the samples that the filter holds, each with its weight in the value, to now [s].
+            All that the phone delays is in it once: waiting for the next sample, the filter, and
+            how long its value has stood. The lag of the hand is before it, the mapping after it.
+        captured: When the pictures behind it were captured, on average [s]; for the recorder.
+    """
+
+    speed: float
+    turn_rate: float
+    sample_age: float
+    captured: float
+
+
+class Trail:
+    """Takes the time at which a picture was captured the way that the tilt takes.
+
+    The hand averages what it is asked to do, and the filter averages what the hand does. The
+    same hand and the same filter, given capture times in place of tilts, answer when the
+    pictures behind a command were captured, on average: as old as a signal that rises steadily
+    comes out of both. It is for the recorder alone, and touches no command.
+
+    Args:
+        make_filter: Makes another filter like the phone's.
+    """
+
+    def __init__(self, make_filter: Callable[[], Filter]) -> None:
+        self._make_filter = make_filter
+        self.begin(0.0)
+
+    def begin(self, now: float) -> None:
+        """A drive begins; what is behind the tilt until a picture is followed counts from now."""
+        self._filter = self._make_filter()
+        # Since the beginning, as empty slots of a filter hold a zero.
+        self._begun, self._asked, self._hand = now, 0.0, 0.0
+
+    def follow(self, captured: float) -> None:
+        """From now on the hand follows what a picture captured at that time [s] led to."""
+        self._asked = captured - self._begun
+
+    def sample(self, count: int, decay: float) -> None:
+        """So many samples; from each to the next the hand keeps the share `decay`."""
+        asked, hand, add = self._asked, self._hand, self._filter.add
+        for _ in range(count):
+            hand = asked + (hand - asked) * decay
+            add((hand, hand))
+        self._hand = hand
+
+    def captured(self) -> float:
+        """When the pictures behind the filter's value were captured, on average [s]."""
+        return self._begun + self._filter.value()[0]
+
+    @property
+    def age(self) -> float:
+        """Mean age of what the filter's value is made of, in samples: of the value taken last."""
+        return self._filter.age
+
+    @property
+    def asked(self) -> float:
+        """When the picture was captured that is followed now [s]."""
+        return self._begun + self._asked
+
+
+class TiltApp:
+    """An app of a phone. What comes of a sample depends on when it was taken, never on who looks.
+
+    Args:
+        profile: How it reads, filters, maps and sends.
+        reference: What the part measures in the pose that means nothing: x, y, z [m/s^2].
+        period: Mean time between two samples [s].
+        decay: The share of the way to what is asked that the hand still has to go, from one
+            sample to the next: 0 if samples are what was asked.
+
+    Attributes:
+        shown: The command on the display: level, turn [deg/s].
+        samples: How many were in the batches of this drive.
+        values: How many batches there were.
+
+    Raises:
+        ConfigError: the filter or the mapping cannot be had.
+    """
+
+    def __init__(
+        self, profile: PhoneProfile, reference: Triple, period: float, decay: float = 0.0
+    ) -> None:
+        self._profile, self._period, self._decay = profile, period, decay
+        self._app = calibrated(profile, reference)
+        filters = load_guarded_filter(profile.filter, profile.filter_options)
+        self._make_filter: Callable[[], Filter] = partial(filters, period)
+        self._batch = self._make_filter().batch
+        self._mapping = load_guarded_mapping(profile.mapping, profile.mapping_options)
+        self._watches = self._mapping.integrates
+        self._trail = Trail(self._make_filter)
+
+    def pick_up(self, now: float) -> None:
+        """Begin a drive: the app starts with nothing in its filter."""
+        self._mapping.begin()
+        self._filter = self._make_filter()
+        self._trail.begin(now)
+        self.shown: Reading = (0.0, 0.0)
+        self.samples = self.values = 0
+        self._last_key: tuple[int, int] | None = None
+        self._fresh = 0
+        self._taken_at = self._stems_from = self._sampled_at = self._captured = now
+        self._due = math.inf if self._batch is None else now + self._app.max_delay
+
+    def sample(self, at: float, acceleration: Triple) -> None:
+        """What the part measured at a time [s], never before an earlier one: x, y, z [m/s^2]."""
+        self.take_values(at - 2 * TIE)
+        self._filter.add(self._app.reading(*acceleration))
+        self._trail.sample(1, self._decay)
+        self._fresh += 1
+        passed, self._sampled_at = at - self._sampled_at, at
+        if self._watches:
+            self._watch(passed)
+        if self._fresh == self._batch:
+            self._take_value(at)
+
+    def take_values(self, now: float) -> None:
+        """Values that were due although no batch was complete."""
+        while self._due <= now + TIE:
+            self._take_value(self._due)
+
+    def followed(self, captured: float) -> None:
+        """From now on the samples are by a picture that was captured at that time [s]."""
+        self._trail.follow(captured)
+
+    def next_look(self, now: float, rate_hz: float) -> float:
+        """When the app next considers sending [s]: its period, or when a batch is complete."""
+        if self.keeps_alive:
+            return now + 1.0 / rate_hz
+        if self._batch is None or self._profile.ideal:
+            return now + min(self._app.max_delay, BATCH * self._period)
+        self._advance(now)
+        complete = self._next_sample + (self._batch - self._fresh - 1) * self._period
+        return min(math.ceil((self._due - TIE / 2) / _TICK) * _TICK, complete + _TICK)
+
+    def look(self, now: float) -> TiltCommand | None:
+        """The command to send at `now`, or None if there is nothing new to say."""
+        self._advance(now)
+        if not self._profile.ideal and self._batch is None:
+            if not self._watches:
+                self.shown = self._mapping.command(*self._filter.value(), 0.0)
+            self._captured = self._trail.captured()
+            self._stems_from = self._sampled_at - self._trail.age * self._period
+        level, turn = self.shown
+        key = round(level), int(turn)
+        if key == self._last_key and not self.keeps_alive:
+            return None
+        self._last_key = key
+        age = now - self._stems_from
+        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age, self._captured)
+
+    @property
+    def keeps_alive(self) -> bool:
+        """Whether the newest value is sent at every chance, changed or not."""
+        return self._profile.send == "keep_alive"
+
+    @property
+    def failures(self) -> int:
+        """How often in this drive a user's filter or mapping gave no answer that is one."""
+        return self._filter.failures + self._mapping.failures
+
+    @property
+    def first_failure(self) -> str:
+        """What was wrong with it first, in a line."""
+        return self._filter.first_failure or self._mapping.first_failure
+
+    @property
+    def _next_sample(self) -> float:
+        """When the next sample is to be expected [s]."""
+        return self._sampled_at + self._period
+
+    def _advance(self, now: float) -> None:
+        """All that was due by now."""
+        self.take_values(now)
+
+    def _watch(self, dt: float) -> None:
+        """What the display shows after a sample."""
+        if self._batch is None:
+            self.shown = self._mapping.command(*self._filter.value(), dt)
+
+    def _take_value(self, at: float) -> None:
+        """A batch is complete, or its time is over."""
+        self.samples, self.values = self.samples + self._fresh, self.values + 1
+        reading = self._filter.value()
+        self._stems_from = self._sampled_at - self._filter.age * self._period
+        self._captured = self._trail.captured()
+        self.shown = self._mapping.command(*reading, at - self._taken_at)
+        self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0

@@ -1,0 +1,70 @@
+"""A phone that is tilted exactly as asked: what a person gives by key, pointer or gamepad.
+
+No hand lags and no part is noisy: the person has a hand of its own. All else is the same app, so
+that what is asked takes the same filter, mapping and rule of sending as a tilt does.
+"""
+
+from __future__ import annotations
+
+import math
+
+from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
+from dva_sim.agents.tilt.app import TIE, TiltApp, TiltCommand, calibrated
+from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
+from dva_sim.agents.tilt.mappings import limited
+from dva_sim.agents.tilt.profile import PhoneProfile
+
+LEAST_WITHIN = 0.1  # in what time a gap on the display is closed at the soonest [s]; assumed
+
+
+class GivenTilt(TiltApp):
+    """A phone in nobody's hand.
+
+    Samples are made when somebody looks, for all the time since, at the profile's rate.
+
+    Args:
+        profile: Phone and app.
+
+    Raises:
+        ConfigError: the filter or the mapping cannot be had.
+    """
+
+    def __init__(self, profile: PhoneProfile) -> None:
+        super().__init__(profile, profile.reference_mps2, 1.0 / profile.sample_rate_hz)
+        self._pose = calibrated(profile, profile.reference_mps2).pose
+        self.pick_up(0.0)
+
+    def pick_up(self, now: float) -> None:
+        """See `TiltApp`: it is asked to stand."""
+        super().pick_up(now)
+        self._wanted = 0.0, 0.0
+        self._tilt = self._tilted()
+
+    def ask(self, now: float, speed: float, turn_rate: float) -> None:
+        """What is wanted from `now` on: speed [m/s], turn rate [rad/s]."""
+        self._advance(now)
+        self.followed(now)
+        self._wanted = limited(speed / SPEED_PER_LEVEL, math.degrees(turn_rate))
+        self._tilt = self._tilted()
+
+    def look(self, now: float) -> TiltCommand | None:
+        """See `TiltApp`; of an ideal phone, what is wanted."""
+        if self._profile.ideal:
+            self.shown = self._wanted
+            self._stems_from, self._captured = now, self._trail.asked
+        return super().look(now)
+
+    def _advance(self, now: float) -> None:
+        """The samples that were due by now."""
+        while not self._profile.ideal and (at := self._next_sample) <= now + TIE:
+            if self._watches:
+                self._tilt = self._tilted()
+            self.sample(at, self._tilt)
+        self.take_values(now)
+
+    def _tilted(self) -> Triple:
+        """What a perfect part measures of the tilt that is asked [m/s^2]."""
+        within = max(LEAST_WITHIN, self._period)
+        pitch, roll = self._pose(*self._mapping.tilt_for(self._wanted, self.shown, within))
+        flat = GRAVITY * math.cos(pitch)
+        return GRAVITY * math.sin(pitch), flat * math.sin(roll), flat * math.cos(roll)

@@ -1,0 +1,258 @@
+"""What people at pages ask for: each action is done once, and answered once.
+
+Seats are given out here. Whatever ends a drive ends it for good: nothing begins again by itself.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.console.seats import Answers, Seats
+from dva_sim.console.world import World
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.patterns import PATTERNS
+from dva_sim.network.realtime import FASTEST
+
+Line = dict[str, Any]
+Said = Callable[[bool, str], object]
+
+LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
+
+
+class Refused(Exception):
+    """An action that cannot be done, and why, in a line."""
+
+
+class Actions:
+    """Does what lines of the web process ask for.
+
+    Args:
+        world: In which.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._seats, self._answers = Seats(), Answers()
+        world.hold = self._stop_all
+        world.clock.pulse(LOOK, self._look_for_the_silent)
+        self._doers: dict[str, Callable[[str, Line, Said], object]] = {
+            "take": self._take,
+            "release": self._release,
+            "start": self._start,
+            "stop": self._stop,
+            "emergency": self._emergency,
+            "link": self._link,
+            "pattern": self._pattern,
+            "pace": self._pace,
+            "confirm": lambda client, _, said: self._person(client).report("confirmed", said),
+            "refute": lambda client, _, said: self._person(client).report("refuted", said),
+            "decline": self._decline,
+        }
+
+    def take(self, line: Line) -> None:
+        """Do what a line asks for; nothing that it can hold does any harm."""
+        what, client = line.get("do"), str(line.get("client", ""))
+        if what == "input":
+            self._input(client, line)
+        elif what == "gone":
+            self._gone(client)
+        elif what == "watch":
+            self._watch(line.get("robots"))
+        elif isinstance(number := line.get("id"), str):
+            self._once(number, client, str(what), line)
+
+    def _once(self, number: str, client: str, what: str, line: Line) -> None:
+        if not self._answers.begin(number):
+            known = self._answers.given[number]
+            if known is not None:
+                self._tell(number, *known)
+            return
+        said = partial(self._said, number)
+        do = self._doers.get(what)
+        if do is None:
+            said(False, f"no action {what!r}")
+            return
+        try:
+            do(client, line, said)
+        except (Refused, ConfigError) as error:
+            said(False, str(error))
+
+    def _said(self, number: str, ok: bool, text: str) -> None:
+        self._answers.end(number, ok, text)
+        self._tell(number, ok, text)
+        self._world.tell_now()
+
+    def _tell(self, number: str, ok: bool, text: str) -> None:
+        now = self._world.feed.now_ms
+        self._world.tell({"k": "done", "t": now, "id": number, "ok": ok, "text": text})
+
+    # --- seats -----------------------------------------------------------------------------
+
+    def _person(self, client: str) -> PersonAgent:
+        seat = self._seats.taken.get(client)
+        if seat is None:
+            raise Refused("nothing is in hand: take control first")
+        return self._world.person(seat.number)
+
+    def _take(self, client: str, line: Line, said: Said) -> None:
+        robots = self._robots(line)
+        number = self._seats.sit(client)
+        if number is None:
+            raise Refused("all seats are taken")
+        person = self._world.person(number)
+        self._world.client_of[number] = client
+        person.sit_down()
+
+        def answered(ok: bool, text: str) -> None:
+            if not ok and not person.robots:
+                self._leave(client)
+            self._hold()
+            said(ok, text)
+
+        person.take(robots, answered)
+
+    def _release(self, client: str, _: Line, said: Said) -> None:
+        person = self._person(client)
+        person.release(said)
+        self._leave(client)
+
+    def _leave(self, client: str) -> None:
+        number = self._seats.stand_up(client)
+        if number is not None:
+            self._world.persons[number].attended = False
+            self._world.client_of.pop(number, None)
+            self._world.free_seat(client)
+        self._hold()
+
+    def _hold(self) -> None:
+        held = {robot for person in self._world.persons for robot in person.robots}
+        self._world.screens.hold(held)
+
+    def _robots(self, line: Line) -> list[str]:
+        """Ids of the robots that a line names by their numbers or labels."""
+        given = line.get("robots")
+        if given == "all":
+            return list(self._world.run.field.robots)
+        if not isinstance(given, list) or not given:
+            raise Refused("no robot is named")
+        return list(dict.fromkeys(self._robot(one) for one in given))
+
+    def _robot(self, given: Any) -> str:
+        world = self._world
+        for robot in world.run.field.robots.values():
+            number = world.feed.numbers[robot.device.id_tag]
+            if given in (robot.device.label, robot.device.id_tag) or (
+                isinstance(given, int) and not isinstance(given, bool) and given == number
+            ):
+                return robot.device.id_tag
+        raise Refused(f"there is no robot {given!r}")
+
+    # --- drives ----------------------------------------------------------------------------
+
+    def _start(self, client: str, _: Line, said: Said) -> None:
+        person, world = self._person(client), self._world
+        if world.lag.held:
+            raise Refused("held: this machine cannot keep up with real time")
+        if world.clock.paused:
+            raise Refused("time stands still: go on first")
+        person.alert = ""
+        person.start(said)
+
+    def _stop(self, client: str, _: Line, said: Said) -> None:
+        self._person(client).stop(said)
+
+    def _emergency(self, client: str, line: Line, said: Said) -> None:
+        robots = self._robots(line)
+        seat = self._seats.taken.get(client)
+        # Who drives a robot from here learns of its end at once, whoever pressed the button.
+        own = self._world.person(0 if seat is None else seat.number)
+        for person in self._world.persons:
+            if person is not own:
+                person.ended_by_others(robots)
+        own.emergency(robots, said)
+
+    def _input(self, client: str, line: Line) -> None:
+        """What a person wants now; what is no number wants to stand."""
+        speed, turn, number = line.get("speed"), line.get("turn"), line.get("n")
+        held = line.get("held") is True
+        if not (held and _is_share(speed, 0.0) and _is_share(turn, -1.0)):
+            speed = turn = 0.0
+        if self._seats.heard(client, time.monotonic(), held):
+            count = number if isinstance(number, int) else 0
+            self._person(client).want(count, float(speed or 0.0), float(turn or 0.0))
+
+    def _gone(self, client: str) -> None:
+        """The page is hidden, or its socket closed: nobody has a hand on it."""
+        self._stop_one(client, "the page is gone, or hidden")
+
+    def _look_for_the_silent(self) -> None:
+        for client in self._seats.silent(time.monotonic()):
+            self._stop_one(client, "nothing was heard of the page while it held on")
+
+    def _stop_one(self, client: str, why: str) -> None:
+        seat = self._seats.taken.get(client)
+        if seat is not None:
+            seat.holds = False
+            self._world.person(seat.number).stop(_nobody, why)
+
+    def _stop_all(self, why: str) -> None:
+        for client in list(self._seats.taken):
+            self._stop_one(client, why)
+
+    def _decline(self, client: str, _: Line, said: Said) -> None:
+        """Of the own seat, or of one in which nobody sits."""
+        if client in self._seats.taken:
+            self._person(client).decline(said)
+            return
+        free = [p for p in self._world.persons if p.order is not None and not p.attended]
+        if not free:
+            raise Refused("there is no order in hand")
+        free[0].decline(said)
+
+    # --- what can be changed ---------------------------------------------------------------
+
+    def _link(self, _: str, line: Line, said: Said) -> None:
+        said(True, self._world.change_link(line))
+
+    def _pattern(self, _: str, line: Line, said: Said) -> None:
+        robot, name = self._robot(line.get("robot")), line.get("name")
+        world = self._world
+        if name not in PATTERNS and name != world.scenario.pattern:
+            raise Refused(f"there is no pattern {name!r}; patterns: {', '.join(PATTERNS)}")
+        label = world.run.stage.labels[robot]
+
+        def changed(ok: bool, text: str = "") -> None:
+            said(ok, f"{label} is driven by {name} next" if ok else text)
+
+        world.change_pattern(robot, str(name), changed)
+
+    def _pace(self, _: str, line: Line, said: Said) -> None:
+        factor, paused = line.get("factor"), line.get("paused")
+        if factor is not None and not _is_share(factor, 1.0, FASTEST):
+            raise Refused(f"factor should be a number from 1 to {FASTEST:g}")
+        if paused is not None and not isinstance(paused, bool):
+            raise Refused("paused should be true or false")
+        if paused:
+            self._stop_all("time stands still")
+        clock = self._world.clock
+        clock.pace(None if factor is None else float(factor), paused)
+        now = "time stands still" if clock.paused else f"{clock.factor:g} times real time"
+        said(True, now)
+
+    def _watch(self, robots: Any) -> None:
+        numbers = robots if isinstance(robots, list) else []
+        ids = {t["id"] for t in self._world.feed.things if t["i"] in numbers}
+        self._world.screens.watch(ids)
+
+
+def _nobody(ok: bool, text: str) -> None:
+    """Takes the answer to what nobody asked for."""
+
+
+def _is_share(value: Any, least: float, most: float = 1.0) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and least <= value <= most

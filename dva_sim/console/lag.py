@@ -1,0 +1,34 @@
+"""When robots are held because the machine cannot keep up: pure, told what was measured."""
+
+from __future__ import annotations
+
+LIMIT = 0.25  # behind real time; above, nobody drives by what is on the page [s]
+GOOD_FOR = 1.0  # below the limit for so long, driving may begin again [s]
+
+
+class LagRule:
+    """Whether a world is too far behind for anybody to drive in it.
+
+    Attributes:
+        held: Whether it is now.
+        newest: The lag that was measured last [s].
+    """
+
+    def __init__(self) -> None:
+        self.held, self.newest = False, 0.0
+        self._bad_at = float("-inf")
+
+    def measured(self, now: float, lag: float) -> bool:
+        """Take a measurement: True if robots have to stop now that went on until then.
+
+        Args:
+            now: Real time [s].
+            lag: By how much events came too late [s].
+        """
+        self.newest = lag
+        if lag > LIMIT:
+            begins, self.held, self._bad_at = not self.held, True, now
+            return begins
+        if self.held and now - self._bad_at >= GOOD_FOR:
+            self.held = False
+        return False

@@ -1,0 +1,74 @@
+"""The link under the sliders: what a person asks for, made into what a link can be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.link import LinkConfig
+from dva_sim.simulation.scenario import Scenario
+
+LIMITS: Final[dict[str, tuple[float, float]]] = {
+    "delay_s": (0.0, 5.0),
+    "jitter_s": (0.0, 1.0),
+    "loss": (0.0, 0.5),
+    "rate_bps": (1e4, 1e9),
+    "processing_s": (0.0, 3.0),
+}
+"""What the sliders reach."""
+_LAWS = ("delay_law", "delay_log")  # of which jitter takes the place
+
+
+def read(given: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers of an action.
+
+    Raises:
+        ConfigError: one that is none, or beyond what the sliders reach.
+    """
+    values: dict[str, float] = {}
+    for key, (least, most) in LIMITS.items():
+        value = given.get(key)
+        if value is None:
+            continue
+        if not isinstance(value, int | float) or not least <= value <= most:
+            raise ConfigError(f"{key} should be a number from {least:g} to {most:g}")
+        values[key] = float(value)
+    return values
+
+
+def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
+    """A link with other numbers in both directions; jitter is kept within the delay.
+
+    Raises:
+        ConfigError: what cannot be, such as a rate where a recorded trace gives it.
+    """
+    if "rate_bps" in wanted and (link.trace_up or link.trace_down):
+        raise ConfigError("the recorded trace gives this link's rate")
+    values = {key: value for key, value in wanted.items() if key in LinkConfig.model_fields}
+    delay = values.get("delay_s", link.delay_s)
+    values["jitter_s"] = min(values.get("jitter_s", link.jitter_s), delay)
+    ways = {}
+    for way in ("up", "down"):
+        special = getattr(link, way)
+        if special is not None:
+            ways[way] = special.model_copy(update=dict.fromkeys(values))
+    gone: dict[str, Any] = dict.fromkeys(_LAWS) if wanted.get("jitter_s") else {}
+    if gone:
+        ways = {way: special.model_copy(update=gone) for way, special in ways.items()}
+    if wanted.get("loss") is not None:
+        gone["bursts"] = None
+        ways = {way: special.model_copy(update={"bursts": None}) for way, special in ways.items()}
+    made = link.model_copy(update=values | gone | ways)
+    try:
+        return LinkConfig.model_validate(made.model_dump())
+    except ValueError as error:
+        raise ConfigError(f"no such link: {error}") from None
+
+
+def with_link(scenario: Scenario, link: LinkConfig, processing: float | None) -> Scenario:
+    """A scenario over another link, to ask what time-outs that needs."""
+    robot = scenario.robot
+    if processing is not None:
+        robot = robot.model_copy(update={"processing_s": processing})
+    return scenario.model_copy(update={"link": link, "robot": robot})

@@ -1,0 +1,58 @@
+"""What a console is asked for, read and judged before anything starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dva_sim.kernel.config_overrides import parse_changes, set_by
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.writing import check_target
+from dva_sim.simulation.scenario import Scenario, build, load
+
+DEFAULT, DEFAULT_PORT = "hands-on", 8765
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConsoleOptions:
+    """What to run, and where it is to be seen.
+
+    Attributes:
+        scenario: By name or path.
+        seed: Decides all luck.
+        changes: Of the scenario, `KEY=VALUE`.
+        host: Address to listen on.
+        port: 0: any that is free.
+        token: Whether the address has to hold a secret.
+        open: Whether a browser is opened, where there is one.
+        record: Recording to be made, if any.
+        overwrite: What is there may be replaced.
+    """
+
+    scenario: str = DEFAULT
+    seed: int = 1
+    changes: tuple[str, ...] = ()
+    host: str = "127.0.0.1"
+    port: int = DEFAULT_PORT
+    token: bool = True
+    open: bool = True
+    record: Path | None = None
+    overwrite: bool = False
+
+    def read(self) -> Scenario:
+        """The scenario.
+
+        Raises:
+            ConfigError: it cannot be run before people's eyes, or not recorded as wanted.
+        """
+        document, changes = load(self.scenario), parse_changes(self.changes)
+        model = document.data.get("model", "full")
+        if model != "full":
+            raise ConfigError(f"{self.scenario!r} is a {model} scenario: nobody moves in it")
+        try:
+            scenario = build(document, changes)
+        except ConfigError as error:
+            raise set_by(self.changes, error) from None
+        if self.record is not None:
+            check_target(self.record, self.overwrite)
+        return scenario

@@ -1,0 +1,115 @@
+"""What a console remembers of its run: little, and all of it in a file where one is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.kernel.recorder import DriveLog, Recorder
+from dva_sim.live.recording import LiveRecorder
+from dva_sim.simulation.full.run import FILM_PERIOD, Run
+
+KEPT = 200  # of each list of a drive, and of ended drives nothing but the last
+KEPT_DRIVES = 20
+KEPT_COMMANDS = 2000  # on their way
+
+Note = Callable[[DriveLog], object]
+
+
+class ConsoleRecorder(Recorder):
+    """A recorder of a run that may last for ever.
+
+    Attributes:
+        on_applied: Told of each drive that has had a command take effect.
+        kept: Takes lines for a recording, if there is to be one.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.on_applied: Note = lambda _: None
+        self.kept: LiveRecorder | None = None
+        self._numbers: dict[int, int] = {}
+        self._known = 0
+        self._done: dict[int, list[float]] = {}  # up to when a drive was kept [s]
+
+    def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
+        """See `Recorder`."""
+        super().tell(time, who, what, kind)
+        if self.kept is not None:
+            self.kept.put("told", time, who, what, kind)
+
+    def view(self, time: float, robot: str, x: float, y: float, heading: float) -> None:
+        """See `Recorder`."""
+        if self.kept is not None:
+            self.kept.view(time, robot, x, y, heading)
+
+    def message_sent(
+        self, time: float, source: str, destination: str, size: int, payload: Any
+    ) -> None:
+        """See `Recorder`."""
+        super().message_sent(time, source, destination, size, payload)
+        if self.kept is not None:
+            self.kept.message(source, payload, sent=True)
+
+    def command_applied(self, drive: DriveLog, *about: Any, **more: Any) -> None:
+        """See `Recorder`."""
+        super().command_applied(drive, *about, **more)
+        self.on_applied(drive)
+
+    def drive_ordered(self, drive: DriveLog) -> None:
+        """See `Recorder`."""
+        super().drive_ordered(drive)
+        self._known += 1
+        self._numbers[id(drive)] = self._known
+
+    def tidy(self) -> None:
+        """Keep what is new for the recording, and forget what is old."""
+        for drive in self.drives:
+            if self.kept is not None:
+                self._keep(self.kept, drive)
+            for kept in (drive.frames, drive.commands, drive.applied, drive.intents):
+                del kept[:-KEPT]
+        over = [drive for drive in self.drives if drive.ended is not None][:-KEPT_DRIVES]
+        for drive in over:
+            self.drives.remove(drive)
+            self._done.pop(self._numbers.pop(id(drive)), None)
+        for key in list(self._issued)[:-KEPT_COMMANDS]:
+            del self._issued[key]
+
+    def _keep(self, kept: LiveRecorder, drive: DriveLog) -> None:
+        number = self._numbers[id(drive)]
+        facts = [drive.robot, drive.operator, drive.event, drive.ordered]
+        facts += [drive.started, drive.ended, drive.outcome]
+        kept.put_new("drive", drive.operator, number, facts, key=f"drive {number}")
+        done = self._done.setdefault(number, [0.0, 0.0])
+        seen = [(f.captured, f.time) for f in drive.frames if f.time > done[0]]
+        made = [command for command in drive.commands if command[0] > done[1]]
+        if (seen or made) and kept.put("drove", drive.operator, number, seen, made):
+            done[0] = seen[-1][1] if seen else done[0]
+            done[1] = made[-1][0] if made else done[1]
+
+
+def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
+    """Say for the recording where everybody is, from now on."""
+    kept = recorder.kept
+    assert kept is not None
+    field, clock = run.field, run.clock
+
+    def sample() -> None:
+        now = clock.now
+        kept.put("at", now, [(name, *point[1:]) for name, point in field.whereabouts(now)])
+
+    def facts() -> None:
+        radii = {name: robot.body.spec.radius for name, robot in field.robots.items()}
+        kept.put_new("team", dict(run.stage.labels), radii, key="team")
+        for number, when in field.contained.items():
+            kept.put_new("contains", number, when, key=f"contained {number}")
+        book = run.dva.desk.book
+        for e in (*book.closed.values(), *book.open.values()):
+            at = [e.position.latitude, e.position.longitude]
+            told = e.number, e.kind, at, e.state.value, dict(e.times)
+            kept.put_new("event", *told, key=f"event {e.number}")
+
+    facts()
+    clock.every(FILM_PERIOD, sample)
+    clock.every(1.0, facts)

@@ -1,0 +1,129 @@
+"""Frames that somebody looks at: noted when they are taken, told when they have arrived.
+
+They come over the modelled link, to the seat that holds the robot, or else to a screen of the
+console. What is told of a frame is what was true when it was taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from dva_sim.agents.observation import FRAME, CameraFrame
+from dva_sim.agents.people.bystander import SAFE
+from dva_sim.network.messaging import Subscription
+from dva_sim.simulation.full.run import Run
+
+Line = dict[str, Any]
+MOST_UNDER_WAY = 400  # frames of a robot
+BEYOND = 2.0  # how much farther than the camera's range people are drawn
+LEAST_SEEN = 25.0  # people are drawn so far away in any case [m]
+
+
+class Screens:
+    """The cameras of a run, as far as anybody looks at them.
+
+    Args:
+        run: Which.
+        screen: Id of a device of its own.
+        numbers: Of everybody, by id or name.
+        tell: Takes a line for each frame that has arrived, and the robot's number.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        screen: str,
+        numbers: dict[str, int],
+        tell: Callable[[Line, int], object],
+    ) -> None:
+        self._run, self._screen, self._numbers, self._tell = run, screen, numbers, tell
+        self._taken: dict[str, OrderedDict[int, tuple[int, list[Any]]]] = {}
+        self._count: dict[str, int] = {}
+        self._subscribed: dict[str, Subscription] = {}
+        self._watched: set[str] = set()
+        self._held: set[str] = set()
+        self._reach = max(LEAST_SEEN, BEYOND * run.scenario.camera.range_m)
+        for robot in run.field.robots.values():
+            robot.filmed = self._film
+
+    def watch(self, robots: set[str]) -> None:
+        """Who is looked at now, by id."""
+        self._watched = robots & self._run.field.robots.keys()
+        self._subscribe()
+
+    def hold(self, robots: set[str]) -> None:
+        """Whose frames come to a seat anyway."""
+        self._held = robots
+        self._subscribe()
+
+    def arrived(self, robot: str, frame: CameraFrame) -> None:
+        """A frame has come over the link."""
+        taken = self._taken.get(robot)
+        if robot not in self._watched or taken is None:
+            return
+        tick, now = frame.observation.tick, self._run.clock.now
+        known = taken.get(tick)
+        if known is None:
+            return
+        number, figures = known
+        while next(iter(taken)) != tick:
+            taken.popitem(last=False)
+        seen = frame.observation
+        line = {
+            "k": "frame",
+            "t": round(1000 * now),
+            "robot": self._numbers[robot],
+            "number": number,
+            "captured_ms": round(1000 * frame.captured),
+            "pose": [round(seen.x, 3), round(seen.y, 3), round(seen.heading, 4)],
+            "figures": figures,
+        }
+        self._tell(line, self._numbers[robot])
+
+    def _subscribe(self) -> None:
+        wanted = self._watched - self._held
+        for robot in self._subscribed.keys() - wanted:
+            self._subscribed.pop(robot).close()
+        for robot in sorted(wanted - self._subscribed.keys()):
+            arrived = partial(self.arrived, robot)
+            self._subscribed[robot] = self._run.network.subscribe(
+                self._screen, robot, FRAME, arrived
+            )
+        for robot in self._taken.keys() - self._watched:
+            del self._taken[robot]
+
+    def _film(self, robot: str, frame: CameraFrame) -> None:
+        """A robot has taken a frame: who was near is noted if anybody will see it."""
+        self._count[robot] = number = self._count.get(robot, 0) + 1
+        if robot not in self._watched:
+            return
+        taken = self._taken.setdefault(robot, OrderedDict())
+        taken[frame.observation.tick] = number, self._figures(robot, frame)
+        if len(taken) > MOST_UNDER_WAY:
+            taken.popitem(last=False)
+
+    def _figures(self, robot: str, frame: CameraFrame) -> list[Any]:
+        """Who could be in the picture: kind, number, place, heading, what they do."""
+        field, seen = self._run.field, frame.observation
+        here, figures = (seen.x, seen.y), list[Any]()
+        for id_tag, other in field.robots.items():
+            pose = other.body.pose()
+            if id_tag != robot and math.dist(here, (pose.x, pose.y)) < self._reach:
+                mode = other.controller.mode.value
+                figures.append(self._figure("robot", id_tag, pose.x, pose.y, pose.heading, mode))
+        for name, who in field.people():
+            x, y = who.walking.place
+            if who.activity != SAFE and math.dist(here, (x, y)) < self._reach:
+                kind = "guard" if hasattr(who, "device") else "bystander"
+                figures.append(self._figure(kind, name, x, y, who.heading, who.activity))
+        return figures
+
+    def _figure(
+        self, kind: str, name: str, x: float, y: float, heading: float, doing: str
+    ) -> list[Any]:
+        place = round(x, 3), round(y, 3), round(heading, 3)
+        return [kind, self._numbers[name], *place, doing]

@@ -1,0 +1,140 @@
+"""What a person in a seat is told of the own drives, 20 times a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.protocol import messages as m
+
+if TYPE_CHECKING:
+    from dva_sim.console.world import World
+
+Line = dict[str, Any]
+PHASES = ("driving", "starting", "stopping", "asking", "held")  # the first that holds is told
+
+
+class SeatLines:
+    """Lines for those who sit somewhere.
+
+    Args:
+        world: Where.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._acted: dict[str, Line] = {}  # by robot: the newest input that is in its set point
+
+    def applied(self, drive: DriveLog) -> None:
+        """A command has taken effect: which input was behind it?"""
+        held = self._held(drive)
+        if held is None or not drive.applied:
+            return
+        command = drive.applied[-1]
+        given = held.acted(command.issued, command.sample_age)
+        if given is not None:
+            self._acted[drive.robot] = {
+                "n": given.number,
+                "at_ms": round(1000 * time.time(), 1),
+                "loop_ms": round(1000 * (command.time - given.time), 1),
+            }
+
+    def _held(self, drive: DriveLog) -> HeldRobot | None:
+        for person in self._world.persons:
+            held = person.robots.get(drive.robot)
+            if held is not None and held.log is drive:
+                return held
+        return None
+
+    def waiting_order(self) -> Line | None:
+        """An order for a seat in which nobody sits yet."""
+        orders = [p.order for p in self._world.persons if p.order is not None and not p.attended]
+        return self._order(orders[0]) if orders else None
+
+    def lines(self) -> Iterator[tuple[str, Line]]:
+        """A line for each client that sits somewhere."""
+        for number, client in self._world.client_of.items():
+            yield client, self._line(client, self._world.persons[number])
+
+    def _line(self, client: str, person: PersonAgent) -> Line:
+        held = list(person.robots.values())
+        phases = {each.phase for each in held}
+        return {
+            "k": "seat",
+            "t": self._world.feed.now_ms,
+            "seat": client,
+            "label": person.device.label,
+            "phase": next((phase for phase in PHASES if phase in phases), "free"),
+            "order": None if person.order is None else self._order(person.order),
+            "alert": person.alert,
+            "drives": [self._drive(each) for each in held],
+        }
+
+    def _order(self, order: m.Order) -> Line:
+        world = self._world
+        where = order.position
+        x, y = world.run.stage.site.frame.to_xy(where.latitude, where.longitude)
+        return {
+            "event": order.event_id,
+            "kind": order.kind,
+            "robot": world.feed.numbers.get(order.device or ""),
+            "x_m": round(x, 2),
+            "y_m": round(y, 2),
+            "room": world.run.stage.site.room_at(x, y),
+        }
+
+    def _drive(self, held: HeldRobot) -> Line:
+        world, log = self._world, held.log
+        robot, reach = world.run.field.robots[held.robot], world.run.stage.reach(held.robot)
+        acted = self._acted.get(held.robot, {})
+        frame, age = held.frame, robot.picture_age
+        told: Line = {
+            "i": world.feed.numbers[held.robot],
+            "pattern": world.feed.pattern_of(held.robot),
+            "phase": held.phase,
+            "mode": robot.controller.mode.value,
+            "session": held.session,
+            "wanted": [
+                round(held.last.speed * reach.speed, 3),
+                round(held.last.turn * reach.turn_rate, 3),
+            ],
+            "command": [0.0, 0.0],
+            "command_age_ms": None if age is None else round(1000 * age),
+            "picture_ms": None if frame is None else round(1000 * frame.captured),
+            "picture_arrived_ms": None if frame is None else round(1000 * held.arrived),
+            "loop_ms": acted.get("loop_ms"),
+            "input": {key: acted[key] for key in ("n", "at_ms")} if acted else None,
+        }
+        return told | (_counts(log) if log is not None else _NONE)
+
+
+_NONE: Line = {
+    "sent": 0,
+    "answered": 0,
+    "timeouts": 0,
+    "refused": 0,
+    "superseded": 0,
+    "round_trip_ms": None,
+    "outcome": None,
+}
+
+
+def _counts(log: DriveLog) -> Line:
+    """How the commands of a drive fared."""
+    trips = log.round_trips
+    counts: Line = {
+        "sent": log.sent,
+        "answered": len(trips),
+        "timeouts": log.timeouts,
+        "refused": sum(log.refused.values()),
+        "superseded": log.superseded,
+        "round_trip_ms": round(1000 * trips[-1], 1) if trips else None,
+        "outcome": log.outcome if log.ended is not None else None,
+    }
+    if log.commands and log.ended is None:
+        counts["command"] = [round(number, 3) for number in log.commands[-1][1:]]
+    return counts

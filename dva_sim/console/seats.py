@@ -1,0 +1,98 @@
+"""Who sits where: pure, without a clock and without sockets.
+
+A client that takes control gets a seat, and keeps it until it gives it up or is gone. What it
+wants must come again and again while it holds on: who falls silent is stopped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SILENT_AFTER = 0.3  # without a word while something is held: it is let go [s]
+MOST_SEATS = 16
+
+
+@dataclass
+class Taken:
+    """A seat in which somebody sits.
+
+    Attributes:
+        number: Of the seat, from 0.
+        heard: When its newest input came, real time [s].
+        holds: Whether that asked for motion, or for standing with a hand on it.
+    """
+
+    number: int
+    heard: float = 0.0
+    holds: bool = False
+
+
+class Seats:
+    """Which client sits where.
+
+    Attributes:
+        taken: By client.
+    """
+
+    def __init__(self) -> None:
+        self.taken: dict[str, Taken] = {}
+
+    def sit(self, client: str) -> int | None:
+        """The number of the seat of a client, the lowest that is free; None: there is none."""
+        if client in self.taken:
+            return self.taken[client].number
+        used = {seat.number for seat in self.taken.values()}
+        free = next((n for n in range(MOST_SEATS) if n not in used), None)
+        if free is not None:
+            self.taken[client] = Taken(free)
+        return free
+
+    def stand_up(self, client: str) -> int | None:
+        """A client leaves: the seat it had."""
+        seat = self.taken.pop(client, None)
+        return None if seat is None else seat.number
+
+    def heard(self, client: str, now: float, holds: bool) -> bool:
+        """Input has come at a time [s]; False: who sends it sits nowhere."""
+        seat = self.taken.get(client)
+        if seat is None:
+            return False
+        seat.heard, seat.holds = now, holds
+        return True
+
+    def silent(self, now: float) -> list[str]:
+        """The clients that held on and have said nothing since; each is told of once."""
+        late = [
+            client
+            for client, seat in self.taken.items()
+            if seat.holds and now - seat.heard > SILENT_AFTER
+        ]
+        for client in late:
+            self.taken[client].holds = False
+        return late
+
+
+class Answers:
+    """What was answered to actions by their id, so that one said twice is done once.
+
+    Attributes:
+        given: The answers; None while one is still to come.
+    """
+
+    MOST = 1000
+
+    def __init__(self) -> None:
+        self.given: dict[str, tuple[bool, str] | None] = {}
+
+    def begin(self, number: str) -> bool:
+        """Whether an action is new."""
+        if number in self.given:
+            return False
+        self.given[number] = None
+        if len(self.given) > self.MOST:
+            del self.given[next(iter(self.given))]
+        return True
+
+    def end(self, number: str, ok: bool, text: str) -> None:
+        """An action has come to its end."""
+        self.given[number] = ok, text

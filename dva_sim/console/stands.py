@@ -1,0 +1,52 @@
+"""Why a robot stands, in words for whoever wonders at the page."""
+
+from __future__ import annotations
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.robot import RobotAgent
+
+STILL = 0.02  # slower it stands [m/s, rad/s]
+LAG = "held: this machine cannot keep up with real time"
+
+
+def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
+    """Why a robot stands; nothing if it moves.
+
+    Args:
+        robot: Which.
+        now: [s]
+        held_by_lag: Whether nobody may drive now.
+    """
+    body, controller, point = robot.body, robot.controller, robot.set_point
+    if abs(body.speed) > STILL or abs(body.turn_rate) > STILL:
+        return ""
+    if not body.powered:
+        return "its battery is empty"
+    if body.jammed:
+        return "it is stuck against something"
+    if controller.mode is Mode.TELEOPERATION:
+        if now >= point.until:
+            return _without_command(robot, now)
+        if abs(point.speed) < STILL and abs(point.turn_rate) < STILL:
+            return "it is asked to stand"
+        return "something is in its way" if body.in_contact else "it sets off, or is held back"
+    if held_by_lag:
+        return LAG
+    if controller.mode is Mode.MISSION:
+        return controller.mission_status.reason or "its mission has it wait"
+    if controller.emergency_at > 0.0 and now - controller.emergency_at < RECENT:
+        return "emergency stop"
+    if controller.grant is None:
+        return "nobody holds it"
+    return "it is held, and not started"
+
+
+RECENT = 10.0  # an emergency is why a robot stands for so long [s]
+
+
+def _without_command(robot: RobotAgent, now: float) -> str:
+    """Its watchdog has stopped it, or the age limit of what it was told."""
+    silent = now - robot.controller.last_valid
+    if robot.stale:
+        return f"commands are older than {robot.controller.limits.max_age:g} s when they come"
+    return f"no command for {silent:.0f} s: its watchdog stopped it"

@@ -1,0 +1,158 @@
+"""A console from its start to its end: the world here, the web and the pictures beside it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import time
+import webbrowser
+from collections.abc import Callable
+from contextlib import suppress
+
+from dva_sim.console.actions import Actions
+from dva_sim.console.children import END_WITHIN, Child, ChildFailed
+from dva_sim.console.options import ConsoleOptions
+from dva_sim.console.recorder import keep_run
+from dva_sim.console.world import World
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.live.process import ending_when_asked
+from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
+
+WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
+LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
+BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
+FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
+NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
+
+Say = Callable[[str], object]
+
+
+class Supervisor:
+    """One console.
+
+    Args:
+        options: What to run, and where it is to be seen.
+        say: Prints a line.
+    """
+
+    def __init__(self, options: ConsoleOptions, say: Say) -> None:
+        self._options, self._say = options, say
+        self._children: list[Child] = []
+        self._failed = ""
+
+    def run(self) -> None:
+        """Run until Ctrl-C, SIGTERM, or the end of the web process.
+
+        Raises:
+            ConfigError: the scenario cannot be run, or not recorded as wanted.
+            ChildFailed: the web process could not begin, or has ended by itself.
+            DvaSimError: what was to be recorded is not, or not all of it.
+        """
+        options = self._options
+        scenario = options.read()
+        world = World(scenario, options.scenario, options.seed)
+        keeper, outlet = None, None
+        if options.record is not None:
+            keeper = Keeper(options.record, world.scenario, options.seed)
+            outlet = Outlet(keeper.inlet())
+            world.recorder.kept = LiveRecorder(world.clock, outlet)
+            world.recorder.kept.is_own = lambda _: True
+            keep_run(world.run, world.recorder)
+        try:
+            self._run(world)
+        finally:
+            self._end_all()
+            if outlet is not None:
+                world.recorder.tidy()
+                outlet.close()
+            lost = None if keeper is None else keeper.finish()
+            if lost is not None and sys.exc_info()[0] is None:
+                raise DvaSimError(lost)
+        if self._failed:
+            raise ChildFailed(self._failed)
+        if options.record is not None:
+            self._say(f"{options.record} written")
+
+    def _run(self, world: World) -> None:
+        with ending_when_asked(world.clock, supervised=False) as ending:
+            web, pictures = self._start()
+            serving = web.first_line()
+            world.serve_cameras(str(serving["base"]))
+            actions = Actions(world)
+            world.tell, world.show = web.pipe.put, pictures.pipe.put
+            world.dropped = lambda: web.pipe.outbox.dropped
+            self._listen(world, web, actions)
+            self._draw(world, pictures)
+            world.begin()
+            world.clock.pulse(FLUSH, self._flush)
+            self._say(f"Console: {serving['drive']}")
+            self._open_browser(str(serving["drive"]))
+            if not ending.is_asked:
+                world.clock.go()
+                world.clock.run()
+            self._leave(world, web)
+
+    def _start(self) -> tuple[Child, Child]:
+        options = self._options
+        ours, theirs = socket.socketpair()
+        words = ["--host", options.host, "--port", str(options.port)]
+        words += ["--pictures-fd", str(ours.fileno())]
+        words += [] if options.token else ["--no-token"]
+        web = Child("web process", WEB, words, [ours])
+        self._children.append(web)
+        pictures = Child("pictures process", PICTURES, ["--web-fd", str(theirs.fileno())], [theirs])
+        self._children.append(pictures)
+        ours.close()
+        theirs.close()
+        return web, pictures
+
+    def _listen(self, world: World, web: Child, actions: Actions) -> None:
+        def hear() -> None:
+            for line in web.pipe.lines():
+                actions.take(line)
+            if not web.pipe.is_open:
+                world.clock.unwatch(web.pipe.fileno())
+                self._failed = web.why()
+                world.clock.stop()
+
+        world.clock.watch(web.pipe.fileno(), hear)
+
+    def _draw(self, world: World, pictures: Child) -> None:
+        """Without pictures all else goes on."""
+
+        def hear() -> None:
+            pictures.pipe.lines()
+            if not pictures.pipe.is_open:
+                world.clock.unwatch(pictures.pipe.fileno())
+                world.recorder.tell(world.clock.now, "console", pictures.why(), "link")
+
+        world.clock.watch(pictures.pipe.fileno(), hear)
+
+    def _flush(self) -> None:
+        for child in self._children:
+            child.pipe.flush()
+
+    def _leave(self, world: World, web: Child) -> None:
+        """Everybody who drives is stopped, and a moment is left for the word of it."""
+        for person in world.persons:
+            person.release(lambda *_: None)
+        world.clock.pace(paused=False)
+        with suppress(DvaSimError):
+            world.clock.run(world.clock.now + LAST_WORDS)
+        web.pipe.put({"k": "bye", "t": world.feed.now_ms, "why": "the console was ended"})
+
+    def _end_all(self) -> None:
+        for child in self._children:
+            child.end()
+        deadline = time.monotonic() + END_WITHIN
+        for child in self._children:
+            child.make_sure(deadline)
+
+    def _open_browser(self, address: str) -> None:
+        """Where there is one; never where nobody could see it."""
+        hidden = any(os.environ.get(name) for name in BROWSERLESS)
+        seen = sys.platform in ("darwin", "win32") or any(map(os.environ.get, NO_DISPLAY))
+        if self._options.open and seen and not hidden:
+            with suppress(webbrowser.Error):
+                webbrowser.open(address)

@@ -1,0 +1,318 @@
+"""The world of a console: a run on a paced clock, people's seats in it, and what pages are told.
+
+One thread does everything, and waits for nobody: lines to other processes go into outboxes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from dva_sim.agents.observation import FRAME, Cameras
+from dva_sim.agents.operator.attention import OperatorSetup
+from dva_sim.agents.operator.held_robot import Console, HeldRobot
+from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console import link as sliders
+from dva_sim.console.feed import Feed
+from dva_sim.console.fields import HazardFeed
+from dva_sim.console.lag import LagRule
+from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.console.scene import scene_of
+from dva_sim.console.screens import Screens
+from dva_sim.console.seat_lines import SeatLines
+from dva_sim.network.realtime import PacedClock
+from dva_sim.simulation.full.run import Run, Watched
+from dva_sim.simulation.full.stage import DVA, id_of
+from dva_sim.simulation.scenario import (
+    Scenario,
+    command_timeout_s,
+    mean_processing_s,
+    phone_profile,
+)
+
+Line = dict[str, Any]
+Tell = Callable[..., object]
+
+PEOPLE = 1  # operators of the scenario whose places people take
+SCREEN = 0xFFFF  # number of the console's own screen among consoles
+POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next, real time [s]
+SOON = 0.05  # from one look at what has changed to the next, real time [s]
+
+
+class World:
+    """What runs, and what of it is told.
+
+    Args:
+        scenario: What the run consists of.
+        name: Of the scenario.
+        seed: Decides all luck.
+        clock: Its time; default: real time.
+
+    Attributes:
+        clock: Virtual time, at its pace.
+        run: The run.
+        tell: Takes lines for pages, and a key for those of which the newest counts.
+        show: Takes lines for whoever draws pictures, likewise.
+
+    Raises:
+        ConfigError: the site cannot hold the team, or the events.
+    """
+
+    def __init__(
+        self, scenario: Scenario, name: str, seed: int, clock: PacedClock | None = None
+    ) -> None:
+        if scenario.transport == "zeromq" and scenario.network_depth == "auto":
+            # A later link may lose or delay anything: only the segments are right for all.
+            scenario = scenario.model_copy(update={"network_depth": "segment"})
+        self.scenario, self.name, self.seed = scenario, name, seed
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
+        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, keeps=False)
+        self.run = Run(scenario, seed, watched=watched)
+        self.feed, self.lag = Feed(self.run), LagRule()
+        self.tell: Tell = lambda *_: None
+        self.show: Tell = lambda *_: None
+        self.link, self.wanted = scenario.link, dict[str, float]()
+        self.dropped: Callable[[], int] = lambda: 0
+        self._console = Console(
+            setup=self._setup(scenario), phone=phone_profile(scenario), reach=self.run.stage.reach
+        )
+        self.persons: list[PersonAgent] = []
+        self.client_of: dict[int, str] = {}
+        self.person(0)
+        self.feed.add(DVA, "dva", "dva")
+        self.screens = Screens(
+            self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
+        )
+        self.seat_lines = SeatLines(self)
+        self.recorder.on_applied = self.seat_lines.applied
+        self.hazards = HazardFeed(self.run)
+        self._newest: dict[str, Any] = {}
+        self.clock.on_late = self._late
+        self.hold: Callable[[str], object] = lambda _: None
+
+    def serve_cameras(self, base: str) -> None:
+        """The robots' pictures are to be had below this URL from now on."""
+        for robot in self.run.field.robots.values():
+            robot.controller.camera_url = camera_url(base, robot.device.label)
+
+    def begin(self) -> None:
+        """Tell the scene, and from then on what changes."""
+        scene = scene_of(self.run, self.feed.things, self.name, self.seed)
+        scene["link"] = self.link_line()
+        self.tell(scene)
+        self.show(
+            {
+                "k": "scene",
+                "scenario": self.scenario.model_dump(mode="json"),
+                "seed": self.seed,
+                "things": self.feed.things,
+            }
+        )
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(ROWS, self._tell_rows)
+        self.clock.pulse(HAZARDS, self._tell_hazards)
+        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def person(self, number: int) -> PersonAgent:
+        """The person of a seat, by its number from 0; new ones register first."""
+        while len(self.persons) <= number:
+            device = self.run.stage.device("console", len(self.persons) + 1)
+            person = PersonAgent(device, self._console)
+            person.on_robot = self._watch_robot
+            device.register()
+            self.feed.add(device.id_tag, device.label, "operator")
+            self.persons.append(person)
+        return self.persons[number]
+
+    def _setup(self, scenario: Scenario) -> OperatorSetup:
+        stage = self.run.stage
+        command = scenario.command
+        return OperatorSetup(
+            pattern=stage.pattern_for,
+            window=command.window,
+            heeds=command.heeds,
+            rate_hz=command.rate_hz,
+            timeout=command_timeout_s(scenario),
+            attempts=command.attempts,
+            guarded=scenario.control == "coordinated",
+            topic=stage.cameras.topic,
+        )
+
+    # --- what is told ----------------------------------------------------------------------
+
+    def link_line(self) -> Line:
+        """What the link is like now."""
+        link, trace = self.link, self.link.trace_up or self.link.trace_down
+        return {
+            "delay_s": link.delay_s,
+            "jitter_s": link.jitter_s,
+            "loss": link.loss,
+            "rate_bps": link.rate_bps,
+            "processing_s": self.wanted.get("processing_s", mean_processing_s(self.scenario)),
+            "kind": "modelled",
+            "trace": trace or link.delay_log,
+        }
+
+    def clock_line(self) -> Line:
+        """How time goes by."""
+        return {
+            "factor": self.clock.factor,
+            "paused": self.clock.paused,
+            "lag_s": round(self.lag.newest, 3),
+            "given_up_s": round(self.clock.given_up, 2),
+            "held_by_lag": self.lag.held,
+        }
+
+    def _tell_positions(self) -> None:
+        self._tell_new(self.feed.positions(), but="t")
+
+    def _tell_rows(self) -> None:
+        self.lag.measured(time.monotonic(), self.clock.worst_lag())
+        rows = {
+            "k": "rows",
+            "t": self.feed.now_ms,
+            "clock": self.clock_line(),
+            "link": self.link_line(),
+            "dropped": self.dropped(),
+            "robots": self.feed.robots(self.lag.held),
+            "people": self.feed.people(),
+            "order": self.seat_lines.waiting_order(),
+        }
+        self.tell(rows)
+
+    def tell_now(self) -> None:
+        """Something has changed that nobody shall wait for."""
+        self._tell_rows()
+        self._tell_seats()
+
+    def _tell_hazards(self) -> None:
+        self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
+        for number, when in self.run.field.contained.items():
+            self._tell_once("contain", number, round(1000 * when))
+
+    def _tell_once(self, kind: str, number: int, when: int) -> None:
+        if self._newest.get(f"{kind} {number}") != when:
+            self._newest[f"{kind} {number}"] = when
+            self.show({"k": kind, "t": when, "n": number})
+
+    def _tell_news(self) -> None:
+        """Events, story and seats, as soon as they change; rows when a mode or holder does."""
+        self._tell_new(self.feed.events(), but="t")
+        for line in self.feed.story():
+            self.tell(line)
+        robots = self.run.field.robots.values()
+        modes = [(robot.controller.mode, robot.holder[0]) for robot in robots]
+        if self._newest.get("modes") != modes:
+            self._newest["modes"] = modes
+            self._tell_rows()
+        self._tell_seats()
+
+    def _tell_seats(self) -> None:
+        for client, line in self.seat_lines.lines():
+            self._tell_new(line, but="t", key=client)
+
+    def _tell_new(self, line: Line, but: str, key: str = "") -> None:
+        """Tell a line unless nothing in it has changed, its time apart."""
+        said = {name: value for name, value in line.items() if name != but}
+        place = f"{line['k']} {key}"
+        if self._newest.get(place) != said:
+            self._newest[place] = said
+            self.tell(line, key)
+
+    def _show_frame(self, line: Line, robot: int) -> None:
+        self.show(line, robot)
+
+    def _watch_robot(self, held: HeldRobot) -> None:
+        """Frames of a robot in somebody's hands are those that the seat gets."""
+        usual = held.on_frame
+
+        def on_frame(held: HeldRobot, frame: Any) -> None:
+            usual(held, frame)
+            self.screens.arrived(held.robot, frame)
+
+        held.on_frame = on_frame
+
+    def free_seat(self, client: str) -> None:
+        """A client sits nowhere any more, and is told so."""
+        empty = {"k": "seat", "t": self.feed.now_ms, "seat": client, "phase": "free"}
+        self.tell(empty | {"order": None, "alert": "", "drives": []}, client)
+        self._newest.pop(f"seat {client}", None)
+
+    def change_pattern(self, robot: str, name: str, said: Callable[[bool, str], object]) -> None:
+        """Drive a robot by another pattern from the next drive on; a drive is stopped first."""
+        agent = self.run.field.robots[robot]
+
+        def change(ok: bool = True, text: str = "") -> None:
+            if agent.controller.mode is Mode.TELEOPERATION:
+                said(False, text or f"{agent.device.label} is driven: it has to be stopped first")
+                return
+            self.run.stage.pattern_names[robot] = name
+            agent.expect(self.run.stage.pattern_for(robot))
+            self.recorder.tell(self.clock.now, agent.device.label, f"is driven by {name}", "link")
+            said(True, "")
+
+        holder = next((p.robots[robot] for p in self.persons if robot in p.robots), None)
+        if holder is not None and holder.is_driven:
+            holder.stop("stopped", change)
+        else:
+            change()
+
+    # --- lag -------------------------------------------------------------------------------
+
+    def _late(self, behind: float) -> None:
+        """An event comes too late: above the limit nobody drives on."""
+        if self.lag.measured(time.monotonic(), behind):
+            why = f"held: {behind:.2f} s behind real time, more than a drive bears"
+            self.hold(why)
+            self.recorder.tell(self.clock.now, "console", why, "link")
+
+    # --- the link --------------------------------------------------------------------------
+
+    def change_link(self, given: Line) -> str:
+        """Change the link of all robots; what it is then, in words.
+
+        Raises:
+            ConfigError: what cannot be.
+        """
+        wanted = sliders.read(given)
+        link = sliders.changed(self.scenario.link, self.wanted | wanted)
+        self.wanted |= wanted
+        now = self.clock.now
+        for pair in self.run.links.values():
+            for each in pair:
+                each.change(now, link)
+        self.link = link
+        if "processing_s" in wanted:
+            self._change_processing(wanted["processing_s"])
+        self._be_patient()
+        told = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
+        self.recorder.tell(now, "console", f"link: {told}", "link")
+        return told
+
+    def _change_processing(self, seconds: float) -> None:
+        for robot in self.run.field.robots.values():
+            robot.inbox.service = lambda: seconds
+        self.run.audit.expect(seconds)
+
+    def _be_patient(self) -> None:
+        """Time-outs are those that the link needs as it is now."""
+        scenario = sliders.with_link(self.scenario, self.link, self.wanted.get("processing_s"))
+        self.run.be_patient(scenario)
+        self._console = replace(self._console, setup=self._setup(scenario))
+        for person in self.persons:
+            person.console = self._console
+
+
+def camera_url(base: str, label: str) -> str:
+    """Where a browser finds a robot's pictures."""
+    return f"{base}camera/{label}.mjpg"
+
+
+def topic_of(url: str) -> str | None:
+    """The frames of a console's cameras, whose URL is one for browsers."""
+    return FRAME if url.startswith("http") else None
