@@ -15,13 +15,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.compare import Comparison as Comparison
+from dva_sim.experiments.execution.checkpoint import load_so_far
+from dva_sim.experiments.execution.dry_run import rehearse_all
+from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.results.results import Frame, frame_of, plain
 from dva_sim.experiments.results.results import Results as ResultsData
-from dva_sim.experiments.study.loading import Settings, pairs_of
+from dva_sim.experiments.study.loading import Settings, pairs_of, write_study
+from dva_sim.experiments.study.registration import register as write_down
+from dva_sim.experiments.study.registration import registration_of
+from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.kernel.suggestions import listed
+from dva_sim.simulation.full import Recording
+from dva_sim.simulation.full.measures import track_rows
 from dva_sim.simulation.models import AnyScenario, Tables, model_for
-from dva_sim.testing.file_kinds import mistakes_of
+from dva_sim.testing.file_kinds import mistakes_of, open_study
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -93,6 +101,7 @@ def episode(
     inset: bool = False,
     side_by_side: str | Sequence[str] | None = None,
     record: str | Path | None = None,
+    overwrite: bool = False,
 ) -> Episode:
     """Run one scenario once, and draw or keep it if asked to.
 
@@ -110,13 +119,12 @@ def episode(
         side_by_side: Run and draw the same seed under two patterns; the episode is that of the
             first.
         record: Keep the run as a file: `.mcap`.
+        overwrite: Replace a recording that is there.
 
     Raises:
         ConfigError: there is none, it is not valid with these changes, or it cannot be drawn so.
     """
-    from dva_sim.experiments.report.episode import EpisodeRequest
-    from dva_sim.simulation.full import Recording
-    from dva_sim.simulation.full.measures import track_rows
+    from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
 
     pairs = pairs_of(set)
     with mistakes_of(str(scenario), pairs, seed):
@@ -127,6 +135,7 @@ def episode(
             side_by_side=None if side_by_side is None else _joined(side_by_side),
             pictures=_wanted(video, still, strip, at, panels, camera, inset),
             record=None if record is None else Path(record),
+            overwrite=overwrite,
         )
         runs = [request.play(each) for each in request.scenarios()]
         list(request.write(runs))
@@ -156,7 +165,7 @@ def replay(
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    from dva_sim.experiments.report.episode import open_recording, write_replay
+    from dva_sim.experiments.report.episode import open_recording, write_replay  # late: start-up
 
     wanted = _wanted(video, still, strip, at, panels, camera, inset)
     opened = open_recording(Path(file), wanted)
@@ -173,7 +182,7 @@ def _wanted(
     camera: str | None,
     inset: bool,
 ) -> Wanted:
-    from dva_sim.recordings.pictures import Wanted
+    from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     film, moment, moments = (None if p is None else Path(p) for p in (video, still, strip))
     times = None if at is None else _joined(at)
@@ -194,7 +203,7 @@ class Results(ResultsData):
     @cached_property
     def reading(self) -> Reading:
         """What the runs say, in words and tables."""
-        from dva_sim.experiments.report.summary import Reading
+        from dva_sim.experiments.report.summary import Reading  # late: start-up
 
         return Reading(self)
 
@@ -263,8 +272,8 @@ def run(
             kept as recordings and could not.
         KeyboardInterrupt: the finished runs are kept, and the same call goes on.
     """
-    from dva_sim.experiments.report.figures.registry import load_figures
-    from dva_sim.experiments.report.report import write_report
+    from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
+    from dva_sim.experiments.report.report import write_report  # late: start-up
 
     request = _request(
         study,
@@ -305,8 +314,6 @@ def dry_run(
     Raises:
         DvaSimError: a mistake in what was asked for.
     """
-    from dva_sim.experiments.execution.scheduling import run_job
-
     request = _request(
         study, out, pairs_of(set, seed), quick=quick, full=full, pilot=pilot, jobs=jobs
     )
@@ -317,16 +324,13 @@ def dry_run(
 def _request(
     study: str | Path, out: str | Path | None, pairs: list[str], **options: Any
 ) -> RunRequest:
-    from dva_sim.experiments.execution.runner import RunRequest
+    from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
 
     return RunRequest(study, None if out is None else Path(out), pairs, **options)
 
 
 def _rehearsed(request: RunRequest) -> tuple[Study, list[DesignCell]]:
     """A study without mistakes, and its configurations."""
-    from dva_sim.experiments.execution.dry_run import rehearse_all
-    from dva_sim.testing.file_kinds import open_study
-
     asked = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     return asked, rehearse_all(asked)
 
@@ -337,8 +341,6 @@ def new(name: str | Path) -> Path:
     Raises:
         DvaSimError: there is such a file, or it cannot be written.
     """
-    from dva_sim.experiments.study.loading import write_study
-
     return write_study(str(name))
 
 
@@ -353,10 +355,6 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> P
     Raises:
         DvaSimError: nothing to register, a size left open, or a registration that is there.
     """
-    from dva_sim.experiments.study.registration import register as write_down
-    from dva_sim.experiments.study.registration import registration_of
-    from dva_sim.testing.file_kinds import open_study
-
     asked = open_study(study, version="full" if full else None)
     write_down(asked, again)
     found = registration_of(asked)
@@ -376,9 +374,7 @@ def tune(
     Raises:
         DvaSimError: the study tunes nothing, or runs failed.
     """
-    from dva_sim.experiments.analysis.tuning import tune as try_all
-    from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned
-    from dva_sim.testing.file_kinds import open_study
+    from dva_sim.experiments.analysis.tuning import tune as try_all  # late: start-up
 
     asked = open_study(study)
     folder = Path(out) if out is not None else folder_of_tuning(str(study))
@@ -398,8 +394,8 @@ def report(folder: Folder, *, pdf: bool = False, figure: str | Sequence[str] = (
     Raises:
         DvaSimError: no results there, no such figure, or a disk that cannot be written.
     """
-    from dva_sim.experiments.report.figures.registry import load_figures
-    from dva_sim.experiments.report.report import write_report
+    from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
+    from dva_sim.experiments.report.report import write_report  # late: start-up
 
     path = folder.folder if isinstance(folder, ResultsData) else Path(folder)
     wanted = [figure] if isinstance(figure, str) else figure
@@ -416,7 +412,7 @@ def show(
     Raises:
         ConfigError: no results there, or no such table.
     """
-    from dva_sim.experiments.report import terminal
+    from dva_sim.experiments.report import terminal  # late: start-up
 
     terminal.show(_so_far(folder), table, columns, rows)
 
@@ -441,7 +437,7 @@ def export(
     Raises:
         DvaSimError: no such table or format, a file that is there, or one that cannot be written.
     """
-    from dva_sim.experiments.results.export import export as write
+    from dva_sim.experiments.results.export import export as write  # late: start-up
 
     tables = [table] if isinstance(table, str) else table
     return write(_results(folder), Path(out), tables, format, overwrite)
@@ -468,8 +464,6 @@ def compare(first: Folder, second: Folder) -> Comparison:
 
 
 def _so_far(folder: Folder) -> ResultsData:
-    from dva_sim.experiments.execution.checkpoint import load_so_far
-
     return folder if isinstance(folder, ResultsData) else load_so_far(folder)
 
 

@@ -212,18 +212,40 @@ class AgentDevice:
             if hearing is Hearing.ANSWERED:
                 request.answer(self._bad_message(error))
             return None
-        self._nuisances.good(request.peer, now)
         refusal = self._imposture(message, request.sender) or self._misdirection(message)
         if refusal is None and isinstance(message.body, m.Reply):
             refusal = m.Reply(message.message_id, m.NOT_SUPPORTED, "a reply to nothing")
         if refusal is not None:
-            count[f"refused: {m.CODE_NAMES[refusal.code]}"] += 1
-            request.answer(self.reply(message, refusal))
+            self.turn_away(request, message, refusal)
             return None
         return message
 
-    def conclude(self, request: Request, message: m.Message, handler: Handler) -> None:
-        """Let `handler` take a message that was admitted, once, and answer it."""
+    def turn_away(self, request: Request, message: m.Message | None, refusal: m.Reply) -> None:
+        """Refuse a message, read or not, as it arrives; told as long as that is not too often."""
+        now = self.clock.now
+        hearing = self._nuisances.hearing(request.peer, now)
+        self._nuisances.bad(request.peer, now)
+        self.recorder.counters[f"refused: {m.CODE_NAMES[refusal.code]}"] += 1
+        if hearing is not Hearing.ANSWERED:
+            return
+        if message is None:
+            request.answer(self._bad_message(ProtocolError(refusal.code, refusal.text)))
+        else:
+            request.answer(self.reply(message, refusal))
+
+    def conclude(
+        self, request: Request, message: m.Message, handler: Handler, *, at_once: bool = False
+    ) -> None:
+        """Let `handler` take a message that was admitted, once, and answer it.
+
+        Args:
+            request: What it came by.
+            message: What it says.
+            handler: What answers.
+            at_once: It is refused as it arrives: who sends such, is listened to less and less.
+        """
+        note = self._nuisances.bad if at_once else self._nuisances.good
+        note(request.peer, self.clock.now)
         key = key_of(request.sender, request.data)
         reply = self._replies.get(key)
         if reply is None:

@@ -43,7 +43,7 @@ def list_(
         dva-sim list scenarios  # of one kind
         dva-sim list --json  # for other programs
     """
-    from dva_sim.cli import names
+    from dva_sim.cli import names  # late: start-up
 
     if as_json:
         print_json(names.as_json(kind))
@@ -61,7 +61,7 @@ def plugins(as_json: Json = False) -> None:
         dva-sim plugins  # all kinds
         dva-sim plugins --json  # for other programs
     """
-    from dva_sim.cli import names
+    from dva_sim.cli import names  # late: start-up
 
     if as_json:
         print_json(names.plugins_as_json())
@@ -97,7 +97,7 @@ def check(
         dva-sim check policy agents/policies/patrol.py:Patrol  # does it keep its promises?
         dva-sim check link  # does the emulated link do what it is told?
     """
-    from dva_sim.cli import checks
+    from dva_sim.cli import checks  # late: start-up
 
     raise typer.Exit(checks.check(files, set_ or []))
 
@@ -119,7 +119,7 @@ def schema(
     Examples:
         dva-sim schema scenario > scenario.schema.json  # for an editor
     """
-    from dva_sim.cli import checks
+    from dva_sim.cli import checks  # late: start-up
 
     checks.print_schema(kind)
 
@@ -166,7 +166,7 @@ def validate(
         dva-sim validate operators -o evidence  # against published experiments
         dva-sim validate network --live --quick  # against sockets of this machine
     """
-    from dva_sim.cli import validation
+    from dva_sim.cli import validation  # late: start-up
 
     with loudness(quiet, verbose):
         code = validation.validate(

@@ -167,7 +167,7 @@ def run_one(part: str, options: LiveOptions, number: int) -> None:
     warn(console, options)
     if options.dva is None and (part != "dva" or not options.port):
         options = replace(options, dva=DEFAULT_DVA)
-    options.check()
+    options.check(part)
     if part in PARTS and part != "dva":
         _print(console, f"Looking for the DVA at {options.dva} for {process.PATIENCE:g} s ...")
     with Live(console=console, refresh_per_second=4, transient=True) as screen:

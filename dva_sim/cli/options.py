@@ -22,7 +22,7 @@ def names_in(*folders: str) -> Completer:
     """Completes the names of files in some folders, wherever those lie."""
 
     def complete(incomplete: str) -> list[str]:
-        from dva_sim.kernel.resources import available
+        from dva_sim.kernel.resources import available  # late: start-up
 
         found = [
             f"{'tasks/' if folder.endswith('/tasks') else ''}{name}"
@@ -116,6 +116,7 @@ Jobs = Annotated[
         "How many processes; default: one for each core.", "-j", "--jobs", least=1, most=MOST_JOBS
     ),
 ]
+Overwrite = Annotated[bool, Option("--overwrite", help="Replace what is there.")]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]

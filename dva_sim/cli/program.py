@@ -15,6 +15,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from dva_sim import __version__
 from dva_sim.cli import files, results, runs, site, studies
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
 from dva_sim.kernel.suggestions import hint
@@ -194,8 +195,6 @@ def _typer(cls: type[PanelGroup], help: str) -> typer.Typer:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from dva_sim import __version__
-
         typer.echo(f"dva-sim {__version__}")
         raise typer.Exit(ExitCode.OK)
 

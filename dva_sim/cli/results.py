@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Json, Quiet, ResultsFolder, Verbose, count
+from dva_sim.cli.options import Json, Overwrite, Quiet, ResultsFolder, Verbose, count
 from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 
 
@@ -32,8 +32,8 @@ def report(
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
         dva-sim report small --figure risk.py:Risk  # with a figure of one's own
     """
-    from dva_sim.experiments.report.figures.registry import load_figures
-    from dva_sim.experiments.report.report import write_report
+    from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
+    from dva_sim.experiments.report.report import write_report  # late: start-up
 
     with loudness(quiet, verbose):
         page = write_report(folder, pdf, figures=load_figures(figure or ()))
@@ -61,9 +61,9 @@ def show(
         dva-sim show small --columns  # what the columns of every table mean
         dva-sim show small --json  # the same for other programs
     """
-    from dva_sim.cli import results_json
-    from dva_sim.experiments.execution.checkpoint import load_so_far
-    from dva_sim.experiments.report import terminal
+    from dva_sim.cli import results_json  # late: start-up
+    from dva_sim.experiments.execution.checkpoint import load_so_far  # late: start-up
+    from dva_sim.experiments.report import terminal  # late: start-up
 
     results = load_so_far(folder)
     if not as_json:
@@ -93,7 +93,7 @@ def export(
     form: Annotated[
         str | None, Option("--format", metavar="csv|parquet", help="In a folder; default: csv.")
     ] = None,
-    overwrite: Annotated[bool, Option("--overwrite", help="Replace what is there.")] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write tables of results for other programs.
 
@@ -103,8 +103,8 @@ def export(
         dva-sim export small -o small.csv  # one row for each run
         dva-sim export small -o tables --format parquet  # every table
     """
-    from dva_sim.experiments.results.export import export as write
-    from dva_sim.experiments.results.results import Results
+    from dva_sim.experiments.results.export import export as write  # late: start-up
+    from dva_sim.experiments.results.results import Results  # late: start-up
 
     for path in write(Results.load(folder), out, table or [], form, overwrite):
         print(path)
@@ -140,7 +140,7 @@ def compare(
         dva-sim compare a b --fail-if 'mean(drive_time_s) per cell > +0.5 s'  # B minus A
         dva-sim compare a b --fail-if 'share(confirmed) < 95 %'  # of B alone
     """
-    from dva_sim.cli import comparison
+    from dva_sim.cli import comparison  # late: start-up
 
     code = comparison.compare(
         first,

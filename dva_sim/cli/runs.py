@@ -14,6 +14,7 @@ from dva_sim.cli.options import (
     At,
     Camera,
     Inset,
+    Overwrite,
     Panels,
     Quiet,
     RunSeed,
@@ -52,6 +53,7 @@ def episode(
     record: Annotated[
         Path | None, file("Keep the run as a file: .mcap, for replay and viewers.")
     ] = None,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
@@ -63,14 +65,16 @@ def episode(
         dva-sim episode evacuation --strip fire.png  # several moments in one figure
         dva-sim episode fire-drill --record drill.mcap  # for `dva-sim replay` and viewers
     """
-    from dva_sim.cli import stories
-    from dva_sim.experiments.report.episode import EpisodeRequest
-    from dva_sim.recordings.pictures import Wanted
-    from dva_sim.testing.file_kinds import mistakes_of
+    from dva_sim.cli import stories  # late: start-up
+    from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
+    from dva_sim.recordings.pictures import Wanted  # late: start-up
+    from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
 
     pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
     with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
-        stories.episode(EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record))
+        stories.episode(
+            EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record, overwrite)
+        )
 
 
 def replay(
@@ -94,8 +98,8 @@ def replay(
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
-    from dva_sim.cli import stories
-    from dva_sim.recordings.pictures import Wanted
+    from dva_sim.cli import stories  # late: start-up
+    from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     with loudness(quiet, verbose):
         stories.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
@@ -126,6 +130,7 @@ def live(
         Path | None,
         Option(metavar="FILE|FOLDER", help="A recording (.mcap); or a folder of traces."),
     ] = None,
+    overwrite: Overwrite = False,
     state: Annotated[Path | None, file("File that lets a killed DVA go on where it was.")] = None,
     seconds: Annotated[
         float | None,
@@ -151,12 +156,13 @@ def live(
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
-    from dva_sim.cli import live_screen
-    from dva_sim.live.options import LiveOptions
+    from dva_sim.cli import live_screen  # late: start-up
+    from dva_sim.live.options import LiveOptions  # late: start-up
 
     changes = tuple(set_ or ())
     options = LiveOptions(
-        scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds
+        *(scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds),
+        overwrite=overwrite,
     )
     with loudness(quiet, verbose):
         if only is None:
@@ -181,6 +187,7 @@ def console(
         bool, Option("--no-token", help="Let everybody in who reaches the page.")
     ] = False,
     record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
+    overwrite: Overwrite = False,
     seed: RunSeed = 1,
     set_: Sets = None,
     quiet: Quiet = False,
@@ -193,9 +200,9 @@ def console(
         dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
     """
-    from dva_sim.console.options import ConsoleOptions
-    from dva_sim.console.supervisor import Supervisor
-    from dva_sim.testing.file_kinds import mistakes_of
+    from dva_sim.console.options import ConsoleOptions  # late: start-up
+    from dva_sim.console.supervisor import Supervisor  # late: start-up
+    from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
 
     changes = tuple(set_ or ())
     options = ConsoleOptions(
@@ -207,6 +214,7 @@ def console(
         token=not no_token,
         open=not no_open,
         record=record,
+        overwrite=overwrite,
     )
     with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):
         Supervisor(options, _say_at_once).run()
@@ -232,6 +240,6 @@ def keys(
         dva-sim keys keys drive-to-event  # for each device of the scenario
         dva-sim keys keys dva robot-1 operator-1  # for these devices
     """
-    from dva_sim.cli.live_screen import make_keys
+    from dva_sim.cli.live_screen import make_keys  # late: start-up
 
     typer.echo(make_keys(folder, names))

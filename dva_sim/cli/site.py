@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from dva_sim.cli.options import SITES, count
+from dva_sim.kernel.errors import ConfigError
 
 if TYPE_CHECKING:
     from dva_sim.worlds.site import Site
@@ -73,10 +74,9 @@ def _open(name: str, changes: Sequence[str]) -> Site:
         ConfigError: it cannot be read, or takes no options.
     """
     from dva_sim.kernel import resources  # late: start-up
-    from dva_sim.kernel.config import load_yaml
-    from dva_sim.kernel.config_overrides import parse_changes
-    from dva_sim.kernel.errors import ConfigError
-    from dva_sim.worlds.site import load_site, map_site
+    from dva_sim.kernel.config import load_yaml  # late: start-up
+    from dva_sim.kernel.config_overrides import parse_changes  # late: start-up
+    from dva_sim.worlds.site import load_site, map_site  # late: start-up
 
     options = parse_changes(changes)
     path = resources.find(name, "worlds", is_asked=True)

@@ -28,7 +28,7 @@ def demo(
     Examples:
         dva-sim demo -o first  # into a folder of your own, in place of results/demo
     """
-    from dva_sim.cli.demo import demo as show_it
+    from dva_sim.cli.demo import demo as show_it  # late: start-up
 
     raise typer.Exit(show_it(out, jobs))
 
@@ -67,8 +67,8 @@ def run(
         dva-sim run req-rep-vs-pub-sub --set persons=4 -j 2 -o small  # smaller, two processes
         dva-sim run mine.yaml --set 'link.delay_s=[0, 0.5]'  # other levels of a factor
     """
-    from dva_sim.cli import study_runs
-    from dva_sim.experiments.execution.runner import RunRequest
+    from dva_sim.cli import study_runs  # late: start-up
+    from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
 
     request = RunRequest(
         study,
@@ -99,7 +99,7 @@ def new(
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    from dva_sim.experiments.study.loading import write_study
+    from dva_sim.experiments.study.loading import write_study  # late: start-up
 
     typer.echo(told(write_study(name)))
 
@@ -119,8 +119,8 @@ def register(
     Examples:
         dva-sim register mine.yaml  # writes mine.registration.yaml beside it
     """
-    from dva_sim.experiments.study.registration import register as write_down
-    from dva_sim.testing.file_kinds import open_study
+    from dva_sim.experiments.study.registration import register as write_down  # late: start-up
+    from dva_sim.testing.file_kinds import open_study  # late: start-up
 
     typer.echo(write_down(open_study(study, version="full" if full else None), again))
 
@@ -139,7 +139,7 @@ def tune(
     Examples:
         dva-sim tune filters  # writes tuned/filters.yaml beside it
     """
-    from dva_sim.cli import study_runs
+    from dva_sim.cli import study_runs  # late: start-up
 
     with loudness(quiet, verbose):
         code = study_runs.tune(study, out, jobs)

@@ -15,13 +15,14 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from dva_sim.cli.console import console, say, warn
 from dva_sim.cli.verbosity import WRITTEN, detail, is_verbose, tell_cells, tell_files
-from dva_sim.experiments.execution.dry_run import DryRun, dry_run
+from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry_run, rehearse_all
 from dva_sim.experiments.execution.runner import RunRequest
-from dva_sim.experiments.execution.scheduling import Simulate
+from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import DesignCell
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
 from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
 from dva_sim.testing.file_kinds import open_study
 
@@ -34,8 +35,8 @@ _MINUTE_S, _HOUR_S = 60, 3600
 
 def run(request: RunRequest) -> ExitCode:
     """Run a study and show how far it is, then write its report; the exit code."""
-    from dva_sim.experiments.report.figures.registry import load_figures
-    from dva_sim.experiments.report.report import write_report
+    from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
+    from dva_sim.experiments.report.report import write_report  # late: start-up
 
     try:
         study, cells = _loaded(request)
@@ -61,8 +62,7 @@ def run(request: RunRequest) -> ExitCode:
 
 def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
-    from dva_sim.experiments.analysis.tuning import tune as try_all
-    from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
+    from dva_sim.experiments.analysis.tuning import tune as try_all  # late: start-up
 
     study = open_study(name)
     trials = tuning_study(study)
@@ -88,8 +88,6 @@ def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
 def plan(request: RunRequest) -> None:
     """Say what `run` would do."""
 
-    from dva_sim.experiments.execution.scheduling import run_job
-
     study, cells = _loaded(request)
     say(escape(_time(_planned(request, study, cells, run_job))))
 
@@ -105,7 +103,6 @@ def _loaded(request: RunRequest) -> tuple[Study, list[DesignCell]]:
 
 def _checked(study: Study) -> list[DesignCell]:
     """Find mistakes before the first run; where that takes a while, it is told."""
-    from dva_sim.experiments.execution.dry_run import contradictions_in, rehearse_all
 
     count = size(study) * len(study.parts) + cells_of_repeats(study)
     if count < _MANY:

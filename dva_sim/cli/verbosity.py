@@ -75,7 +75,7 @@ def tell_measures(row: Mapping[str, Any], columns: Iterable[Measure]) -> None:
 def lines_of(row: Mapping[str, Any], columns: Iterable[Measure]) -> Iterator[str]:
     """Each value of a row in a line, with its unit and what it means."""
     from dva_sim.experiments.results.results import plain  # late: start-up
-    from dva_sim.kernel.measure import Measure
+    from dva_sim.kernel.measure import Measure  # late: start-up
 
     width = max(map(len, row), default=0)
     known = {column.name: column for column in columns}
@@ -90,7 +90,7 @@ def tell_cells(study: Study, cells: Sequence[DesignCell]) -> None:
     if not is_verbose():
         return
     from dva_sim.experiments.study.cell_grid import REFERENCE  # late: start-up
-    from dva_sim.simulation.labels import brief
+    from dva_sim.simulation.labels import brief  # late: start-up
 
     detail(f"Study: {study.file}, seed {study.seed}")
     for cell in cells:

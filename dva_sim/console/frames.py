@@ -11,6 +11,7 @@ import json
 from typing import NamedTuple
 
 MAGIC = b'{"robot":'  # how each header begins
+JPEG_END = b"\xff\xd9"
 MOST_HEADER = 512  # bytes
 MOST_PICTURE = 1 << 20  # bytes
 ALIVE = -1  # robot of a record that says only that somebody draws
@@ -88,6 +89,8 @@ class Unpacker:
         if len(self._rest) < end:
             return None
         jpeg = bytes(self._rest[4 + size : end])
+        if jpeg and not jpeg.endswith(JPEG_END):
+            return None, self._skip()
         return Picture(robot, number, captured, arrived, jpeg), end
 
     def _broken_off(self, start: int, end: int) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.recording import SUFFIX
+from dva_sim.recordings.writing import check_target
 from dva_sim.simulation.scenario import Scenario, build, load
 
 DEFAULT, DEFAULT_PORT = "hands-on", 8765
@@ -26,6 +26,7 @@ class ConsoleOptions:
         token: Whether the address has to hold a secret.
         open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
+        overwrite: What is there may be replaced.
     """
 
     scenario: str = DEFAULT
@@ -36,6 +37,7 @@ class ConsoleOptions:
     token: bool = True
     open: bool = True
     record: Path | None = None
+    overwrite: bool = False
 
     def read(self) -> Scenario:
         """The scenario.
@@ -52,14 +54,5 @@ class ConsoleOptions:
         except ConfigError as error:
             raise set_by(self.changes, error) from None
         if self.record is not None:
-            self._check_record(self.record)
+            check_target(self.record, self.overwrite)
         return scenario
-
-    @staticmethod
-    def _check_record(path: Path) -> None:
-        if path.suffix != SUFFIX:
-            raise ConfigError(f"--record {path} should end in {SUFFIX}")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConfigError(f"cannot be written: {error.strerror}", error.filename) from error

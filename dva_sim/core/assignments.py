@@ -80,6 +80,8 @@ class Rules:
         order_limit: Who has not settled an event so long after the order gives it back [s].
         depart_within: So does who has taken an order up and not set out after this [s].
         still_within: And who is on the way and has not moved for so long [s].
+        arrived_within: Who says that it is there counts as on the way until it has told a
+            position so near the event [m].
         bid_within: How long bids are taken [s].
         operator_span: How many robots one operator may have in hand at once.
         declined_pause: Who declines an order, or is not reached, is not asked again for [s].
@@ -93,6 +95,7 @@ class Rules:
     order_limit: float = 900.0
     depart_within: float = math.inf
     still_within: float = math.inf
+    arrived_within: float = math.inf
     bid_within: float = 2.0
     operator_span: int = 1
     declined_pause: float = 10.0

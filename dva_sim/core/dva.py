@@ -94,9 +94,11 @@ class Dva:
         elif isinstance(body, m.RobotStatus):
             self.registry.locate(entry, body.position)
             entry.mode = body.mode
+            self.orders.moved(message.source, now)
             self.handovers.seen(message.source, body, now)
         elif isinstance(body, m.PersonStatus):
             self.registry.locate(entry, body.position)
+            self.orders.moved(message.source, now)
         elif isinstance(body, m.SensorValue) and entry.position is not None:
             return self._and_revocations(self._felt(message, body, entry.position, now))
         return []
@@ -132,7 +134,7 @@ class Dva:
         elif isinstance(body, m.TaskAnnouncement):
             self.dispatcher.auctions.no_bid(body.event_id, send.to)
             sends = self.dispatcher.decide(now)
-        elif isinstance(body, m.Relocation):
+        elif isinstance(body, m.RelocationOrder):
             self.dispatcher.situations.forget_move(send.to)
         elif isinstance(body, m.GetSensorInfo):
             self.sensing.told(send.to, None, now)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
-from dva_sim.core.events import NEXT, Event, EventBook, State
+from dva_sim.core.events import NEXT, Event, EventBook, State, apart
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
@@ -32,6 +32,7 @@ class Orders:
     engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
     _pauses: list[float] = field(default_factory=list)
+    _from_afar: set[tuple[str, int]] = field(default_factory=set)  # who said so, of which event
     _promises: Promises = field(init=False)
 
     def __post_init__(self) -> None:
@@ -154,23 +155,44 @@ class Orders:
         self.book.touch(event)
 
     def arrived(self, event: Event, device: str, now: float) -> None:
-        """Somebody is there."""
+        """Somebody says that it is there; that counts as soon as it has told where it is."""
         self.departed(event, device, now)
-        if device == event.actor:
+        goes = device if device == event.actor else event.responder
+        if goes is None or self._is_near(event, goes):
+            self._is_there(event, goes, now)
+        else:
+            self.counters["said from afar to have arrived"] += 1
+            self._from_afar.add((goes, event.number))
+
+    def moved(self, device: str, now: float) -> None:
+        """A device has told where it is: that may be where it said that it was."""
+        for event in self.engaged.all(device) if self._from_afar else ():
+            if (device, event.number) in self._from_afar and self._is_near(event, device):
+                self._is_there(event, device, now)
+
+    def _is_near(self, event: Event, device: str) -> bool:
+        within, entry = self.rules.arrived_within, self.registry.entries.get(device)
+        at = None if entry is None else entry.position
+        return math.isinf(within) or (at is not None and apart(at, event.position) <= within)
+
+    def _is_there(self, event: Event, device: str | None, now: float) -> None:
+        if device is not None and device == event.actor:
             event.times.setdefault("act_arrived", now)
         elif event.state is State.ASSIGNED:
             event.times["arrived"] = now
             self.book.move(event, State.ON_SCENE, now)
-        name = device if device == event.actor else event.responder
-        if name is not None:
-            self.registry.locate(self.registry.entries[name], event.position)
+        if device is not None:
+            self._from_afar.discard((device, event.number))
+            self.book.touch(event)
+            self.registry.locate(self.registry.entries[device], event.position)
 
     def found(self, event: Event, device: str, finding: str, now: float) -> list[Send]:
         """What somebody who was sent has found, or done."""
         if not event.open:
             return []
         if self.has_order(event, device):
-            self.arrived(event, device, now)
+            self.departed(event, device, now)
+            self._is_there(event, device if device == event.actor else event.responder, now)
         if finding == "contained" and event.state is State.CONFIRMED:
             self.book.move(event, State.CONTAINED, now)
             return self._stand_down(event, but=device)
@@ -381,6 +403,7 @@ class Orders:
     def _free(self, event: Event, *names: str | None) -> None:
         for name in names:
             if name is not None and self.engaged.end(name, event):
+                self._from_afar.discard((name, event.number))
                 self.book.touch(event)
 
     def _reopen(self, event: Event, now: float) -> list[Send]:

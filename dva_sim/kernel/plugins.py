@@ -24,6 +24,8 @@ A = TypeVar("A")
 
 FAILURES: Final = (Exception, SystemExit)  # what is wrong with a plug-in: it may not end us either
 
+BEYOND: Final = 0.02  # share of a limit by which an answer may miss it
+
 
 @dataclass(frozen=True)
 class Plugins(Generic[T]):
@@ -235,6 +237,12 @@ class Guard:
         except FAILURES as error:
             self._count(said(error))
         return None
+
+    def _held(self, what: str, value: float, least: float, most: float) -> float:
+        """What is allowed of a value; by how much it misses that beyond rounding, is counted."""
+        if not least - BEYOND * most <= value <= most + BEYOND * most:
+            self._count(f"{what} {value:.3g}; allowed is {least:.3g} to {most:.3g}")
+        return min(max(value, least), most)
 
     def _count(self, problem: str) -> None:
         self.failures += 1

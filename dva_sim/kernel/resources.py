@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -109,6 +109,25 @@ def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
             use = f" Try: {other.command} {near}" if is_asked else ""
             return f"{kind} {name!r} not found; did you mean the {other.word} {near!r}?{use}"
     return f"{kind} {name!r} not found; {hint(path.stem, known, 'available')}"
+
+
+def refuse_to_replace(
+    paths: Iterable[Path], overwrite: bool = False, way: str = "give another name, or --overwrite"
+) -> None:
+    """See that nothing is lost of what an earlier run or command left.
+
+    Args:
+        paths: What is to be written.
+        overwrite: The user has said that it may be replaced.
+        way: What the user can do.
+
+    Raises:
+        ConfigError: something is there.
+    """
+    there = [path for path in paths if path.is_symlink() or path.exists()]
+    if there and not overwrite:
+        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+        raise ConfigError(f"{there[0]}{more} would be replaced; {way}")
 
 
 def is_file(path: Path) -> bool:

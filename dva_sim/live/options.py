@@ -11,10 +11,13 @@ from typing import Any
 
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.resources import refuse_to_replace
+from dva_sim.recordings.writing import PART, SUFFIX, check_target, try_to_write
 from dva_sim.simulation.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")
 PATHS = ("keys", "record", "state")  # options that name files
+TRACED = {None: "*", "dva": "dva", "world": "robot-*", "operator": ""}  # by who is run alone
 OPERATORS = ("simulated", "scripted")
 
 
@@ -34,6 +37,7 @@ class LiveOptions:
         record: A recording to make, `.mcap`; or a folder for traces of all decisions.
         state: File in which the DVA keeps what must survive it; None: it keeps nothing.
         duration: How long the run lasts [s]; None: to the scenario's horizon.
+        overwrite: What was recorded before may be replaced.
     """
 
     scenario: str
@@ -47,11 +51,12 @@ class LiveOptions:
     record: Path | None = None
     state: Path | None = None
     duration: float | None = None
+    overwrite: bool = False
 
     @property
     def records_run(self) -> bool:
         """Whether a recording is wanted, and not traces alone."""
-        return self.record is not None and self.record.suffix == ".mcap"
+        return self.record is not None and self.record.suffix.lower() == SUFFIX
 
     def read(self) -> Scenario:
         """The scenario, with its changes.
@@ -79,14 +84,17 @@ class LiveOptions:
             )
         return scenario
 
-    def check(self) -> Scenario:
+    def check(self, part: str | None = None) -> Scenario:
         """The scenario as `read` gives it, with everything placed once.
+
+        Args:
+            part: The only one that is run here; None: all.
 
         Raises:
             ConfigError: see `read`; or the site has no place for the team, or what is recorded
                 cannot be put where it is wanted.
         """
-        from dva_sim.simulation.full import rehearse
+        from dva_sim.simulation.full import rehearse  # late: start-up
 
         scenario, document = self.read(), load(self.scenario)
 
@@ -99,13 +107,26 @@ class LiveOptions:
             found = blame(error, parse_changes(self.changes), make, document)
             raise set_by(self.changes, found) from None
         if self.record is not None:
-            folder = self.record.parent if self.records_run else self.record
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                problem = f"cannot be written: {error.strerror}"
-                raise ConfigError(problem, error.filename) from error
+            self._check_record(self.record, part)
         return scenario
+
+    def _check_record(self, record: Path, part: str | None) -> None:
+        if self.records_run:
+            lines = record.with_name(record.name + PART)
+            refuse_to_replace([lines], self.overwrite, f"dva-sim replay {lines}, or --overwrite")
+            check_target(record, self.overwrite)
+            return
+        if not record.is_dir() and (record.suffix or record.exists()):
+            raise ConfigError(
+                f"recording should end in {SUFFIX}, not {record.name!r}; a folder for traces has "
+                "no dot in its name, or is there"
+            )
+        try:
+            record.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigError(f"is no folder for traces: {error.strerror}", record) from error
+        refuse_to_replace(sorted(record.glob(trace_of(TRACED.get(part, "")))), self.overwrite)
+        try_to_write(record)
 
     def _built(self) -> Scenario:
         document, changes = load(self.scenario), parse_changes(self.changes)
@@ -113,6 +134,11 @@ class LiveOptions:
             return build(document, changes)
         except ConfigError as error:
             raise set_by(self.changes, error) from None
+
+
+def trace_of(label: str) -> str:
+    """The file for the trace of a robot, or the DVA, in the folder for traces."""
+    return f"{label}.trace.jsonl"
 
 
 def _is_address(text: str) -> bool:

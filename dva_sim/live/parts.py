@@ -23,7 +23,7 @@ from dva_sim.core.sessions import Permissions
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
-from dva_sim.live.options import PARTS, LiveOptions
+from dva_sim.live.options import PARTS, LiveOptions, trace_of
 from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.control_room import add_dva, add_operator
@@ -67,7 +67,7 @@ def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str],
         return TraceLines(recorder, label)
     if options.record is None:
         return None
-    path = options.record / f"{label}.trace.jsonl"
+    path = options.record / trace_of(label)
     return TraceFile(path, lambda told: recorder.tell(stage.clock.now, label, told, "link"))
 
 

@@ -17,7 +17,7 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -30,7 +30,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings import write_recording
+from dva_sim.recordings.writing import PART, write_recording
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.hazards import draw_incidents
@@ -39,7 +39,6 @@ from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.hazards import Surroundings
 
-SUFFIX, PART = ".mcap", ".part"
 FORMAT = 1  # of the lines
 MOST_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
 BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
@@ -218,6 +217,36 @@ class TraceFile:
             self._complain(f"keeps no trace any longer: {error.strerror}")
 
 
+def _lock(file: IO[bytes], path: Path) -> None:
+    """Take a file for this process, as long as it is open.
+
+    Raises:
+        ConfigError: another one has it.
+    """
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise ConfigError("belongs to a run that still goes on", path) from error
+
+
+def _emptied(path: Path) -> IO[bytes]:
+    """A file to write, of which nothing is left if it takes a byte.
+
+    Raises:
+        ConfigError: it does not, or another process has it.
+    """
+    try:
+        with ExitStack() as stack:
+            file = stack.enter_context(path.open("ab", buffering=0))
+            _lock(file, path)
+            file.write(b"?")
+            file.truncate(0)
+            stack.pop_all()
+            return file
+    except OSError as error:
+        raise ConfigError(f"cannot be written: {error.strerror}", path) from error
+
+
 class Keeper:
     """Puts what all parts say into one file.
 
@@ -234,10 +263,7 @@ class Keeper:
         start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
         self.problem: str | None = None
         self._room = MOST_BYTES
-        try:
-            self._file: IO[bytes] = self.path.open("wb", buffering=0)
-        except OSError as error:
-            raise ConfigError(f"cannot be written: {error.strerror}", self.path) from error
+        self._file = _emptied(self.path)
         self._threads: list[threading.Thread] = []
         self._lock = threading.Lock()
         self._keep(json.dumps(start).encode() + b"\n")
@@ -287,7 +313,8 @@ class Keeper:
         try:
             lasted = finish(self.path, self._target)
         except DvaSimError as error:
-            return f"{self._target} was not recorded: {self.problem or error}"
+            why = self.problem or error
+            return f"{self._target} was not recorded: {why}; {self.path} is left for dva-sim replay"
         if self.problem is None:
             return None
         return f"{self._target} is recorded up to {lasted:.0f} s only: {self.problem}"
@@ -334,6 +361,7 @@ class _Told:
         self._drives: dict[tuple[str, int], DriveLog] = {}
         try:
             with part.open("rb") as file:
+                _lock(file, part)
                 first, *lines = file.read(MOST_BYTES).split(b"\n")
             self.start = json.loads(first)
             if self.start["format"] > FORMAT:

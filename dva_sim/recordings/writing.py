@@ -12,7 +12,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -23,7 +23,8 @@ import numpy as np
 
 from dva_sim import __version__
 from dva_sim.kernel import resources
-from dva_sim.kernel.errors import DvaSimError
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.recordings import channels, messages
 from dva_sim.recordings.messages import SCHEMAS, XML, ChannelMessage
 from dva_sim.simulation.full import Playback
@@ -94,9 +95,49 @@ ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
 DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
+SUFFIX, PART = ".mcap", ".part"  # a recording; what a live run puts together until its end
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
 
 Tables = Mapping[str, Any]
+
+
+def check_target(path: Path, overwrite: bool = False, **way: str) -> None:
+    """Tell what keeps a recording from being made there, before anything is run.
+
+    Args:
+        path: Of the recording.
+        overwrite: What is there may be replaced.
+        way: See `refuse_to_replace`.
+
+    Raises:
+        ConfigError: its name does not say what it is, something is there, or nothing can be
+            written.
+    """
+    if path.suffix.lower() != SUFFIX:
+        raise ConfigError(f"recording should end in {SUFFIX}, not {path.name!r}")
+    if not path.parent.is_dir():
+        raise ConfigError(f"folder {str(path.parent)!r} for the recording does not exist")
+    if path.is_dir():
+        raise ConfigError("is a folder; give the name of a file", path)
+    refuse_to_replace([path], overwrite, **way)
+    try_to_write(path.parent)
+
+
+def try_to_write(folder: Path) -> None:
+    """See whether a folder takes files.
+
+    Raises:
+        ConfigError: it does not.
+    """
+    path = _beside(folder / "probe")
+    try:
+        path.write_bytes(b"is there room?")
+        path.unlink()
+    except OSError as error:
+        with suppress(OSError):
+            path.unlink()
+        why = error.strerror
+        raise ConfigError(f"nothing can be written in folder {str(folder)!r}: {why}") from error
 
 
 def write_recording(
@@ -126,6 +167,11 @@ def write_recording(
         _write(playback, file, tables, dict(about or {}), traces or {})
 
 
+def _beside(path: Path) -> Path:
+    """Where a file is written before it takes its place."""
+    return path.with_name(f".{path.name}.{os.getpid()}")
+
+
 @contextmanager
 def whole_file(path: Path) -> Iterator[IO[bytes]]:
     """A file beside `path`, which takes its place if all goes well, and else is gone.
@@ -133,7 +179,7 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
     Raises:
         DvaSimError: it cannot be written.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}")
+    part = _beside(path)
     try:
         with part.open("wb") as file:
             yield file

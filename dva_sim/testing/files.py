@@ -67,6 +67,9 @@ def check_file(path: Path) -> FileVerdict:
         return _check_yaml(path)
     if kind in ("recording", "trace"):
         return _check_evidence(kind, path)
+    if path.suffix == ".part":
+        told = "holds what a live run left; dva-sim replay makes a recording of it"
+        return FileVerdict("unknown", [Problem(1, 1, told)])
     return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
 
 
@@ -106,13 +109,13 @@ def _flawed(path: Path, limit: int) -> list[Problem]:
 
 
 def _check_plan(path: Path) -> FileVerdict:
-    from dva_sim.testing.file_kinds import check_plan
+    from dva_sim.testing.file_kinds import check_plan  # late: start-up
 
     return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
 
 
 def _check_evidence(kind: str, path: Path) -> FileVerdict:
-    from dva_sim.testing.evidence import check_recording, check_trace
+    from dva_sim.testing.evidence import check_recording, check_trace  # late: start-up
 
     _read(path, 1)
     return FileVerdict(kind, *(check_recording if kind == "recording" else check_trace)(path))
@@ -120,7 +123,7 @@ def _check_evidence(kind: str, path: Path) -> FileVerdict:
 
 def _check_yaml(path: Path) -> FileVerdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.testing.file_kinds import check_config, doubts, recognise
+    from dva_sim.testing.file_kinds import check_config, doubts, recognise  # late: start-up
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)
@@ -184,7 +187,7 @@ def _json_schema(kind: str) -> dict[str, Any]:
     """From the models that read the files, of which a scenario and an agent have several."""
     from pydantic import TypeAdapter
 
-    from dva_sim.testing.file_kinds import KINDS as FILES
+    from dva_sim.testing.file_kinds import KINDS as FILES  # late: start-up
 
     models = [
         file.model

@@ -206,7 +206,7 @@ class TriedDrive:
         """See `Line`; the app reads every answer."""
 
         def answered(reply: bytes) -> None:
-            if why := self._refusals.answered(self.code_of(reply)):
+            if why := self._refusals.answered(self.code_of(reply), self.clock.now):
                 self.lost(why)
             then(reply)
 

@@ -134,6 +134,11 @@ class AskedFor(Generic[T]):
             self.coming.pop()
         self.coming.append((start, what))
 
+    @property
+    def newest(self) -> T:
+        """What was put last."""
+        return self.coming[-1][1] if self.coming else self.now
+
     def at(self, tick: int) -> T:
         """What holds in a tick; they are asked for in their order."""
         coming = self.coming
@@ -429,6 +434,12 @@ class RobotBody(Body):
             speed, turn_rate = self.motors.set_point(speed, turn_rate)
             self._asked.put(start, TickTarget(speed, turn_rate, world.tick_at(until)))
         world.wake(self)
+
+    @property
+    def asked_until(self) -> float:
+        """Until when it was last asked to move [s], in whole ticks; 0: to stand."""
+        target = self._asked.newest
+        return target.end * self._world.dt if target.speed or target.turn_rate else 0.0
 
     def push(self, tick: int, dt: float) -> bool:
         """Apply the motors' forces for one tick; False if the robot stands and shall stand.

@@ -147,7 +147,8 @@ class GuardedDrive(Guard, Drive):
 
     Both accelerations stay within their limits, and so do the speed and the turn rate that they
     lead to: never backwards, never too fast. What raises or answers no two finite numbers is
-    counted, and brakes.
+    counted, and brakes. What aims at more than its profile has is counted too, and what would
+    drive so, even within the limits of acceleration.
 
     Attributes:
         drive: The user's own.
@@ -163,7 +164,8 @@ class GuardedDrive(Guard, Drive):
         if got is None:
             return 0.0, 0.0
         most = self.spec.max_turn_rate
-        return _within(got[0], 0.0, self.spec.max_speed), _within(got[1], -most, most)
+        aims = self._held("aims at [m/s]", got[0], 0.0, self.spec.max_speed)
+        return aims, self._held("aims at [rad/s]", got[1], -most, most)
 
     def accelerations(
         self, speed: float, turn_rate: float, now_speed: float, now_turn_rate: float, dt: float
@@ -172,6 +174,7 @@ class GuardedDrive(Guard, Drive):
         spec, given = self.spec, (speed, turn_rate, now_speed, now_turn_rate, dt)
         got = self._answer(self.drive.accelerations, *given)
         along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
+        self._judge_motion(along, turn, now_speed, now_turn_rate, dt)
         # Who was pushed beyond a limit comes back as fast as the accelerations allow.
         along = _within(along, -now_speed / dt, (spec.max_speed - now_speed) / dt)
         most = spec.max_turn_rate
@@ -180,6 +183,19 @@ class GuardedDrive(Guard, Drive):
         return _within(along, -spec.max_deceleration, spec.max_acceleration), _within(
             turn, -most, most
         )
+
+    def _judge_motion(
+        self, along: float, turn: float, now_speed: float, now_turn_rate: float, dt: float
+    ) -> None:
+        """Where a tick leads to; who was pushed beyond a limit and brakes does nothing wrong."""
+        spec, most = self.spec, self.spec.max_turn_acceleration
+        speed = now_speed + dt * _within(along, -spec.max_deceleration, spec.max_acceleration)
+        turn_rate = now_turn_rate + dt * _within(turn, -most, most)
+        brakes = min(now_speed, 0.0) <= speed <= max(now_speed, 0.0)
+        spins = abs(turn_rate) > abs(now_turn_rate)
+        most = spec.max_turn_rate
+        self._held("drives at [m/s]", 0.0 if brakes else speed, 0.0, spec.max_speed)
+        self._held("drives at [rad/s]", turn_rate if spins else 0.0, -most, most)
 
 
 def _within(value: float, least: float, most: float) -> float:

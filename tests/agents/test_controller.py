@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dva_sim.agents.robot.controller import LEASE_S, STAND, Decision, Limits, Mode, RobotController
 from dva_sim.protocol import messages as m
 
+SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
 DVA, ROBOT, ANA, RUI = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
 
 
@@ -96,6 +99,66 @@ def test_an_older_command_never_follows_a_newer_one(driven: Bench) -> None:
 def test_commands_of_others_and_of_old_sessions_never_act(driven: Bench) -> None:
     assert driven.say(RUI, m.SetTeleOp(0.4, 0.0)).code == m.NOT_PERMITTED
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), session=6).code == m.BAD_SESSION
+
+
+DRIVES, ABSURD = m.SetTeleOp(0.4, 0.0), 2**64 - 1
+MISSION = m.GoTo((m.Position(38.66, -9.2),))
+REFUSALS = [
+    ("a command of a device that never held it", RUI, 7, DRIVES, m.NOT_PERMITTED),
+    (
+        "a command of the last holder, whose session was revoked",
+        *(ANA, 7, DRIVES, m.NOT_PERMITTED, m.PermissionRevocation(ROBOT, ANA, 7)),
+    ),
+    (
+        "a command of the last holder, while somebody else holds it",
+        *(ANA, 7, DRIVES, m.NOT_PERMITTED, m.PermissionGrant(RUI, "both", 8)),
+    ),
+    (
+        "a command of its holder in an earlier session of that holder",
+        *(ANA, 7, DRIVES, m.BAD_SESSION, m.PermissionGrant(ANA, "both", 8)),
+    ),
+    (
+        "a command of its holder in a session that nobody was granted, or in 0",
+        *(ANA, 0, DRIVES, m.BAD_SESSION),
+    ),
+    (
+        "a mission of a holder who may only drive, in its session",
+        *(ANA, 7, MISSION, m.NOT_PERMITTED),
+    ),
+    (
+        "`DevSub` to a sensor that is not in the permission of its sender, in any session",
+        *(ANA, 6, m.DevSub("smoke", 1.0), m.NOT_PERMITTED),
+    ),
+    (
+        "`DevSub` to a sensor that is, in another session",
+        *(RUI, 6, m.DevSub("smoke", 1.0), m.BAD_SESSION),
+        m.PermissionGrant(RUI, "sensors", 9, None, ("smoke",)),
+    ),
+    (
+        "a grant or revocation of anybody but the DVA",
+        *(RUI, 0, m.PermissionRevocation(ROBOT, ANA, 7), m.NOT_PERMITTED),
+    ),
+    (
+        "a grant of the DVA whose session is over, or absurd",
+        *(DVA, 0, m.PermissionGrant(RUI, "both", ABSURD), m.BAD_SESSION),
+    ),
+]
+
+
+@pytest.mark.parametrize("row", REFUSALS, ids=lambda row: row[0])
+def test_which_refusal_is_as_the_specification_says(driven: Bench, row: tuple[Any, ...]) -> None:
+    told, who, session, body, code, *before = row
+    driven.robot.sensors = (m.Sensor("smoke", "1/m"),)
+    for grant in before:
+        assert driven.say(DVA, grant).code == m.OK
+    assert driven.say(who, body, session=session).code == code
+    name = "NOT_PERMITTED" if code == m.NOT_PERMITTED else "BAD_SESSION"
+    assert f"| {told} | `{name}` |" in SPECIFICATION.read_text()
+
+
+def test_no_row_on_refusals_goes_untested() -> None:
+    _, _, rows = SPECIFICATION.read_text().partition("| what comes to a robot | answer |\n")
+    assert rows.partition("\n\n")[0].count("\n") == len(REFUSALS)
 
 
 @pytest.mark.invariant("S2")

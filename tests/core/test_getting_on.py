@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from office import GUARD, OPERATOR, OTHER_GUARD, OTHER_ROBOT, ROBOT, Office
 
@@ -134,3 +136,42 @@ def test_a_robot_may_stand_while_its_operator_has_another_in_hand() -> None:
         office.progress(OPERATOR, "departed", 1.0, event=event)
     for now in range(2, 300, 10):
         assert office.tick(float(now)) == []
+
+
+def test_who_says_from_afar_that_it_has_arrived_loses_the_order_as_if_it_stood_still() -> None:
+    office = Office(rules=replace(RULES, arrived_within=10.0))  # the guard stands at 0 m
+    office.register(OTHER_GUARD, "Guard", at=90)
+    send_a_guard(office)
+    for state in ("departed", "arrived"):
+        office.progress(GUARD, state, 1.0)
+    for now in range(2, 33):
+        assert office.event().state is State.ASSIGNED
+        office.stands(GUARD, 0.0, float(now))
+        given = office.tick(float(now))
+    assert sent_to(given) == [OTHER_GUARD]
+    assert office.desk.counters["said from afar to have arrived"] == 1
+
+
+def test_who_is_nearly_there_when_it_says_so_has_arrived_with_its_next_position() -> None:
+    office = Office(rules=replace(RULES, arrived_within=10.0))
+    office.register(OTHER_GUARD, "Guard", at=90)
+    send_a_guard(office)
+    office.progress(GUARD, "arrived", 10.0)
+    assert office.event().state is State.ASSIGNED
+    office.stands(GUARD, 2.5, 12.0)
+    assert (office.event().state, office.event().times["arrived"]) == (State.ON_SCENE, 12.0)
+    for now in range(13, 200):
+        assert office.tick(float(now)) == []
+
+
+def test_who_deals_with_it_has_to_be_there_too() -> None:
+    office = Office(rules=replace(RULES, arrived_within=10.0))
+    office.register(OTHER_GUARD, "Guard", at=90)
+    office.ok(office.fire(12))
+    office.ok([office.desk.orders.act(office.event(), GUARD, 0.0)])
+    office.progress(OPERATOR, "arrived", 1.0)  # its robot stands at 10 m
+    office.ok(office.finds(OPERATOR, "confirmed", 2.0)[1])
+    office.progress(GUARD, "arrived", 2.0)
+    for now in range(3, 34):
+        office.tick(float(now))
+    assert office.event().actor == OTHER_GUARD

@@ -2,7 +2,7 @@
 
 import ast
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -15,15 +15,13 @@ MOST_LINES = 600
 
 # One meaning for each public class, but for these.
 SHARED_NAMES = {
-    "Drive": "what motors do; one drive of a phone's app in a trial of patterns",
-    "Relocation": "a policy's advice, and the message that carries it",
     "Results": "what a folder holds, and the same with what can be concluded from it",
 }
 
 
-def imported(path: Path) -> Iterator[str]:
-    """Every module of ours that a file imports: also inside functions, also for types alone."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def imports_of(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    """Every module of ours that these statements import."""
+    for node in nodes:
         if isinstance(node, ast.ImportFrom) and node.module in MODULES:
             for name in node.names:
                 whole = f"{node.module}.{name.name}"
@@ -32,12 +30,65 @@ def imported(path: Path) -> Iterator[str]:
             yield from (name.name for name in node.names if name.name in MODULES)
 
 
+def imported(path: Path) -> Iterator[str]:
+    """Every module of ours that a file imports: also inside functions, also for types alone."""
+    return imports_of(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
 def test_no_module_is_part_of_a_circle_of_imports():
     graph = {name: set(imported(path)) - {name} for name, path in MODULES.items()}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         raise AssertionError(" -> ".join(error.args[1])) from None
+
+
+def test_a_late_import_is_for_start_up_and_says_so():
+    """One of what is loaded by then anyway would save nothing."""
+    early, late = {}, []
+    for name, path in MODULES.items():
+        text = path.read_text(encoding="utf-8")
+        tree, lines = ast.parse(text), text.splitlines()
+        early[name] = set(imports_of(tree.body))
+        late += [
+            (name, node, lines[node.lineno - 1])
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and node.col_offset and set(imports_of([node]))
+            if not is_for_types(node, tree)
+        ]
+    unmarked = [f"{name}:{node.lineno}" for name, node, line in late if MARK not in line]
+    assert unmarked == []
+    assert late
+    in_vain = [
+        f"{name}:{node.lineno} {target}"
+        for name, node, _ in late
+        for target in imports_of([node])
+        if target in loaded_with(name, early)
+    ]
+    assert in_vain == []
+
+
+MARK = "# late: start-up"
+
+
+def is_for_types(wanted: ast.AST, tree: ast.Module) -> bool:
+    """Whether an import stands below `if TYPE_CHECKING`."""
+    return any(
+        wanted in ast.walk(node)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
+
+
+def loaded_with(name: str, early: dict[str, set[str]]) -> set[str]:
+    """All modules that are there once one is imported, the packages they lie in among them."""
+    known, open_ = {name}, [name]
+    while open_:
+        for module in (*early[open_[-1]], open_.pop().rpartition(".")[0]):
+            if module in MODULES and module not in known:
+                known.add(module)
+                open_.append(module)
+    return known
 
 
 def test_no_module_is_longer_than_600_lines():
@@ -53,8 +104,7 @@ def test_a_public_class_name_means_one_thing():
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes[node.name].append(name)
-    twice = {name: rooms for name, rooms in homes.items() if len(rooms) > 1}
-    assert {name: rooms for name, rooms in twice.items() if name not in SHARED_NAMES} == {}
+    assert {name for name, rooms in homes.items() if len(rooms) > 1} == set(SHARED_NAMES)
 
 
 def test_each_package_says_what_it_is():

@@ -269,17 +269,42 @@ def test_lines_that_were_left_are_made_a_recording_by_replay(tmp_path: Path) -> 
     keeper.close()
     with keeper.path.open("ab") as file:
         file.write(b'["sent", 9.9, "02')
+    told = call("check", str(keeper.path))
+    assert told.returncode == 1
+    assert "dva-sim replay makes a recording of it" in told.stdout
+    target = tmp_path / "run.mcap"
+    target.write_text("of an earlier run")
+    ended = call("replay", str(keeper.path))
+    assert ended.returncode == 2
+    assert f"{target} would be replaced; rename it, or {keeper.path}" in ended.stderr
+    target.unlink()
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "is now in mode Idle" in ended.stdout
     assert check_recording(tmp_path / "run.mcap") == ([], [], "20 messages")
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
-def test_a_full_disk_is_told_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "run.mcap.part").symlink_to("/dev/full")
-    lost = record(tmp_path / "run.mcap").finish()
-    assert lost == f"{tmp_path / 'run.mcap'} was not recorded: No space left on device"
+def test_the_lines_of_a_run_that_goes_on_are_left_alone(tmp_path: Path) -> None:
+    keeper = record(tmp_path / "run.mcap")
+    ended = call("replay", str(keeper.path))
+    assert ended.returncode == 2
+    assert ended.stderr == f"error: {keeper.path}: belongs to a run that still goes on\n"
+    with pytest.raises(ConfigError, match="belongs to a run that still goes on"):
+        Keeper(tmp_path / "run.mcap", scenario_of(), 1)
+    assert keeper.finish() is None
+    assert check_recording(tmp_path / "run.mcap") == ([], [], "20 messages")
+
+
+def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path: Path) -> None:
+    keeper = Keeper(tmp_path / "run.mcap", scenario_of(), 1)
+    inlet = keeper.inlet()
+    with Path("/dev/full").open("wb") as full:
+        os.dup2(full.fileno(), keeper._file.fileno())
+    os.write(inlet, b'["told", 1.0, "dva", "is here", "event"]\n')
+    os.close(inlet)
+    lost = keeper.finish()
+    assert lost is not None
+    assert lost.endswith("run.mcap is recorded up to 0 s only: No space left on device")
 
 
 def test_a_run_that_has_grown_too_large_is_kept_up_to_there(

@@ -26,17 +26,31 @@ from dva_sim.live import supervisor
         (["--for", "-1"], "--for '-1' should be a number above 0"),
         (["--for", "nan"], "--for 'nan' should be a number above 0"),
         (["--set", "robot.count=9"], "--set robot.count=9: site 'caparica' has 3 robot bases"),
-        (["--record", "/dev/null"], "/dev/null: cannot be written: File exists"),
-        (["--record", "/proc/no/run.mcap"], "cannot be written: No such file or directory"),
-        (["--record", "/proc/run.mcap"], "/proc/run.mcap.part: cannot be written"),
+        (["--record", "/dev/null"], "recording should end in .mcap, not 'null'; a folder for"),
+        (["--record", "run.mcp"], "recording should end in .mcap, not 'run.mcp'; a folder for"),
+        (["--record", "no/run.mcap"], "folder 'no' for the recording does not exist"),
+        (["--record", "there.mcap"], "there.mcap would be replaced; give another name, or --over"),
+        (["--record", "cut.mcap"], "cut.mcap.part would be replaced; dva-sim replay cut.mcap.part"),
+        (["--record", "traces"], "traces/dva.trace.jsonl and 1 more would be replaced; give"),
+        (["--record", "traces", "--only", "world"], "traces/robot-1.trace.jsonl would be replaced"),
+        (["--record", "/proc/run.mcap"], "nothing can be written in folder '/proc'"),
+        (["--record", "full.mcap", "--overwrite"], "full.mcap.part: cannot be written"),
+        (["--record", "/proc/traces"], "/proc/traces: is no folder for traces"),
+        (["--record", "/proc"], "nothing can be written in folder '/proc'"),
     ],
 )
 def test_a_mistake_ends_in_one_line_before_anything_is_started(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
 ) -> None:
+    for name in ("there.mcap", "cut.mcap.part", "dva.trace.jsonl", "robot-1.trace.jsonl"):
+        folder = tmp_path / ("traces" if name.endswith("jsonl") else "")
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text("of an earlier run")
+    (tmp_path / "full.mcap.part").symlink_to("/dev/full")
     monkeypatch.setattr(supervisor.subprocess, "Popen", lambda *_, **__: pytest.fail("started"))
     ended = call("live", "drive-to-event", "--for", "60", *words, cwd=tmp_path)
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
     assert line.startswith("error: ")
     assert said in line
+    assert (tmp_path / "there.mcap").read_text() == "of an earlier run"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import socket
 from pathlib import Path
@@ -85,13 +86,18 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
     assert not list(tmp_path.glob("*.part"))
 
 
-def test_the_robots_go_on_when_the_disk_is_full(programs: Programs, tmp_path: Path) -> None:
-    (tmp_path / "run.mcap.part").symlink_to("/dev/full")
+def test_the_robots_go_on_when_the_disk_becomes_full(programs: Programs, tmp_path: Path) -> None:
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
+    run.wait_to_say("is now in mode Teleoperation")
+    resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
     assert run.ends() == 2
     assert "200 of 200 commands obeyed" in run.said
     assert "The run ended (the script is done)" in run.said
-    assert run.complained == ["error: run.mcap was not recorded: No space left on device"]
+    (complaint,) = run.complained
+    assert complaint == (
+        "error: run.mcap was not recorded: File too large; run.mcap.part is left for dva-sim replay"
+    )
+    assert call("replay", tmp_path / "run.mcap.part").returncode == 0
 
 
 def test_a_run_lasts_as_long_as_it_is_told_to(programs: Programs) -> None:
@@ -153,6 +159,9 @@ def test_what_was_recorded_until_the_supervisor_is_killed_can_be_replayed(
     run.send(signal.SIGKILL)
     assert run.ends() == -signal.SIGKILL
     programs.wait_for_none()
+    again = call(*SCRIPTED, "--record", "run.mcap", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "run.mcap.part would be replaced; dva-sim replay run.mcap.part, or" in again.stderr
     told = call("replay", tmp_path / "run.mcap.part")
     assert told.returncode == 0, told.stderr
     assert "is now in mode Teleoperation" in told.stdout

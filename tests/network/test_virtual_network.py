@@ -73,7 +73,7 @@ def test_the_period_under_request_reply_is_round_trip_plus_service(
 def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_does_not(
     depth: Depth,
 ) -> None:
-    """10 commands a second, 0.5 s each: after 20 s the last one waits for 80 s."""
+    """10 commands a second, 0.5 s each: after 10 s a stop comes 40 s late."""
     ages = {}
     for latest_wins in (False, True):
         net, done = network(depth, delay_s=0.05), list[float]()
@@ -84,12 +84,12 @@ def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_d
 
         inbox = CommandQueue(clock, lambda: 0.5, handle, latest_wins)
         inbox.flow = net.subscribe("robot", "phone", "r|", inbox.published)
-        for number in range(10, 210):
+        for number in range(10, 110):
             at = 0.1 * number
             clock.call_at(at, net.publish, "phone", "r|", b"%f" % at, 400)
         clock.run(200.0)
         ages[latest_wins] = max(done)
-    assert ages[False] == pytest.approx(80.0, abs=1.0)
+    assert ages[False] == pytest.approx(40.0, abs=1.0)
     assert ages[True] < 1.2
 
 

@@ -71,6 +71,8 @@ def test_a_file_cut_short_is_told_and_so_is_what_is_missing(folder, tmp_path, ca
         (["replay", "{drive}", "--ros2", "."], "is there already; give a new folder"),
         (["episode", "fire-drill", "--record", "run.bag"], "recording should end in .mcap"),
         (["episode", "fire-drill", "--record", "no/run.mcap"], "folder 'no' for the recording"),
+        (["episode", "fire-drill", "--record", "{drive}"], "drive.mcap would be replaced; give an"),
+        (["episode", "fire-drill", "--record", "/proc/a.mcap"], "nothing can be written in folder"),
         (["episode", "tasks/fitts-tilt", "--record", "a.mcap"], "only full ones are recorded"),
         (
             [*("episode", "fire-drill", "--record", "a.mcap"), "--side-by-side", "req-rep,pub-sub"],

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections import Counter
 from functools import partial
 
 import pymunk
 import pytest
 
+from dva_sim.agents.device import command_topic
+from dva_sim.agents.robot.command_queue import EACH
 from dva_sim.agents.robot.robot import FRAME, MISSION, RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
-from dva_sim.network.messaging import Request
+from dva_sim.kernel.recorder import Accepted
+from dva_sim.network.messaging import Request, Requester
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.exchange import Nuisances, Outbox
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import broken_by_moving
@@ -336,3 +342,179 @@ def test_nobody_can_talk_a_robot_to_death() -> None:
     unread = counted["refused unread: of a peer that sends no messages"]
     assert counted["refused"] + unread == 20 * 500
     assert unread > 5000
+
+
+HOLDER, SERVICE = id_of("operator", 1), 0.05
+STRANGERS = (1, 5, 20)
+ANSWERED_BY_ITSELF: tuple[m.Body, ...] = (
+    m.GetSensorInfo(),
+    m.GetSensorInfo(ROBOT),
+    m.GetMissionStatus(),
+    m.DevSub("heat_flux", 1.0),
+    m.Registration("a device", "Robot", "127.0.0.1"),
+)
+HOLDERS: tuple[m.Body, ...] = (
+    m.StartTeleOp(),
+    m.SetTeleOp(0.5, 0.0),
+    m.StopTeleOp(),
+    m.GoTo((m.Position(38.66, -9.2),)),
+    m.ReturnToBase(),
+    m.CancelMission(),
+)
+DVAS: tuple[m.Body, ...] = (
+    m.PermissionGrant("02:00:00:0F:00:01", "both", 9 << 32),
+    m.PermissionRevocation(ROBOT, HOLDER, 9 << 32),
+    m.TaskAward(7),
+)
+FORGED: tuple[tuple[str, m.Body], ...] = (
+    (DVA, m.GetSensorInfo()),
+    (DVA, m.PermissionGrant(HOLDER, "both", 1)),
+    (HOLDER, m.StopTeleOp()),
+    (HOLDER, m.SetTeleOp(0.5, 0.0)),
+)
+FLOODS = [("", body) for body in (*ANSWERED_BY_ITSELF, *HOLDERS, *DVAS)] + list(FORGED)
+
+
+class Driven:
+    """A robot that an operator drives by a pattern, at 10 commands a second."""
+
+    def __init__(self, pattern: str) -> None:
+        self.run = staged(pattern=pattern)
+        self.robot, self.clock = self.run.field.robots[ROBOT], self.run.clock
+        self.outbox, self.answered = Outbox(HOLDER), list[float]()
+        network, waits = self.run.network, list[float]()
+        self.waits, accepted = waits, self.run.recorder.on_accepted
+
+        def note(command: Accepted) -> None:
+            waits.append(command.time - command.arrived - SERVICE)
+            accepted(command)
+
+        self.run.recorder.on_accepted = note  # type: ignore[method-assign]
+        self.control = Requester(network, HOLDER, ROBOT, 9.0)
+        self.commands = Requester(
+            network, HOLDER, ROBOT, 9.0, 3, 8 if pattern == "pipelined" else 1
+        )
+        self.emergency = Requester(network, id_of("guard", 1), ROBOT, 9.0)
+        self.published = pattern in ("pub-sub", "latest-wins")
+        self.session = 0
+        self.clock.call_at(1.0, self._ask_for_it)
+        self.clock.call_at(2.0, self.start)
+        self.clock.every(0.1, self._command, start=3.0)
+        self.clock.run(4.0)
+        assert self.robot.controller.mode == "Teleoperation"
+        self.numbers = itertools.count(1)
+
+    def _ask_for_it(self) -> None:
+        def granted(reply: bytes) -> None:
+            body = decode(reply).body
+            assert isinstance(body, m.Reply)
+            assert isinstance(body.content, m.Permission)
+            self.session = body.content.session
+
+        asked = self.outbox.encode(DVA, m.PermissionRequest(ROBOT, "both"), self.clock.now)
+        Requester(self.run.network, HOLDER, DVA, 9.0).request(asked, granted)
+
+    def start(self) -> None:
+        self.control.request(self._says(m.StartTeleOp()), lambda _: None)
+
+    def _says(self, body: m.Body) -> bytes:
+        return self.outbox.encode(ROBOT, body, self.clock.now, self.session)
+
+    def _command(self) -> None:
+        data = self._says(m.SetTeleOp(0.0, 0.1))
+        if self.published:
+            self.run.network.publish(HOLDER, command_topic(ROBOT), data, len(data))
+        elif not self.commands.busy:
+            self.commands.request(data, lambda _: None)
+
+    def flood(self, strangers: int, source: str, body: m.Body, lasts: float = 1.0) -> None:
+        """Strangers send so, 25 a second each, over connections that are new."""
+        service, begun = self.run.network.service(ROBOT), self.clock.now
+        assert service is not None
+        for stranger in range(strangers):
+            peer = next(self.numbers)
+            outbox = Outbox(source or f"02:00:00:0F:{peer >> 8:02X}:{peer & 255:02X}")
+            session = 77 << 32 if source == HOLDER else 0
+
+            def say(peer: int = peer, outbox: Outbox = outbox, session: int = session) -> bool:
+                data = outbox.encode(ROBOT, body, self.clock.now, session)
+                service(Request(data, lambda _: None, peer=peer))
+                return self.clock.now < begun + lasts - 0.1
+
+            self.clock.every(0.04, say, start=begun + 0.001 * stranger)
+        self.clock.run(begun + lasts)
+
+    def cry(self) -> None:
+        """An emergency, whose answer is timed."""
+        begun = self.clock.now
+        data = Outbox(id_of("guard", 1)).encode(ROBOT, m.Emergency(), begun)
+        self.emergency.request(data, lambda _: self.answered.append(self.clock.now - begun))
+
+
+@pytest.mark.invariant("S10")
+@pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub"])
+def test_no_valid_message_of_strangers_keeps_the_holder_waiting(pattern: str) -> None:
+    """The holder's command waits for one message of others, whatever they send, however many."""
+    driven = Driven(pattern)
+    for source, body in FLOODS:
+        for strangers in STRANGERS:
+            applied = len(driven.waits)
+            driven.flood(strangers, source, body)
+            assert driven.robot.controller.mode == "Teleoperation", body
+            assert len(driven.waits) - applied >= 4, (strangers, body)
+    assert max(driven.waits) < SERVICE + 1e-4
+    assert driven.robot.controller.grant is not None
+    assert not driven.run.recorder.violations
+
+
+def test_what_only_the_holder_may_say_costs_a_robot_that_is_driven_nothing() -> None:
+    driven = Driven("req-rep")
+    for body in (*HOLDERS, *DVAS):
+        driven.flood(20, "", body)
+    driven.flood(20, HOLDER, m.SetTeleOp(0.5, 0.0))
+    assert max(driven.waits) < 1e-4
+
+
+@pytest.mark.parametrize("body", [body for _, body in FLOODS[:1]] + [m.Emergency()])
+def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body: m.Body) -> None:
+    driven = Driven("pub-sub")
+    for strangers in STRANGERS:
+        cries = [0.1 + 0.1537 * number for number in range(5)]
+        for cry in cries:
+            driven.clock.call_after(cry, driven.cry)
+        driven.flood(strangers, "", body)
+        assert len(driven.answered) == len(cries)
+        driven.clock.run(driven.clock.now + 0.5)
+        driven.start()
+        driven.clock.run(driven.clock.now + 0.5)
+        assert driven.robot.controller.mode == "Teleoperation"
+        driven.answered.clear()
+    longest = max(driven.emergency.round_trips) - min(driven.emergency.round_trips)
+    assert longest < SERVICE + 1e-3  # of which one service is its own
+
+
+def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy() -> None:
+    driven, told = Driven("req-rep"), list[m.Body]()
+    service = driven.run.network.service(ROBOT)
+    assert service is not None
+    outbox = Outbox("02:00:00:0F:00:01")
+    for _ in range(200):
+        data = outbox.encode(ROBOT, m.GetSensorInfo(), driven.clock.now)
+        service(Request(data, lambda reply: told.append(decode(reply).body), peer="one"))
+    driven.clock.run(driven.clock.now + 5.0)
+    codes = Counter(reply.code for reply in told if isinstance(reply, m.Reply))
+    assert codes[m.OK] in (EACH, EACH + 1)
+    assert codes[m.BUSY] == Nuisances.UNANSWERED + 1
+    counted = driven.run.recorder.counters
+    busy, unread = (
+        counted["refused: busy"],
+        counted["refused unread: of a peer that sends no messages"],
+    )
+    assert busy + unread + codes[m.OK] == 200
+
+
+def test_a_robot_says_which_sensors_it_has_itself_when_it_is_asked_by_its_id() -> None:
+    run = staged()
+    told = send(run, 1.0, m.GetSensorInfo(ROBOT), session=0)
+    run.clock.run(2.0)
+    assert isinstance(told[0].content, m.SensorInfo)

@@ -1,5 +1,6 @@
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -146,6 +147,55 @@ def test_a_drive_of_a_user_is_kept_within_the_limits_whatever_it_answers():
     assert drive.accelerations(0.5, 0.0, 0.1, 0.0, DT) == (0.5, 0.5)
     assert drive.accelerations(0.5, 0.0, 0.499, 0.0, DT)[0] == pytest.approx(0.001 / DT)
     assert drive.accelerations(0.0, 0.0, 0.3, 0.1, DT) == (-1.0, -1.5)
+
+
+class Racing(Differential):
+    def set_point(self, speed, turn_rate):
+        return 50.0, 0.0
+
+
+class Raving(Differential):
+    """Its set point is as it should be, what it does is not."""
+
+    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
+        return (50.0 - now_speed) / dt, 0.0
+
+
+class Dancing(Differential):
+    def set_point(self, speed, turn_rate):
+        return speed, 9.0
+
+
+@pytest.mark.invariant("S4")
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        (Racing, "aims at [m/s] 50; allowed is 0 to 0.5"),
+        (Raving, "drives at [m/s] 0.52; allowed is 0 to 0.5"),
+        (Dancing, "aims at [rad/s] 9; allowed is -0.524 to 0.524"),
+    ],
+)
+def test_a_drive_that_wants_more_than_its_profile_has_is_limited_and_counted(kind, told):
+    world = World(hall(20.0, 20.0), 0.04)
+    spec = DriveSpec(drive=lambda spec: GuardedDrive(kind(spec)))
+    robot = world.add_robot("robot-1", spec, Pose(10.0, 10.0, 0.0))
+    for _ in range(20):
+        robot.drive(0.5, 0.0, world.time + 0.4)
+        world.advance_to(world.time + 0.1)
+        assert robot.speed <= 0.5 + 1e-9
+    assert robot.motors.failures >= 10
+    assert robot.motors.first_failure == told
+
+
+def test_a_drive_that_keeps_within_its_profile_is_never_counted_whatever_it_is_asked_for():
+    world = World(hall(20.0, 20.0), 0.04)
+    for number, (kind, own) in enumerate(((Differential, DriveSpec()), (ThreeWay, CAR))):
+        spec = replace(own, drive=lambda spec, kind=kind: GuardedDrive(kind(spec)))
+        robot = world.add_robot(f"robot-{number}", spec, Pose(5.0 + 9.0 * number, 10.0, 0.0))
+        for speed, turn_rate in itertools.product((9.0, 0.5, 0.0), (-9.0, 0.1, 0.0)):
+            robot.drive(speed, turn_rate, math.inf)
+            world.advance_to(world.time + 1.0)
+        assert (robot.motors.failures, robot.motors.first_failure) == (0, "")
 
 
 class Spinning(Differential):

@@ -13,6 +13,10 @@ from dva_sim.protocol import messages as m
 
 ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # whether the permission holds is for the DVA to say
 PASSES = (m.STALE, m.OUT_OF_ORDER)  # such a command came late: the next may not
+LATE_FOR = 10.0  # but if nothing else has come for so long, and `ENOUGH` of them, none will [s]
+SAYS_LATE_FOR = 40.0
+"""The same of what is published [s]: the app alerts after `LATE_FOR`, but a robot that is only slow
+ends the drive itself by then, when it has obeyed nothing for 30 s."""
 ENOUGH = 3  # answers in a row of any other kind, as of sends without an answer
 TAKEN = "somebody else holds the robot"
 
@@ -25,33 +29,39 @@ class Refusals:
         me: Id of the device that drives.
         codes: How often commands were answered with each code but OK.
         last: The code that ended it.
+        late: Whether every command has come late for `LATE_FOR`.
     """
 
     me: str
     codes: Counter[int] = field(default_factory=Counter)
     last: int | None = None
+    late: bool = False
     _in_vain: int = 0
+    _late: int = 0
+    _late_since: float = 0.0
+    _sent: int = 0
     _confirmed: bool = False
     _doubtful: int = 0
 
-    def answered(self, code: int | None) -> str:
+    def answered(self, code: int | None, now: float) -> str:
         """A command was answered: why nobody obeys any more, or nothing.
 
         Args:
             code: Of the reply; None if it cannot be read, or answers something else.
+            now: Time [s].
         """
         if code == m.OK:
-            self._in_vain = 0
+            self._in_vain = self._late = 0
             return ""
         self.codes[m.BAD_MESSAGE if code is None else code] += 1
         if code in PASSES:
-            return ""
+            return self._too_late(code, now, LATE_FOR)
         self._in_vain += 1
         if code not in m.OBEYS_NO_MORE and self._in_vain < ENOUGH:
             return ""
         return self._over(code)
 
-    def held(self, holder: str | None, code: int | None) -> str:
+    def held(self, holder: str | None, code: int | None, now: float, sent: int) -> str:
         """The robot says who holds it: why nobody obeys any more, or nothing.
 
         What it said before the drive began may come late: it counts once it has said that it is
@@ -60,17 +70,34 @@ class Refusals:
         Args:
             holder: Id of the device that may act; None: nobody.
             code: How its newest command fared, or would; None: as it should.
+            now: Time [s].
+            sent: How many commands were sent so far: of none, nothing new can be said.
         """
         code = m.OK if code is None else code
-        ours = holder == self.me
+        ours, goes_on, self._sent = holder == self.me, sent > self._sent, sent
         if ours and (code == m.OK or code in PASSES):
             self._confirmed, self._doubtful = True, 0
-            return ""
+            if code == m.OK:
+                self._late, self.late = 0, False
+            if code == m.OK or not goes_on:
+                return ""
+            why = self._too_late(code, now, SAYS_LATE_FOR)
+            self.codes[code] += bool(why)
+            return why
         self._doubtful += 1
         if not self._confirmed and self._doubtful < ENOUGH:
             return ""
         self.codes[code if ours else m.NOT_PERMITTED] += 1
         return self._over(code) if ours else self._over(m.NOT_PERMITTED, TAKEN if holder else "")
+
+    def _too_late(self, code: int, now: float, limit: float) -> str:
+        """One more that came late, and none that did not since the first of them."""
+        if self._late == 0:
+            self._late_since = now
+        self._late += 1
+        since = now - self._late_since if self._late >= ENOUGH else 0.0
+        self.late = since >= LATE_FOR
+        return self._over(code, f"{m.CODE_NAMES[code]} for {limit:g} s") if since >= limit else ""
 
     def _over(self, code: int | None, why: str = "") -> str:
         self.last = code

@@ -155,7 +155,8 @@ def _drive(
     obeyed, refusals = 0, Refusals(operator.device.id_tag)
     for number in range(commands):
         reply = yield Ask(robot, _swaying(number, operator.seen_tick), session)
-        why = refusals.answered(None if reply is None else reply.code)
+        code = None if reply is None else reply.code
+        why = refusals.answered(code, operator.device.clock.now)
         obeyed += reply is not None and reply.code == m.OK
         if why:
             operator.tell(f"stops driving {name} after {obeyed} of {commands} commands: {why}")

@@ -1,6 +1,10 @@
 """A robot's computer: it takes one message at a time, each for its processing time.
 
-That time is always the same, or drawn from a distribution.
+That time is always the same, or drawn from a distribution. Whoever holds the robot has every second
+turn, and all strangers together, however many, a fifth of the time while it is driven: what
+they can take from the holder must not grow with their connections, which cost them nothing. An
+emergency waits for nobody but the one message that is being worked on, and one processing
+answers all that have come by its end: more of them cannot stop the robot any better.
 """
 
 from __future__ import annotations
@@ -8,6 +12,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict, deque
 from collections.abc import Callable, Hashable, Iterator, Mapping
+from enum import IntEnum
 from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
@@ -23,9 +28,20 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
+EACH = 8  # messages that may wait of a connection that is not the holder's
+REST = 4.0  # how long strangers rest after a message of theirs, in times of its processing
+TICK = 1e-6  # of the clock [s]
 
 
 PUBLISHED: Final = object()  # stands for whoever publishes commands: one at a time
+
+
+class Standing(IntEnum):
+    """What reason a robot has to listen to whoever a message is of."""
+
+    HOLDER = 0  # has proved it: by the session, or as the robot has subscribed to it
+    DVA = 1  # says so; without keys anybody can
+    STRANGER = 2
 
 
 class Letter(NamedTuple):
@@ -36,62 +52,100 @@ class Letter(NamedTuple):
         arrived: When [s].
         request: What it came by; None if nobody waits for an answer.
         message: What it says, where the queue was told how to read it.
+        moves: Whether it is a command; everything else is control.
     """
 
     data: bytes
     arrived: float
     request: Request | None = None
     message: Message | None = None
+    moves: bool = True
 
     @property
     def answer(self) -> Answer | None:
         """Takes the reply; None if nobody waits for one."""
         return None if self.request is None else self.request.answer
 
+    @property
+    def peer(self) -> Hashable:
+        """The connection that it came by."""
+        return PUBLISHED if self.request is None else self.request.peer
+
+
+StandingOf = Callable[[Letter], Standing]
+Line = deque[Letter]
+
 
 class FairQueue:
-    """First come, first served among peers who wait with one message; else by turns.
+    """A line for the control and one for the commands of each connection; lines have turns.
 
-    Whoever sends much waits for itself: of a queue that is full, the newest of who has most in it
-    makes room for the others.
+    Whoever sends much waits for itself. A connection that is not the holder's has `EACH` places;
+    where there is no room at all, the newest of the longest line makes some, strangers first.
 
     Args:
-        limit: How many messages may wait.
+        limit: How many messages of the holder may wait, and how many of all others.
+        standing: Of a message, by now: a grant that comes meanwhile counts.
     """
 
-    def __init__(self, limit: int) -> None:
-        self._limit, self._length = limit, 0
-        self._peers: OrderedDict[Hashable, deque[Letter]] = OrderedDict()
+    def __init__(self, limit: int, standing: StandingOf) -> None:
+        self._limit, self._standing, self._length = limit, standing, 0
+        self._lines: OrderedDict[tuple[Hashable, bool], Line] = OrderedDict()
 
     def __len__(self) -> int:
         return self._length
 
-    def put(self, letter: Letter) -> bool:
-        """Take a letter in; False if one was dropped for it, or itself."""
-        peer = PUBLISHED if letter.request is None else letter.request.peer
-        has_room = self._length < self._limit
-        if not has_room:
-            most = max(self._peers, key=lambda one: len(self._peers[one]))
-            if most == peer or len(self._peers[most]) == 1:
-                return False
-            self._peers[most].pop()
-            self._length -= 1
-        self._peers.setdefault(peer, deque()).append(letter)
-        self._length += 1
-        return has_room
+    def count(self, holders: bool) -> int:
+        """How many are the holder's, or are not."""
+        return sum(map(len, self._beside(holders).values()))
 
-    def pop(self) -> Letter:
-        """The next one; who has more waits until all others have had their turn."""
-        peer, letters = self._peers.popitem(last=False)
-        letter = letters.popleft()
-        if letters:
-            self._peers[peer] = letters
+    def _beside(self, holders: bool) -> dict[tuple[Hashable, bool], Line]:
+        return {k: v for k, v in self._lines.items() if (self._standing(v[0]) == 0) is holders}
+
+    def has(self, standing: Standing) -> bool:
+        """Whether one of a standing is next in its line."""
+        return any(self._standing(line[0]) is standing for line in self._lines.values())
+
+    def put(self, letter: Letter) -> Letter | None:
+        """Take a letter in; the one that finds no room, if any: another, or itself."""
+        gone, key = None, (letter.peer, letter.moves)
+        standing = self._standing(letter)
+        mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
+        if standing is not Standing.HOLDER and sum(mine) >= EACH:
+            return letter
+        if self._length >= self._limit:
+            beside = self._beside(standing is Standing.HOLDER)
+            if sum(map(len, beside.values())) >= self._limit:
+                worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
+                if (standing, mine[letter.moves] + 1) >= self._rank(line):
+                    return letter
+                gone = self._take(worst, newest=True)
+        self._lines.setdefault(key, deque()).append(letter)
+        self._length += 1
+        return gone
+
+    def _rank(self, line: Line) -> tuple[Standing, int]:
+        return self._standing(line[0]), len(line)
+
+    def pop(self, standing: Standing) -> Letter | None:
+        """The next one of a standing, control first; its line waits until all others had a turn."""
+        lines = [key for key, line in self._lines.items() if self._standing(line[0]) is standing]
+        if not lines:
+            return None
+        key = min(lines, key=lambda one: one[1])
+        self._lines.move_to_end(key)
+        return self._take(key)
+
+    def _take(self, key: tuple[Hashable, bool], newest: bool = False) -> Letter:
+        line = self._lines[key]
+        letter = line.pop() if newest else line.popleft()
+        if not line:
+            del self._lines[key]
         self._length -= 1
         return letter
 
     def forget_published(self) -> int:
         """Drop what nobody waits to be answered: how many those were."""
-        gone = len(self._peers.pop(PUBLISHED, ()))
+        gone = len(self._lines.pop((PUBLISHED, True), ()))
         self._length -= gone
         return gone
 
@@ -99,8 +153,15 @@ class FairQueue:
 Read = Callable[[Request], Message | None]
 
 
+def _nobody_waits(_: Letter) -> None:
+    """What finds no room is counted, and that is all."""
+
+
 class CommandQueue:
-    """First come, first served within a class; emergencies before control before commands.
+    """Emergencies first, but for every second turn; the holder's next after each of another.
+
+    The holder's next message waits for one message of others at most, for two where one of the
+    holder's own was being worked on; while emergencies come, for as many of these in addition.
 
     Args:
         clock: The run's clock.
@@ -108,9 +169,12 @@ class CommandQueue:
         handle: Takes each letter when its processing is done.
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
-        limit: How many messages of a class may wait.
+        limit: How many messages of the holder may wait, of all others, and emergencies.
         read: Reads what arrives, before it waits: what is None was refused, and takes no time.
             Without it all is taken as bytes, and only emergencies are read.
+        standing: Of a message, by now.
+        driven: Whether somebody drives the robot, so that strangers have to leave it time.
+        refuse: Takes each letter that there is no room for.
 
     Attributes:
         service: As given; may be replaced at any time.
@@ -127,76 +191,146 @@ class CommandQueue:
         latest_wins: bool,
         limit: int = LIMIT,
         read: Read | None = None,
+        standing: StandingOf = lambda _: Standing.HOLDER,
+        driven: Callable[[], bool] = lambda: False,
+        refuse: Callable[[Letter], object] = _nobody_waits,
     ) -> None:
         self._clock, self.service, self._handle = clock, service, handle
         self.latest_wins, self._limit, self._read = latest_wins, limit, read
+        self._standing, self._driven, self._refuse = standing, driven, refuse
         self.flow: Flow | None = None
-        self._paused = False
-        self._emergencies, self._control = FairQueue(limit), FairQueue(limit)
-        self._commands = FairQueue(limit)
-        self._busy = False
+        self._paused = self._busy = self._waking = self._was_urgent = False
+        self._emergencies: list[Letter] = []
+        self._waiting = FairQueue(limit, standing)
+        self._last, self._turns = Standing.HOLDER, [Standing.DVA, Standing.STRANGER]
+        self._rested = 0.0  # strangers are, from then on [s]
         self.longest = self.superseded = self.overflowed = 0
 
     def __len__(self) -> int:
-        return len(self._emergencies) + len(self._control) + len(self._commands)
+        return len(self._emergencies) + len(self._waiting)
+
+    @property
+    def hears_the_dva(self) -> bool:
+        """Whether something that claims to be of the DVA waits, or is being worked on."""
+        at_work = self._busy and self._last is Standing.DVA
+        return at_work or self._waiting.has(Standing.DVA)
 
     def request(self, request: Request) -> None:
         """A request has arrived; somebody waits for the answer."""
         data, message = request.data, None
+        looks_urgent = b"<EmergencyMsg" in data
+        if looks_urgent and not self._has_room(request.peer):
+            self._turn_away(Letter(data, self._clock.now, request))
+            return
         if self._read is not None:
             message = self._read(request)
             if message is None:
                 return
             urgent, moves = isinstance(message.body, Emergency), isinstance(message.body, SetTeleOp)
         else:
-            urgent = b"<EmergencyMsg" in data and _is_emergency(data)
-            moves = b"<SetTeleOp>" in data
-        queue = self._emergencies if urgent else self._commands if moves else self._control
-        self._put(queue, Letter(data, self._clock.now, request, message))
+            urgent, moves = looks_urgent and _is_emergency(data), b"<SetTeleOp>" in data
+        self._put(Letter(data, self._clock.now, request, message, moves), urgent)
+
+    def _has_room(self, peer: Hashable) -> bool:
+        """For one more emergency; those that wait will stop the robot as well."""
+        of_peer = sum(letter.peer == peer for letter in self._emergencies)
+        return of_peer < EACH and len(self._emergencies) < self._limit
 
     def published(self, data: bytes, message: Message | None = None) -> None:
         """A command has arrived that nobody waits to be answered; who has read it, says so."""
         if self.latest_wins:
             self.superseded += self.forget_published()
-        self._put(self._commands, Letter(data, self._clock.now, None, message))
-        if self.flow is not None and len(self._commands) >= self._limit:
+        self._put(Letter(data, self._clock.now, None, message))
+        if self.flow is not None and self._waiting.count(holders=True) >= self._limit:
             self._paused = True
             self.flow.pause()
 
     def forget_published(self) -> int:
         """Drop the published commands that wait: how many those were."""
-        return self._commands.forget_published()
+        return self._waiting.forget_published()
 
-    def _put(self, queue: FairQueue, letter: Letter) -> None:
-        if not queue.put(letter):
-            self.overflowed += 1
-        if len(queue) > self.longest:
-            self.longest = len(queue)
+    def _put(self, letter: Letter, urgent: bool = False) -> None:
+        if urgent:
+            self._emergencies.append(letter)
+        else:
+            gone = self._waiting.put(letter)
+            if gone is not None:
+                self._turn_away(gone)
+        self.longest = max(self.longest, len(self._emergencies if urgent else self._waiting))
         if not self._busy:
             self._work()
 
+    def _turn_away(self, letter: Letter) -> None:
+        self.overflowed += 1
+        self._refuse(letter)
+
     def _work(self) -> None:
-        """Take the next letter; where processing takes no time, all of them."""
-        while queue := self._emergencies or self._control or self._commands:
+        """Take what is next; where processing takes no time, all of it."""
+        while letters := self._next():
             self._busy = True
-            letter = queue.pop()
             if self._paused:
                 self._take_more()
             duration = self.service()
+            if self._last is Standing.STRANGER and not self._was_urgent:
+                self._rested = self._clock.now + (1.0 + REST) * duration
             if duration > 0.0:
-                self._clock.call_after(duration, self._done, letter)
+                self._clock.call_after(duration, self._done, letters)
                 return
-            self._handle(letter)
+            self._finish(letters)
         self._busy = False
+
+    def _next(self) -> list[Letter]:
+        """Emergencies, all in one, unless it is the turn of somebody else."""
+        held_up = self._emergencies and not self._was_urgent
+        letter = None if held_up else self._next_of_others()
+        self._was_urgent = letter is None and bool(self._emergencies)
+        return self._emergencies if letter is None else [letter]
+
+    def _next_of_others(self) -> Letter | None:
+        """The holder's after each of another; the DVA and strangers by turns."""
+        if not self._waiting:
+            return None
+        others, holder = self._turns, Standing.HOLDER
+        for one in (*others, holder) if self._last is holder else (holder, *others):
+            if one is Standing.STRANGER and self._strangers_rest():
+                continue
+            letter = self._waiting.pop(one)
+            if letter is not None:
+                self._last = one
+                if one is not holder:
+                    self._turns = [*(other for other in others if other is not one), one]
+                return letter
+        return None
+
+    def _strangers_rest(self) -> bool:
+        """Whether they have to wait although nobody else does; then there is an end to it."""
+        if self._clock.now >= self._rested - TICK or not self._driven():
+            return False
+        if not self._waking:
+            self._waking = True
+            self._clock.call_at(self._rested, self._wake)
+        return True
+
+    def _wake(self) -> None:
+        self._waking = False
+        if not self._busy:
+            self._work()
 
     def _take_more(self) -> None:
         """Let published commands come again once half of the inbox is done."""
-        if self.flow is not None and len(self._commands) <= self._limit // 2:
+        if self.flow is not None and self._waiting.count(holders=True) <= self._limit // 2:
             self._paused = False
             self.flow.resume()
 
-    def _done(self, letter: Letter) -> None:
-        self._handle(letter)
+    def _finish(self, letters: list[Letter]) -> None:
+        """Processing is done; an emergency that came meanwhile is done with, too."""
+        if letters is self._emergencies:
+            self._emergencies = []
+        for letter in letters:
+            self._handle(letter)
+
+    def _done(self, letters: list[Letter]) -> None:
+        self._finish(letters)
         self._work()
 
 

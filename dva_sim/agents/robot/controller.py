@@ -214,7 +214,7 @@ class RobotController:
                 return Decision(m.OK, content=self.mission_status)
             case m.TaskAnnouncement() | m.TaskAward():
                 return self._auction(message)
-            case m.GetSensorInfo(device=None):
+            case m.GetSensorInfo(device=device) if device in (None, self.id_tag):
                 return Decision(m.OK, content=m.SensorInfo(self.camera_url, self.sensors))
             case m.Reply():
                 return self._told_by_dva(body)
@@ -222,6 +222,15 @@ class RobotController:
                 return Decision(m.UNKNOWN_DEVICE, "ask the DVA for the sensors of others")
             case _:
                 return Decision(m.NOT_SUPPORTED, f"a robot does not take {type(body).__name__}")
+
+    def knows(self, message: m.Message) -> bool:
+        """Whether a message proves that it is of the holder, by the session."""
+        grant = self.grant
+        return (
+            grant is not None
+            and message.source == grant.holder
+            and message.session == grant.session
+        )
 
     def expire(self, now: float) -> bool:
         """End a teleoperation whose operator has long said nothing; True if it did."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
 from dva_sim.agents.observation import FRAME, CameraFrame, Observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
-from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter
+from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (
     ENDS,
     STAND,
@@ -154,6 +154,8 @@ class MissionLoop:
             self._on_news()
 
 
+HOLDERS_ONLY = m.StartTeleOp | m.StopTeleOp | m.SetTeleOp | Mission | m.CancelMission
+DVAS_ONLY = m.PermissionGrant | m.PermissionRevocation | m.TaskAnnouncement | m.TaskAward
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
@@ -251,6 +253,9 @@ class RobotAgent:
             setup.pattern.newest_wins or setup.conflates,
             setup.limit,
             self._admit,
+            self._standing,
+            self._is_driven,
+            self._turn_away,
         )
         self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
@@ -316,8 +321,41 @@ class RobotAgent:
     # --- messages ----------------------------------------------------------------------
 
     def _admit(self, request: Request) -> m.Message | None:
-        """A request that is worth waiting for; without power it hears none."""
-        return None if self.device.silent else self.device.admit(request)
+        """A request that is worth waiting for; without power it hears none.
+
+        While somebody drives, what only that one may say is refused to strangers before it costs
+        any processing, unless a word of the DVA waits that may make one of them the holder.
+        """
+        message = None if self.device.silent else self.device.admit(request)
+        if message is None or not isinstance(body := message.body, HOLDERS_ONLY | DVAS_ONLY):
+            return message
+        standing, now = self._standing_of(message), self.device.clock.now
+        unknown = not self._is_driven() or self.inbox.hears_the_dva
+        if standing is not Standing.STRANGER or (unknown and isinstance(body, HOLDERS_ONLY)):
+            return message
+        self.device.conclude(request, message, lambda one: self._reply(one, now), at_once=True)
+        return None
+
+    def _standing_of(self, message: m.Message) -> Standing:
+        if self.controller.knows(message):
+            return Standing.HOLDER
+        return Standing.DVA if message.source == self.controller.dva else Standing.STRANGER
+
+    def _standing(self, letter: Letter) -> Standing:
+        """Who publishes commands is the holder: the robot has subscribed to it."""
+        if letter.request is None or letter.message is None:
+            return Standing.HOLDER
+        return self._standing_of(letter.message)
+
+    def _is_driven(self) -> bool:
+        return self.controller.mode is Mode.TELEOPERATION
+
+    def _turn_away(self, letter: Letter) -> None:
+        """There is no room for a letter."""
+        if letter.request is not None and not self.device.silent:
+            answers = letter.message.message_id if letter.message is not None else 0
+            refusal = m.Reply(answers, m.BUSY, "too many of your messages wait")
+            self.device.turn_away(letter.request, letter.message, refusal)
 
     def _published(self, data: bytes) -> None:
         """A command has arrived of the one who drives; what is none takes no time."""
@@ -336,12 +374,12 @@ class RobotAgent:
         if letter.request is None:
             self._decide(letter.message, letter.arrived)
             return
+        arrived = letter.arrived
+        self.device.conclude(letter.request, letter.message, lambda one: self._reply(one, arrived))
 
-        def decide(message: m.Message) -> m.Reply:
-            decision = self._decide(message, letter.arrived)
-            return m.Reply(message.message_id, decision.code, decision.text, decision.content)
-
-        self.device.conclude(letter.request, letter.message, decide)
+    def _reply(self, message: m.Message, arrived: float) -> m.Reply:
+        decision = self._decide(message, arrived)
+        return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
         now = self.device.clock.now

@@ -245,8 +245,10 @@ class GuardedMapping(Guard, Mapping):
             self._count(said(error))
 
     def command(self, level: float, turn: float, dt: float) -> Reading:
-        """See `Mapping`; within the limits."""
-        return limited(*(self._answer(self._mapping.command, level, turn, dt) or NEUTRAL))
+        """See `Mapping`; within the limits: who wants to stand may ask for less than nothing."""
+        level, turn = self._answer(self._mapping.command, level, turn, dt) or NEUTRAL
+        level = self._held("asks for level", max(level, 0.0), 0.0, LEVELS)
+        return level, self._held("asks for [deg/s]", turn, -MAX_TURN_DEG, MAX_TURN_DEG)
 
     def tilt_for(self, wanted: Reading, shown: Reading, within: float) -> Reading:
         """See `Mapping`; the hand holds the phone at rest where it is told nothing."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -23,10 +23,10 @@ from dva_sim.console.web.state import body_of, encode
 
 LOOKS_RATE, LOOKS_BURST = 20.0, 60  # messages of a page that looks [1/s]
 DRIVES_RATE, DRIVES_BURST = 150.0, 300  # of one that drives [1/s]
-TOO_MUCH, NONSENSE, STUCK, LEAVING = 1008, 1008, 1013, 1001
+REFUSED, STUCK, LEAVING = 1008, 1013, 1001  # why a socket is closed
 
 Next = Callable[[], str | None]
-Hear = Callable[[str], Awaitable[None]]
+Hear = Callable[[str], None]
 
 
 class Hub:
@@ -64,7 +64,7 @@ class Hub:
         await ws.accept()
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
-        async def hear(text: str) -> None:
+        def hear(text: str) -> None:
             self._hear_looker(client, text)
 
         def following() -> str | None:
@@ -122,7 +122,7 @@ class Hub:
             driver.seat("{" + known.body)
         await ws.accept()
 
-        async def hear(text: str) -> None:
+        def hear(text: str) -> None:
             self._hear_driver(client, driver, text)
 
         try:
@@ -190,13 +190,14 @@ class Hub:
     async def _receive(self, ws: WebSocket, hear: Hear, bucket: Bucket) -> None:
         """Messages of a page, as long as they make sense and are not too many."""
         while (text := await heard(ws)) is not None:
-            if not bucket.takes(time.monotonic()):
-                wire_of(ws).drop(TOO_MUCH, "too many messages")
-                return
             try:
-                await hear(text)
+                if isinstance(text, bytes):
+                    raise Refused("is not text")
+                if not bucket.takes(time.monotonic()):
+                    raise Refused("too many messages")
+                hear(text)
             except Refused as error:
-                wire_of(ws).drop(NONSENSE, str(error)[:100])
+                wire_of(ws).drop(REFUSED, str(error)[:100])
                 return
 
     async def close(self, why: str) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -62,11 +63,18 @@ class Simulation:
     def _take(self, data: bytes) -> None:
         self._heard = time.monotonic()
         try:
-            for text in self._lines.feed(data):
-                self._take_line(json.loads(text))
-        except (ValueError, KeyError, TypeError, IndexError) as error:
-            self.why = f"the simulation said what nobody understands: {error}"
+            lines = self._lines.feed(data)
+        except ValueError as error:
+            self.why = f"the simulation said too much: {error}"
             self._end()
+            return
+        for text in lines:
+            try:
+                self._take_line(json.loads(text))
+            except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+                print(
+                    f"dva-sim: a line of the simulation makes no sense: {error!r}", file=sys.stderr
+                )
 
     def _take_line(self, line: dict[str, Any]) -> None:
         kind = line.get("k")

@@ -16,7 +16,7 @@ from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import resolved
 from dva_sim.network.patterns import known_patterns
-from dva_sim.recordings import Opened, read_recording, write_recording
+from dva_sim.recordings import Opened, check_target, read_recording, write_recording
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, simulate
@@ -61,6 +61,7 @@ class EpisodeRequest:
         side_by_side: Two patterns to play the same seed under, separated by a comma.
         pictures: What to draw.
         record: File to keep the run in, `.mcap`.
+        overwrite: It may be there, and is replaced.
 
     Raises:
         ConfigError: options that do not go together, before anything is run.
@@ -72,10 +73,13 @@ class EpisodeRequest:
     side_by_side: str | None = None
     pictures: Wanted = field(default_factory=Wanted)
     record: Path | None = None
+    overwrite: bool = False
 
     def __post_init__(self) -> None:
         if self.record is not None:
-            _check_record(self.record, self.side_by_side)
+            if self.side_by_side is not None:
+                raise ConfigError("--record keeps one run; it does not go with --side-by-side")
+            check_target(self.record, self.overwrite)
         if self.side_by_side is not None and self.pictures.camera is not None:
             raise ConfigError("--camera shows one run; it does not go with --side-by-side")
 
@@ -166,16 +170,6 @@ def write_replay(opened: Opened, pictures: Wanted, ros2: Path | None) -> Iterato
 
         write_bag(opened.playback, ros2)
         yield f"ROS 2 bag: {ros2}"
-
-
-def _check_record(path: Path, side_by_side: str | None) -> None:
-    """What cannot be kept is told before anything is run."""
-    if side_by_side is not None:
-        raise ConfigError("--record keeps one run; it does not go with --side-by-side")
-    if path.suffix.lower() != ".mcap":
-        raise ConfigError(f"recording should end in .mcap, not {path.name!r}")
-    if not path.parent.is_dir():
-        raise ConfigError(f"folder {str(path.parent)!r} for the recording does not exist")
 
 
 def _two_patterns(text: str) -> list[str]:

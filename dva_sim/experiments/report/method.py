@@ -8,6 +8,7 @@ from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.kernel.wording import number
+from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.labels import measure_called
 from dva_sim.statistics import VarianceReduction, variance_reduction
 
@@ -77,7 +78,6 @@ def _made_by(reading: Reading) -> str:
 
 
 def _usual(reading: Reading) -> list[str]:
-    from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT  # late: start-up
 
     study, is_task = reading.study, _is_task(reading)
     awaited = measure_called(reading.view.measure).awaits if reading.view else ""

@@ -337,7 +337,7 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
         _write_figures(folder / FIGURES, drawn)
         page.write_text(_page(question, blocks), encoding="utf-8", newline="\n")
         if pdf or (folder / PAPER).exists():
-            from dva_sim.experiments.report.pdf import write_pdf
+            from dva_sim.experiments.report.pdf import write_pdf  # late: start-up
 
             write_pdf(folder / PAPER, question, blocks)
     except OSError as error:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from dva_sim.experiments.results.results import Results, quoted
 from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.kernel.suggestions import either
 
 FORMATS = ("csv", "parquet")
@@ -47,10 +48,7 @@ def export(
     if not str(out).isprintable():
         raise ConfigError(f"{str(out)!r} cannot be the name of a file that others read")
     files = _files(results, out, tables, form)
-    there = [path for path in files if path.exists()]
-    if there and not overwrite:
-        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
-        raise ConfigError(f"{there[0]}{more} would be replaced; give another name, or --overwrite")
+    refuse_to_replace(files, overwrite)
     for path, write in files.items():
         _put(path, write)
     return list(files)

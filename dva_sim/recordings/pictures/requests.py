@@ -46,7 +46,7 @@ class Wanted:
         _check_path("still", self.still, STANDING if self.camera else DRAWN)
         _check_path("strip", self.strip, DRAWN)
         if self.video is not None and self.video.suffix.lower() == ".mp4":
-            from dva_sim.recordings.pictures.film import find_ffmpeg
+            from dva_sim.recordings.pictures.film import find_ffmpeg  # late: start-up
 
             find_ffmpeg()
         if self.camera is not None and self.still is None:
@@ -106,8 +106,8 @@ class Wanted:
         Raises:
             ConfigError: a moment after the run ended, or a failing ffmpeg.
         """
-        from dva_sim.recordings.pictures import film, stills
-        from dva_sim.recordings.pictures.film import Film
+        from dva_sim.recordings.pictures import film, stills  # late: start-up
+        from dva_sim.recordings.pictures.film import Film  # late: start-up
 
         stills.check_times(recordings, self.times)
         if self.still is not None:

@@ -15,6 +15,7 @@ from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.operator.strategies import Truth, load_strategy
 from dva_sim.agents.operator.supervision import Supervision
+from dva_sim.agents.people.guard import IN_SIGHT
 from dva_sim.agents.population import draw_person
 from dva_sim.agents.robot.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
@@ -78,7 +79,11 @@ def make_desk(stage: Stage, permissions: Permissions) -> Dva:
     return Dva(
         policy,
         _Ways(stage),
-        replace(dispatch.rules(), operator_span=stage.scenario.operator.span),
+        replace(
+            dispatch.rules(),
+            operator_span=stage.scenario.operator.span,
+            arrived_within=at_event_m(stage.scenario),
+        ),
         rng=stage.streams["dva/policy"],
         sessions=Sessions(permissions),
         ground=_ground(stage) if policy.relocates else SiteKnowledge(),
@@ -102,6 +107,18 @@ def _supervisors(stage: Stage) -> frozenset[str]:
     """The ids of those whom the scenario calls supervisors, by label or id: keys are of ids."""
     ids = {label: id_tag for id_tag, label in stage.labels.items()}
     return frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors)
+
+
+MOVED_SINCE = 2.0  # since somebody last told where it is; assumed [m]
+
+
+def at_event_m(scenario: Scenario) -> float:
+    """From how far somebody may see what was reported somewhere [m].
+
+    Guards and cameras see so far; reports nearer than may be merged are of one event.
+    """
+    sees = max(IN_SIGHT, scenario.camera.range_m)
+    return sees + scenario.dispatch.merge_distance_m + MOVED_SINCE
 
 
 class _Ways:

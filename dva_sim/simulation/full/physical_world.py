@@ -84,6 +84,15 @@ class Field(RunHazards):
             for middle, radius in dangers
         )
 
+    def place_of(self, device: str) -> m.Position | None:
+        """Where a robot or a guard really is, by its id."""
+        known = self.robots.get(device)
+        if known is not None:
+            return m.Position(*self.stage.site.frame.to_latlon(known.body.x, known.body.y))
+        guards = (g for g in self.guards if g.device.id_tag == device)
+        places = (self.stage.site.frame.to_latlon(*g.walking.place) for g in guards)
+        return next((m.Position(*place) for place in places), None)
+
     def whereabouts(self, now: float) -> Iterator[tuple[str, TrackPoint]]:
         """Where everybody is who is on the site, by name."""
         self.world.advance_to(now)

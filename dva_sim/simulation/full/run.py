@@ -26,9 +26,9 @@ from dva_sim.network.link import (
 )
 from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.virtual_network import VirtualNetwork
-from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.control_room import add_dva, add_operator, at_event_m
 from dva_sim.simulation.full.disturbance import Disturbance
-from dva_sim.simulation.full.physical_world import Field, is_dangerous
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import SafetyAudit
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
@@ -147,6 +147,9 @@ class Run:
                 (mean_of(robot.processing_s) for robot in self.stage.robots), default=0.0
             ),
             dva=DVA,
+            place_of=self.field.place_of,
+            at_event=at_event_m(scenario),
+            tick=PHYSICS_TICK,
         )
         self._listeners = (self.audit,)
         Disturbance(self.stage, self.dva, self.field)

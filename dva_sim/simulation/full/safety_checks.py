@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -30,7 +30,9 @@ SLACK = 1.02  # measured speeds may exceed a limit by so much
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second [s]
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
 ROUNDED = 0.002  # of ticks [s]
-MOST_KEPT = 1000  # of the newest messages to a robot, and of its sessions
+MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
+FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
+FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
 
 CHECKED: Final = {
     "S1": "a robot moves by a command that arrived within the watchdog, behind it a picture within "
@@ -56,6 +58,8 @@ Broken = tuple[str, str]
 _COMMAND = re.compile(  # as everybody here writes them, but any other would do no harm
     rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>.*<SetTeleOp>", re.DOTALL
 )
+_OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>"
+_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -79,6 +83,14 @@ class Unanswered(NamedTuple):
     source: str
 
 
+class Doing(NamedTuple):
+    """What a robot does by the newest order: `level` is as of a permission."""
+
+    source: str
+    session: int | None
+    level: str
+
+
 @dataclass
 class Witness:
     """What is known of one robot without asking it; times in [s].
@@ -88,28 +100,34 @@ class Witness:
         sessions: By session: what the DVA gave.
         over: By session: from when on nobody may act by it.
         unanswered: By sender and number: what it has not answered yet.
+        done: By sender, session and number: what it has said OK to; it may say so again.
         arrivals: By sender and number: when the newest commands arrived.
         stopped: When the newest emergency was obeyed, or should have been.
         ordered: When the newest order that was accepted had arrived.
-        on_mission: Whether that order was a mission.
+        does: What that was, by sender and session; nothing once that was ended.
         owner: Who gave it.
-        allowed: Until when its newest command lets it move.
+        newest: Sender, session and number of the newest command that was accepted.
+        allowed: Until when that lets it move.
         offset: What is to be added to its own clock to have the time.
-        last_mission: When it was last seen on a mission.
+        last_mission: When it was last on a mission that it may be on.
+        looked: When it was last looked at.
     """
 
     obeys_within: float
     sessions: OrderedDict[int, Held] = field(default_factory=OrderedDict)
     over: dict[int, float] = field(default_factory=dict)
     unanswered: dict[tuple[str, int], Unanswered] = field(default_factory=dict)
+    done: OrderedDict[tuple[str, int | None, int], None] = field(default_factory=OrderedDict)
     arrivals: OrderedDict[tuple[str, int], float] = field(default_factory=OrderedDict)
     stopped: float = -1.0
     ordered: float = -1.0
-    on_mission: bool = False
+    does: Doing | None = None
     owner: str | None = None
+    newest: tuple[str, int | None, int] = "", None, 0
     allowed: float = 0.0
     offset: float | None = None
     last_mission: float = 0.0
+    looked: float = 0.0
 
     def given(self, session: int, held: Held) -> None:
         """The DVA gives a permission, or says that one holds."""
@@ -127,6 +145,30 @@ class Witness:
             return "S2", f"obeys {source}, whose session was over"
         return None
 
+    def may_be_on_a_mission(self, now: float) -> bool:
+        """Whether it was sent on one, nobody has called it back, and the session holds."""
+        does = self.does
+        if does is None or does.level != "missions":
+            return False
+        return now <= self.over.get(does.session or 0, now)
+
+    def ends(self, level: str, now: float) -> None:
+        """What it does at a level is over: no command that came before moves it."""
+        if level == "teleoperation":
+            self.allowed = min(self.allowed, now)
+        if self.does is not None and self.does.level == level:
+            self.does = None
+
+    def obeyed_before(self, message: m.Message) -> bool:
+        """Whether it has said OK to that already, and only repeats it; noted from now on."""
+        key = message.source, message.session, message.message_id
+        if key in self.done:
+            return True
+        self.done[key] = None
+        if len(self.done) > MOST_KEPT:
+            self.done.popitem(last=False)
+        return False
+
 
 class SafetyAudit:
     """Holds what happens against the rules, and tells the recorder what breaks one.
@@ -139,6 +181,9 @@ class SafetyAudit:
         rules: Of the DVA.
         processing: Of a message at a robot, mean [s].
         dva: Its id.
+        place_of: Where a device really is, by its id; None: it has no place.
+        at_event: From how far somebody may see what was reported somewhere [m].
+        tick: Of the motors [s].
     """
 
     def __init__(
@@ -151,10 +196,13 @@ class SafetyAudit:
         rules: Rules,
         processing: float,
         dva: str,
+        place_of: Callable[[str], m.Position | None],
+        at_event: float,
+        tick: float,
     ) -> None:
         self._recorder, self._limits, self._robots = recorder, limits, robots
         self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
-        self._ledger = EventLedger(book, rules)
+        self._ledger, self._tick = EventLedger(book, rules, dva, place_of, at_event), tick
         self._witnesses: dict[str, Witness] = {}
         recorder.on_accepted = self.accepted
 
@@ -180,8 +228,8 @@ class SafetyAudit:
                 witness.offset = data.captured - data.observation.tick / 1000
         elif to in self._robots:
             self._reaches_robot(now, source, to, data)
-        elif to == self._dva and b"<EventReport>" in data:
-            self._ledger.asked(_read(data))
+        elif to == self._dva and any(what in data for what in _OF_EVENTS):
+            self._ledger.hears(source, _read(data), now)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness = self.witness(robot)
@@ -203,12 +251,20 @@ class SafetyAudit:
 
     def sent(self, now: float, source: str, to: str, data: Any) -> None:
         """A message has been sent."""
-        if source == self._dva and self._ledger.waits and b"<reply>" in data:
-            self._report(self._ledger.answered(_read(data)), now, "dva")
+        if not isinstance(data, bytes):
+            return
+        if self._ledger.waits_for(source, data):
+            self._report(self._ledger.told(source, _read(data)), now, "dva")
         if source == self._dva and to in self._robots and b"<Permission>" in data:
             self._says_who_holds(to, _read(data))
         witness = self._witnesses.get(source)
-        if witness is None or not witness.unanswered or not isinstance(data, bytes):
+        if witness is None:
+            return
+        if witness.offset is None and b"<RobotStatus>" in data:
+            status = _read(data)
+            if status is not None and isinstance(status.body, m.RobotStatus):
+                witness.offset = now - status.body.tick / 1000
+        if not witness.unanswered:
             return
         reply = _read(data) if b"<reply>" in data else None
         if reply is None or not isinstance(reply.body, m.Reply):
@@ -238,9 +294,13 @@ class SafetyAudit:
                 _end(witness, body.session, now)
             case m.PermissionGrant() if asked.source == self._dva and code == m.OK:
                 self._replaced(witness, body, now)
-        if code != m.OK:
+        if code != m.OK or witness.obeyed_before(message):
             return
-        if isinstance(body, m.DevSub):
+        if isinstance(body, m.StopTeleOp):
+            witness.ends("teleoperation", now)
+        elif isinstance(body, m.CancelMission):
+            witness.ends("missions", now)
+        elif isinstance(body, m.DevSub):
             held = witness.sessions.get(message.session or 0)
             mine = (
                 held is not None and held.holder == message.source and body.sensor in held.sensors
@@ -267,7 +327,8 @@ class SafetyAudit:
         if another and abs(robot.body.speed) > MOVING and not _pushed(robot, now):
             yield "S2", f"goes over to {message.source} at {robot.body.speed:.2f} m/s"
         witness.owner, witness.ordered = message.source, asked.at
-        witness.on_mission = level == "missions"
+        witness.ends("teleoperation", now)
+        witness.does = Doing(message.source, message.session, level)
 
     @staticmethod
     def _replaced(witness: Witness, grant: m.PermissionGrant, now: float) -> None:
@@ -287,12 +348,19 @@ class SafetyAudit:
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
         if broken is not None:
             found.append(broken)
+        source, session, number = command.source, command.session, command.message_id
         if witness.stopped > max(witness.ordered, -0.5):
             found.append(("S3", "obeys a command after an emergency, before a new order"))
-        key = command.source, command.message_id
-        arrived = witness.arrivals.pop(key, command.arrived)
+        elif witness.does != (source, session, "teleoperation"):
+            found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
+        if witness.newest[:2] == (source, session) and number <= witness.newest[2]:
+            found.append(("S1", "obeys a command again, or after a newer one"))
+        witness.newest = source, session, number
+        arrived = witness.arrivals.pop((source, number), command.arrived)
         witness.allowed = arrived + limits.watchdog_s
-        if command.seen_tick is not None and witness.offset is not None:
+        if command.seen_tick is not None and witness.offset is None:
+            found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
+        elif command.seen_tick is not None and witness.offset is not None:
             pictured = command.seen_tick / 1000 + witness.offset
             witness.allowed = min(witness.allowed, pictured + limits.max_age_s)
             if pictured > command.time + ROUNDED:
@@ -306,7 +374,10 @@ class SafetyAudit:
         for id_tag, robot in self._robots.items():
             witness = self.witness(id_tag)
             self._overdue(witness, robot, now)
-            self._report(broken_by_moving(witness, robot, now), now, robot.device.label)
+            found = [*broken_by_wish(witness, robot, now, self._tick)]
+            found += broken_by_moving(witness, robot, now)
+            self._report(found, now, robot.device.label)
+            witness.looked = now
         self._report(self._ledger.check(now), now, "dva")
 
     def _overdue(self, witness: Witness, robot: RobotAgent, now: float) -> None:
@@ -317,7 +388,9 @@ class SafetyAudit:
         for key in late:
             message, at, source = witness.unanswered.pop(key)
             body, by = message.body, at + witness.obeys_within
-            if isinstance(body, m.Emergency) and robot.body.powered:
+            if not robot.body.powered:
+                pass  # it has not heard it
+            elif isinstance(body, m.Emergency):
                 witness.stopped = max(witness.stopped, by)
             elif source != self._dva:
                 pass
@@ -331,12 +404,22 @@ class SafetyAudit:
             self._recorder.violated(rule, now, who, what)
 
 
+def broken_by_wish(
+    witness: Witness, robot: RobotAgent, now: float, tick: float
+) -> Iterator[Broken]:
+    """Whether the motors were asked to move for longer than they may be; to a tick."""
+    until = robot.body.asked_until
+    if robot.controller.mode is Mode.MISSION and witness.may_be_on_a_mission(now):
+        witness.last_mission = now
+    elif until > max(witness.allowed + tick + ROUNDED, witness.looked):
+        late = until - max(witness.allowed, witness.last_mission)
+        yield "S1", f"is asked to move for {late:.2f} s longer than it may"
+
+
 def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
     """Rules that the motion of a robot breaks now."""
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
     pushed, stopping = _pushed(robot, now), _stopping(robot)
-    if robot.controller.mode is Mode.MISSION and witness.on_mission:
-        witness.last_mission = now
     if abs(speed) > MOVING and not pushed:
         allowed = max(witness.allowed, witness.last_mission)
         if now > allowed + stopping:
@@ -374,46 +457,163 @@ def _read(data: bytes) -> m.Message | None:
         return None
 
 
+class Seen(NamedTuple):
+    """How an event stood when it was last looked at; times in [s].
+
+    Attributes:
+        found: What somebody has found, or done, there.
+        hands: Who has it in hand, and for what; empty: nobody.
+        since: From when on those do.
+        waits: Since when it has waited for somebody who takes it up.
+    """
+
+    found: frozenset[str]
+    hands: tuple[str | None, ...]
+    since: float
+    waits: float
+
+
+@dataclass
+class Word:
+    """What was said about one event on the network.
+
+    Attributes:
+        ordered: Who was sent there, and what goes there for them: a robot, or they themselves.
+        taken: Who has taken that up.
+        loose: Who has it no longer, by its own word or the DVA's, or has started anew.
+        busy: Whether somebody has taken it up since it was last looked at.
+        anew: Whether somebody loose was sent there since then.
+        found: What those at the place have found, or done.
+    """
+
+    ordered: dict[str, str] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
+    loose: set[str] = field(default_factory=set)
+    busy: bool = False
+    anew: bool = False
+    found: set[str] = field(default_factory=set)
+
+
 class EventLedger:
-    """A second book of the events, by what was reported and what the DVA's own book shows.
+    """A second book of the events, by what is said on the network, beside what the DVA's shows.
 
     Args:
         book: The DVA's.
         rules: How long an event may wait, or be in one pair of hands.
+        dva: Id of the DVA.
+        place_of: Where a device really is.
+        at_event: Who is so near may have seen what there is [m].
     """
 
-    def __init__(self, book: EventBook, rules: Rules) -> None:
-        self._book, self._rules = book, rules
+    def __init__(
+        self,
+        book: EventBook,
+        rules: Rules,
+        dva: str,
+        place_of: Callable[[str], m.Position | None],
+        at_event: float,
+    ) -> None:
+        self._book, self._rules, self._dva = book, rules, dva
+        self._place_of, self._at_event = place_of, at_event
         self._asked: dict[tuple[str, int], m.EventReport] = {}
+        self._orders: dict[tuple[str, int], int] = {}
+        self._words: dict[int, Word] = {}
+        self._felt: dict[str, float] = {}
+        self._seen: dict[int, Seen] = {}
         self._open: set[int] = set()
         self._now = 0.0
 
-    @property
-    def waits(self) -> bool:
-        """Whether a report is not answered yet."""
-        return bool(self._asked)
+    # --- what is said --------------------------------------------------------------------
 
-    def asked(self, message: m.Message | None) -> None:
-        """A report is on its way into the book."""
-        if message is None or not isinstance(message.body, m.EventReport):
+    def hears(self, source: str, message: m.Message | None, now: float) -> None:
+        """Something about events has reached the DVA; `source` has really sent it."""
+        if message is None or message.source != source:
             return
-        if message.body.event_id is None and message.body.finding == "detected":
-            self._asked[message.source, message.message_id] = message.body
-            if len(self._asked) > MOST_KEPT:
-                del self._asked[next(iter(self._asked))]
+        match message.body:
+            case m.SensorValue():
+                self._felt[source] = now
+            case m.EventReport(event_id=None, finding="detected") as report:
+                self._asked[source, message.message_id] = report
+                _keep_newest(self._asked)
+            case m.EventReport(event_id=int(number), finding=finding):
+                self._finds(self._word(number), source, number, finding)
+            case m.OrderProgress(event_id=number, state=state):
+                if state != "declined":
+                    self._takes_up(number, source)
+                if state not in ("departed", "arrived"):
+                    self._word(number).loose.add(source)
+            case m.Registration():
+                for word in self._words.values():
+                    word.loose.add(source)
 
-    def answered(self, reply: m.Message | None) -> Iterator[Broken]:
+    def waits_for(self, source: str, data: bytes) -> bool:
+        """Whether what is sent is worth reading: an order, or an answer that is waited for."""
+        if source == self._dva:
+            return any(what in data for what in _ORDERED) or _answers(self._asked, data)
+        return _answers(self._orders, data)
+
+    def told(self, source: str, message: m.Message | None) -> Iterator[Broken]:
+        """The DVA sends an order, or somebody answers."""
+        if message is None:
+            return
+        match message.body:
+            case m.Order(event_id=number, device=device):
+                self._sends(message, number, device or message.destination)
+            case m.TaskAward(event_id=number):
+                self._sends(message, number, message.destination)
+            case m.OrderProgress(event_id=number) if source == self._dva:
+                self._word(number).loose.add(message.destination)
+            case m.Reply() as reply if source == self._dva:
+                yield from self._answered(message.destination, reply)
+            case m.Reply(answers=answers, code=code):
+                ordered = self._orders.pop((source, answers), None)
+                if ordered is not None and code == m.OK:
+                    self._takes_up(ordered, source)
+
+    def _word(self, number: int) -> Word:
+        word = self._words.setdefault(number, Word())
+        _keep_newest(self._words)
+        return word
+
+    def _sends(self, message: m.Message, number: int, goes: str) -> None:
+        word, to = self._word(number), message.destination
+        word.ordered[to], word.anew = goes, word.anew or to in word.loose
+        word.taken.discard(to)
+        word.loose.discard(to)
+        self._orders[to, message.message_id] = number
+        _keep_newest(self._orders)
+
+    def _takes_up(self, number: int, device: str) -> None:
+        word = self._word(number)
+        if device in word.ordered:
+            word.busy = True
+            word.taken.add(device)
+
+    def _finds(self, word: Word, source: str, number: int, finding: str) -> None:
+        """It counts if who was sent there says so; what is confirmed, was looked at there."""
+        goes, event = word.ordered.get(source), self._book.get(number)
+        if goes is None or event is None:
+            return
+        self._takes_up(number, source)
+        if finding != "confirmed" or self._is_near(goes, event):
+            word.found.add(finding)
+
+    def _is_near(self, device: str, event: Event) -> bool:
+        place = self._place_of(device)
+        return place is not None and apart(place, event.position) <= self._at_event
+
+    def _answered(self, reporter: str, reply: m.Reply) -> Iterator[Broken]:
         """The DVA has taken a report: then there is an event."""
-        if reply is None or not isinstance(reply.body, m.Reply):
-            return
-        report = self._asked.pop((reply.destination, reply.body.answers), None)
-        if report is None or reply.body.code != m.OK:
+        report = self._asked.pop((reporter, reply.answers), None)
+        if report is None or reply.code != m.OK:
             return
         near, kind = max(self._book.merge_distance, SAME_SPOT), report.kind
         known = (*self._book.open.values(), *self._book.closed.values())
         same = (e for e in known if e.kind == kind)
         if not any(apart(e.position, report.position) < near for e in same):
             yield "S6", f"a {report.kind} was reported, and is in no book"
+
+    # --- what the book shows -------------------------------------------------------------
 
     def check(self, now: float) -> Iterator[Broken]:
         """What is wrong with the book now."""
@@ -434,26 +634,60 @@ class EventLedger:
         for number in self._open - book.open.keys() - book.closed.keys():
             yield "S6", f"event {number} was open, and is in no book"
         self._open = set(book.open)
-        for event in (*book.open.values(), *book.closed.values()):
-            yield from self._of_event(event, now)
+        every = (*book.open.values(), *book.closed.values())
+        seen, self._seen = self._seen, {}
+        for event in every:
+            yield from self._of_event(event, seen.get(event.number), now)
 
-    def _of_event(self, event: Event, now: float) -> Iterator[Broken]:
-        waited, rules = now - event.waiting_since, self._rules
-        if event.waits_for is not None and waited > rules.escalate_after + PENDING_SLACK:
-            yield "S6", f"event {event.number} is {event.state} after {waited:.0f} s"
-        begun = _taken_in_hand(event)
-        if begun is not None and now - begun > rules.order_limit + PENDING_SLACK:
-            yield "S6", f"event {event.number} is in one pair of hands for {now - begun:.0f} s"
+    def _of_event(self, event: Event, old: Seen | None, now: float) -> Iterator[Broken]:
+        new, rules = self._look(event, old, now), self._rules
+        self._seen[event.number] = new
+        if event.waits_for is not None and now - new.waits > rules.escalate_after + PENDING_SLACK:
+            yield "S6", f"event {event.number} is {event.state} after {now - new.waits:.0f} s"
+        if new.hands and now - new.since > rules.order_limit + PENDING_SLACK:
+            held = now - new.since
+            yield "S6", f"event {event.number} is in one pair of hands for {held:.0f} s"
+        for finding in new.found - (old.found if old else frozenset()):
+            if not self._is_found(event, finding, now):
+                yield "S6", f"event {event.number} is {finding}, and nobody there has said so"
         for steps in (STEPS, ACT_STEPS):
             times = [event.times[step] for step in steps if step in event.times]
             if times != sorted(times):
                 yield "S7", f"times of event {event.number} are out of order"
 
+    def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
+        """Waiting ends when somebody takes it up, and begins anew when it is confirmed."""
+        found = FOUND & (event.times.keys() | {event.state.value})
+        old = old or Seen(found - FOUND, (), now, now)
+        word, hands = self._word(event.number), _in_hand(event)
+        taken = bool(word.taken.intersection(hands))
+        confirmed = "confirmed" in found - old.found
+        waits = now if taken or word.busy or confirmed else old.waits
+        since = old.since if hands == old.hands and not word.anew else now
+        word.busy = word.anew = False
+        return Seen(found, hands, since, waits)
 
-def _taken_in_hand(event: Event) -> float | None:
-    """Since when the same responder has had an event that is not settled [s]."""
+    def _is_found(self, event: Event, finding: str, now: float) -> bool:
+        """Whether who was sent there has said so; or a robot nearby may just have felt it."""
+        if finding in self._word(event.number).found:
+            return True
+        lately = [robot for robot, when in self._felt.items() if now - when < FELT_LATELY]
+        return finding == "confirmed" and any(self._is_near(r, event) for r in lately)
+
+
+def _keep_newest(kept: dict[Any, Any]) -> None:
+    if len(kept) > MOST_KEPT:
+        del kept[next(iter(kept))]
+
+
+def _answers(asked: dict[Any, Any], data: bytes) -> bool:
+    return bool(asked) and b"<reply>" in data
+
+
+def _in_hand(event: Event) -> tuple[str | None, ...]:
+    """Who has an event in hand that is not settled; who stands by has not."""
     if event.state in (State.ASSIGNED, State.ON_SCENE):
-        return event.times.get("assigned")
+        return "look", event.holder, event.responder
     if event.open and event.state is State.CONFIRMED and event.actor is not None:
-        return max(event.times.get("act_assigned", 0.0), event.times["confirmed"])
-    return None
+        return "act", event.actor
+    return ()

@@ -146,7 +146,7 @@ class TeamBuilder:
             self._failures[device.label] = failures
             if not known:
                 device.tell(
-                    f"brakes, as its drive fails: {robot.body.motors.first_failure}", "mode"
+                    f"is held back, as its drive fails: {robot.body.motors.first_failure}", "mode"
                 )
 
     def add_guard(self, number: int) -> GuardAgent:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dva_sim.agents.tilt import try_phone
 from dva_sim.kernel import config_overrides, resources
 from dva_sim.kernel.config import Document, Fail, KeyPath, load_yaml
 from dva_sim.kernel.errors import ConfigError
@@ -84,7 +85,7 @@ def _check_hazard(event: EventConfig, path: KeyPath, error: Fail) -> None:
 
 def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> None:
     """Refuse a way of steering that cannot be loaded, or does not know its options."""
-    from dva_sim.agents.operator.strategies import try_strategy
+    from dva_sim.agents.operator.strategies import try_strategy  # late: start-up
 
     with _told(error, lambda problem: _place(problem, "operator", "strategy", "options")):
         try_strategy(strategy, options)
@@ -92,7 +93,7 @@ def check_strategy(strategy: str, options: Mapping[str, Any], error: Fail) -> No
 
 def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
     """Refuse a policy that cannot be loaded, or does not know its options."""
-    from dva_sim.core.dispatch import load_policy
+    from dva_sim.core.dispatch import load_policy  # late: start-up
 
     with _told(error, lambda problem: _place(problem, "dispatch", "policy", "options")):
         load_policy(policy, options)
@@ -100,7 +101,6 @@ def check_policy(policy: str, options: Mapping[str, Any], error: Fail) -> None:
 
 def check_phone(profile: PhoneProfile, error: Fail) -> None:
     """Refuse a phone whose part, filter or mapping cannot be had, or does not know its options."""
-    from dva_sim.agents.tilt import try_phone
 
     def place(problem: ConfigError) -> KeyPath:
         stages = ("accelerometer", "mapping", "filter")

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import FASTEST, SLOWEST, SensorConfig
+from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.core.assignments import Rules
 from dva_sim.core.permissions import LEVELS
 from dva_sim.kernel.config import AlsoCalled, Config, Key
@@ -123,7 +124,6 @@ class PhoneConfig(BaseModel):
     @classmethod
     def further_keys(cls) -> type[BaseModel]:
         """The model of all other keys that it may have."""
-        from dva_sim.agents.tilt import PhoneProfile
 
         return PhoneProfile
 

@@ -20,6 +20,7 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.protocol.messages import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
 from dva_sim.simulation.shift.distributions import ZERO, Constant, Law
+from dva_sim.worlds.site import load_site
 
 
 def check_names(scenario: TimedScenario, error: Fail) -> TimedScenario:
@@ -52,7 +53,6 @@ def zone_names(scenario: TimedScenario, error: Fail) -> list[str]:
     """Names of the zones, in order."""
     if scenario.site is None:
         return list(scenario.zones) or ["area" if scenario.area else "here"]
-    from dva_sim.worlds.site import load_site
 
     try:
         return [room.name for room in load_site(scenario.site.name).rooms]

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
-from dva_sim.agents.operator.refusals import ENOUGH, Refusals
-from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.operator.refusals import ENOUGH, LATE_FOR, PASSES, SAYS_LATE_FOR, Refusals
+from dva_sim.agents.robot.controller import LEASE_S, Mode
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import id_of
@@ -28,16 +28,38 @@ def refusals() -> Refusals:
 
 @pytest.mark.parametrize("code", m.OBEYS_NO_MORE)
 def test_a_refusal_that_will_last_ends_it_at_once(refusals: Refusals, code: int) -> None:
-    assert refusals.answered(m.OK) == ""
-    assert refusals.answered(code) == f"the robot obeys no more: {m.CODE_NAMES[code]}"
+    assert refusals.answered(m.OK, 0.0) == ""
+    assert refusals.answered(code, 0.1) == f"the robot obeys no more: {m.CODE_NAMES[code]}"
     assert (refusals.last, refusals.codes) == (code, {code: 1})
 
 
 def test_commands_that_come_late_are_counted_and_no_more(refusals: Refusals) -> None:
-    for _ in range(100):
-        assert not refusals.answered(m.STALE)
-        assert not refusals.answered(m.OUT_OF_ORDER)
+    for now in range(100):
+        assert not refusals.answered(m.STALE, float(now))
+        assert not refusals.answered(m.OUT_OF_ORDER, now + 0.5)
+        assert now % 9 or not refusals.answered(m.OK, now + 0.6)  # now and then one is in time
     assert refusals.codes == {m.STALE: 100, m.OUT_OF_ORDER: 100}
+
+
+@pytest.mark.parametrize("code", PASSES)
+def test_commands_of_which_all_come_late_end_it_after_the_stated_time(
+    refusals: Refusals, code: int
+) -> None:
+    refusals.answered(m.OK, 0.0)
+    said = [refusals.answered(code, 1.0 + 0.1 * n) for n in range(102)]
+    assert [bool(why) for why in said].index(True) == LATE_FOR / 0.1
+    assert said[100] == f"the robot obeys no more: {m.CODE_NAMES[code]} for 10 s"
+    assert refusals.last == code
+
+
+def test_word_that_all_come_late_counts_only_while_commands_are_sent(refusals: Refusals) -> None:
+    assert not any(refusals.held(ME, m.STALE, float(now), sent=1) for now in range(60))
+    assert not refusals.held(ME, None, 60.0, sent=2)
+    said = [bool(refusals.held(ME, m.STALE, 61.0 + n, sent=3 + n)) for n in range(41)]
+    assert said == [False] * 40 + [True]
+    assert refusals.late
+    assert SAYS_LATE_FOR > LEASE_S
+    assert refusals.codes == {m.STALE: 1}
 
 
 @pytest.mark.parametrize("code", [None, m.BUSY, m.BAD_MESSAGE, 999])
@@ -45,19 +67,26 @@ def test_any_other_answer_ends_it_when_it_comes_three_times_in_a_row(
     refusals: Refusals, code: int | None
 ) -> None:
     answers = [code, code, m.OK, code, m.STALE, code, code]
-    assert [bool(refusals.answered(a)) for a in answers] == [False] * 6 + [True]
+    assert [bool(refusals.answered(a, 0.0)) for a in answers] == [False] * 6 + [True]
     assert ENOUGH == 3
 
 
 def test_word_of_a_holder_counts_once_the_robot_was_ours(refusals: Refusals) -> None:
-    assert not refusals.held(None, m.WRONG_MODE)  # from before the start
-    assert not refusals.held(ME, None)
-    assert not refusals.held(ME, m.STALE)
-    assert refusals.held(OTHER, None) == "the robot obeys no more: somebody else holds the robot"
+    assert not refusals.held(None, m.WRONG_MODE, 0.0, 0)  # from before the start
+    assert not refusals.held(ME, None, 1.0, 1)
+    assert not refusals.held(ME, m.STALE, 2.0, 2)
+    assert (
+        refusals.held(OTHER, None, 3.0, 3)
+        == "the robot obeys no more: somebody else holds the robot"
+    )
 
 
 def test_word_that_never_says_it_is_ours_counts_the_third_time(refusals: Refusals) -> None:
-    assert [bool(refusals.held(ME, m.WRONG_MODE)) for _ in range(3)] == [False, False, True]
+    assert [bool(refusals.held(ME, m.WRONG_MODE, float(n), n)) for n in range(3)] == [
+        False,
+        False,
+        True,
+    ]
 
 
 # --- a drive -----------------------------------------------------------------------------
@@ -91,6 +120,27 @@ def test_a_robot_that_refuses_every_command_is_given_up_with_an_alert(pattern: s
     assert log.refused[m.NOT_PERMITTED] >= 1
     told = [moment.what for moment in dva.stage.recorder.timeline]
     assert "is refused: the robot obeys no more: not permitted" in told
+
+
+@pytest.mark.parametrize("code", PASSES)
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_a_robot_to_which_every_command_comes_late_is_given_up_with_an_alert(
+    pattern: str, code: int
+) -> None:
+    dva, log = driving(pattern)
+    dva.field.robots[ROBOT].refuses = code
+    if pattern not in ("pub-sub", "latest-wins"):
+        ends(dva, log, within=LATE_FOR + 2.5)
+        assert log.refusal == code
+        dva.run_for(5.0)
+        assert dva.progress(1)[-1] == "failed"
+        return
+    dva.run_for(LATE_FOR + 2.5)
+    recorder = dva.stage.recorder
+    assert recorder.counters["alerts: every command comes late"] == 1
+    assert "is told that every command comes late" in [m.what for m in recorder.timeline]
+    dva.run_until(lambda: "failed" in dva.progress(1), limit=SAYS_LATE_FOR)
+    assert "failed" in dva.progress(1)  # sooner by the person, who sees that it stands
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)

@@ -87,6 +87,6 @@ def test_a_drive_that_fails_is_told_once_and_counted_and_the_run_goes_on(
     robot = run.field.robots[ROBOT]
     told = [line.what for line in run.recorder.timeline if "drive fails" in line.what]
     assert robot.controller.mode is Mode.TELEOPERATION
-    assert told == ["brakes, as its drive fails: ValueError: no motor here"]
+    assert told == ["is held back, as its drive fails: ValueError: no motor here"]
     assert run.recorder.counters["failed: an answer of a drive"] > 100
     assert robot.body.distance == 0.0

@@ -7,7 +7,11 @@ from typing import Any
 
 import pytest
 
+from dva_sim.agents.device import command_topic
+from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.robot.controller import Decision, Mode, RobotController, TimedSetPoint
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.dispatcher import Dispatcher
 from dva_sim.core.events import EventBook, State
 from dva_sim.core.orders import Orders
 from dva_sim.protocol import messages as m
@@ -392,3 +396,192 @@ def test_a_count_below_zero_breaks_s6() -> None:
     counts[State.CONFIRMED] += 1
     run.audit.check(10.5)
     assert broken(run) == {"S6"}
+
+
+# --- what others say of themselves -------------------------------------------------------
+
+
+def ends_its_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RobotController, "_revoked", lambda *_: Decision(m.OK))
+
+
+def cancels_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RobotController, "_cancel", lambda *_: Decision(m.OK))
+
+
+@pytest.mark.invariant("S1")
+@pytest.mark.parametrize(
+    ("word", "deaf"),
+    [
+        (m.PermissionRevocation(ROBOT, DVA, 5), ends_its_session),
+        (m.CancelMission(), cancels_nothing),
+    ],
+    ids=["its session", "its cancelling"],
+)
+def test_a_mission_that_outlives_what_ends_it_breaks_s1(
+    monkeypatch: pytest.MonkeyPatch, word: m.Body, deaf: Callable[[pytest.MonkeyPatch], None]
+) -> None:
+    """The robot says that it is on a mission, and so it is."""
+
+    def sent() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
+        goal = m.Position(*run.stage.site.frame.to_latlon(30.0, 12.0))
+        ask(run, 12.0, m.GoTo((goal,)))
+        ask(run, 14.0, word)
+        run.clock.run(20.0)
+        return run
+
+    assert broken(sent()) == set()
+    deaf(monkeypatch)
+    run = sent()
+    assert run.field.robots[ROBOT].controller.mode is Mode.MISSION
+    assert broken(run) == {"S1"}
+
+
+@pytest.mark.invariant("S1")
+@pytest.mark.parametrize("commands", [0, 3], ids=["no more commands", "more commands"])
+def test_a_robot_that_says_ok_to_a_stop_and_drives_on_breaks_s1(
+    monkeypatch: pytest.MonkeyPatch, commands: int
+) -> None:
+    def stopped() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        ask(run, 12.0, m.SetTeleOp(0.1, 0.3))
+        ask(run, 12.1, m.StopTeleOp())
+        for second in range(commands):
+            ask(run, 14.0 + second, m.SetTeleOp(0.1, 0.3))
+        run.clock.run(20.0)
+        return run
+
+    assert broken(stopped()) == set()
+    monkeypatch.setattr(RobotController, "_stop", lambda *_: Decision(m.OK))
+    assert broken(stopped()) == {"S1"}
+
+
+@pytest.mark.invariant("S1")
+@pytest.mark.parametrize("numbers", [(51, 50), (50, 50)], ids=["out of order", "twice"])
+def test_commands_that_act_out_of_order_or_twice_break_s1(
+    monkeypatch: pytest.MonkeyPatch, numbers: tuple[int, int]
+) -> None:
+    def driven() -> Run:
+        run = staged(pattern="pub-sub")
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        for time, number in zip((12.0, 12.1), numbers, strict=True):
+            command = m.Message(ROBOT, number, DVA, "12:00:00", 5, m.SetTeleOp(0.1, 0.3))
+            data = encode(command)
+            run.clock.call_at(time, run.network.publish, DVA, command_topic(ROBOT), data, len(data))
+        run.clock.run(14.0)
+        assert run.field.robots[ROBOT].applied >= 1
+        return run
+
+    assert broken(driven()) == set()
+    honest = RobotController._set
+
+    def forgetful(self: RobotController, *args: Any) -> Decision:
+        self.last_set_id = 0
+        return honest(self, *args)
+
+    monkeypatch.setattr(RobotController, "_set", forgetful)
+    assert broken(driven()) == {"S1"}
+
+
+@pytest.mark.invariant("S1")
+@pytest.mark.parametrize("longer", [1.0, 0.1])
+def test_a_watchdog_that_is_too_long_breaks_s1(
+    monkeypatch: pytest.MonkeyPatch, longer: float
+) -> None:
+    """The robot brakes in time all the same: it is what the motors are asked for that tells."""
+    honest = RobotController._set
+
+    def patient(self: RobotController, *args: Any) -> Decision:
+        decision = honest(self, *args)
+        wanted = decision.set_point
+        assert wanted is not None
+        return decision._replace(set_point=wanted._replace(until=wanted.until + longer))
+
+    assert broken(played(horizon_s=20)) == set()
+    monkeypatch.setattr(RobotController, "_set", patient)
+    assert broken(played(horizon_s=20)) == {"S1"}
+
+
+@pytest.mark.invariant("S1")
+def test_the_age_of_a_command_is_known_though_nobody_watches_the_camera(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def late() -> Run:
+        run = staged()
+        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
+        ask(run, 11.0, m.StartTeleOp())
+        tick = run.field.robots[ROBOT].controller.tick(2.0)
+        ask(run, 12.0, m.SetTeleOp(0.1, 0.4, tick))
+        run.clock.run(14.0)
+        return run
+
+    honest = RobotController._set
+
+    def careless(self: RobotController, message: m.Message, body: Any, *args: Any) -> Decision:
+        return honest(self, message, m.SetTeleOp(body.speed, body.turn_rate, None), *args)
+
+    assert broken(late()) == set()
+    monkeypatch.setattr(RobotController, "_set", careless)
+    assert broken(late()) == {"S1"}
+    # Where it has never told its clock, nobody can have seen that tick.
+    monkeypatch.setattr(RobotAgent, "_publish_status", lambda _: None)
+    assert broken(late()) == {"S1"}
+
+
+@pytest.mark.invariant("S6")
+def test_a_wait_that_begins_anew_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody is sent; the DVA sets back what it escalates by."""
+    alone = {"dispatch.escalate_after_s": 20}
+    monkeypatch.setattr(Dispatcher, "_decide", lambda *_: [])
+    honest = Orders.give_up
+
+    def patient(self: Orders, now: float) -> Any:
+        for event in self.book.waiting.values():
+            event.waiting_since = now
+        return honest(self, now)
+
+    assert broken(played(**alone)) == set()
+    monkeypatch.setattr(Orders, "give_up", patient)
+    assert broken(played(**alone)) == {"S6"}
+
+
+@pytest.mark.invariant("S6")
+def test_an_order_that_begins_anew_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = Orders.take_back
+
+    def patient(self: Orders, now: float) -> Any:
+        for _, event in self.engaged.pairs():
+            event.times["assigned"] = now
+            for step in ("departed", "arrived"):
+                event.times.pop(step, None)
+        return honest(self, now)
+
+    monkeypatch.setattr(Orders, "take_back", patient)
+    assert broken(played(**{"dispatch.order_limit_s": 20})) == {"S6"}
+
+
+@pytest.mark.invariant("S6")
+def test_an_event_that_nobody_has_confirmed_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = Orders.departed
+
+    def hasty(self: Orders, event: Any, device: str, now: float) -> None:
+        honest(self, event, device, now)
+        if event.state is State.ASSIGNED:
+            self.book.move(event, State.CONFIRMED, now)
+
+    assert broken(played()) == set()
+    monkeypatch.setattr(Orders, "departed", hasty)
+    assert "S6" in broken(played())
+
+
+@pytest.mark.invariant("S6")
+def test_an_event_that_is_confirmed_from_afar_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The operator says so as soon as the drive begins."""
+
+    monkeypatch.setattr(Teleoperation, "begin", lambda self: self.end("confirmed"))
+    assert broken(played(**{"robot.way_m": 25, "dispatch.merge_distance_m": 0})) == {"S6"}

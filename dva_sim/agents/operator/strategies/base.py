@@ -110,7 +110,8 @@ class GuardedStrategy(Guard, Strategy):
         """Within the limits of the robot; it stands where there is no answer."""
         speed, turn = self._answer(self.strategy.drive, route, view, stop_before) or (0.0, 0.0)
         most = self.reach.turn_rate
-        return Intent(min(max(speed, 0.0), self.reach.speed), min(max(turn, -most), most))
+        speed = self._held("wants [m/s]", speed, 0.0, self.reach.speed)
+        return Intent(speed, self._held("wants [rad/s]", turn, -most, most))
 
     def point(self, view: PointView) -> Velocity:
         """No faster than the cursor can."""

@@ -40,6 +40,7 @@ from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import capital, number, quantity
+from dva_sim.simulation import scenario as scenes
 from dva_sim.simulation.labels import factor_name, level_name, measure_name, setting
 
 if TYPE_CHECKING:
@@ -158,10 +159,8 @@ def _points(rows: Table) -> Floats:
 
 def site_of(scenario: Mapping[str, Any]) -> Site | None:
     """The site, or None where its files are not to be had; the ways are shown all the same."""
-    from dva_sim.simulation.scenario import build, site_of
-
     try:
-        return site_of(build(scenario), seed=0)
+        return scenes.site_of(scenes.build(scenario), seed=0)
     except DvaSimError:
         return None
 
@@ -174,7 +173,7 @@ def draw_ground(ax: Axes, site: Site | None) -> None:
         ax.set_xlabel("x (east) [m]")
         ax.set_ylabel("y (north) [m]")
         return
-    from dva_sim.worlds.view import draw_site
+    from dva_sim.worlds.view import draw_site  # late: start-up
 
     draw_site(ax, site, labels=False, scale=False)
     for artist in (*ax.lines, *ax.patches, *ax.collections):

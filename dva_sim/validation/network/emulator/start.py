@@ -29,7 +29,11 @@ def main() -> None:
             problem = error.strerror or str(error)
     die_with_parent(int(sys.argv[1]))
 
-    from dva_sim.validation.network.emulator.cell import EmulatedCell, EmulatedJob, EmulatedOutcome
+    from dva_sim.validation.network.emulator.cell import (  # late: start-up
+        EmulatedCell,
+        EmulatedJob,
+        EmulatedOutcome,
+    )
 
     outcome = (
         EmulatedOutcome(problem=problem)

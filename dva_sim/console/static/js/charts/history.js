@@ -1,0 +1,49 @@
+/** The last values of some numbers, for charts and for what is said of them. */
+
+/** Times [s] with as many values each; what is older than the span is forgotten. */
+export class History {
+  /**
+   * @param {number} width how many values at a time
+   * @param {number} [span] [s]
+   */
+  constructor(width, span = 40) {
+    this.span = span;
+    /** @type {number[][]} */
+    this.columns = Array.from({ length: width + 1 }, () => []);
+  }
+
+  /**
+   * @param {number} time
+   * @param {(number | null)[]} values
+   */
+  add(time, values) {
+    const [times] = this.columns;
+    if (times.length && time < (times.at(-1) ?? 0)) this.clear();
+    [time, ...values].forEach((value, n) => this.columns[n].push(/** @type {number} */ (value)));
+    while (times.length && times[0] < time - this.span) this.columns.forEach((one) => one.shift());
+  }
+
+  clear() {
+    this.columns.forEach((column) => (column.length = 0));
+  }
+
+  /** As charts read it. */
+  read() {
+    return this.columns.map((column) => column.slice());
+  }
+
+  /** @param {number} n */
+  last(n) {
+    return this.columns[n + 1].at(-1) ?? null;
+  }
+
+  /**
+   * What 95 of 100 values stay below.
+   * @param {number} n
+   */
+  p95(n) {
+    const known = this.columns[n + 1].filter((value) => Number.isFinite(value) && value !== null);
+    if (!known.length) return null;
+    return known.sort((a, b) => a - b)[Math.ceil(0.95 * known.length) - 1];
+  }
+}

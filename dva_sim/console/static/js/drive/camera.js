@@ -1,0 +1,85 @@
+/** A robot's picture with its true age; old looks old. */
+import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
+import { pictures, scene } from '../store.js';
+import { worldNow } from '../net/world_time.js';
+import { useEvery } from '../ui/every.js';
+import { secondsText } from '../ui/words.js';
+import { play } from './mjpeg.js';
+
+const OLD_PERIODS = 2;
+const HATCHED_S = 2;
+
+/** Ages of the newest pictures by robot [ms], for the charts. @type {Map<number, number>} */
+const captured = new Map();
+
+/** How old the newest picture of a robot is [ms]. @param {number} i */
+export function pictureAge(i) {
+  const at = captured.get(i);
+  return at === undefined ? NaN : Math.max(0, worldNow() - at);
+}
+
+/** @param {{robot: import('../types.js').Thing}} props */
+export function CameraPicture({ robot }) {
+  const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
+  const [trouble, tell] = useState('');
+  const seen = usePageSeen();
+  useEffect(() => {
+    if (!seen) return undefined;
+    const stop = new AbortController();
+    const url = `/camera/${encodeURIComponent(robot.label)}.mjpg`;
+    play(url, (frame) => draw(canvas.current, robot.i, frame), tell, stop.signal);
+    return () => {
+      stop.abort();
+      captured.delete(robot.i);
+    };
+  }, [robot.label, seen]);
+  return html`<figure class="camera">
+    <canvas ref=${canvas} width="320" height="240" role="img"
+      aria-label=${`What ${robot.label} sees`}></canvas>
+    <${Age} robot=${robot} trouble=${trouble} />
+  </figure>`;
+}
+
+/** @param {{robot: import('../types.js').Thing, trouble: string}} props */
+function Age({ robot, trouble }) {
+  useEvery(100);
+  const age = pictureAge(robot.i) / 1000;
+  const period = 1 / (robot.camera?.rate_hz || 5);
+  const known = Number.isFinite(age);
+  const limit = Math.max(HATCHED_S, scene.value?.stale_s ?? 0);
+  const look = !known || age > limit ? 'hatched' : age > OLD_PERIODS * period ? 'old' : 'fresh';
+  const text = known ? `${secondsTo(age)} old` : pictures.value || trouble || 'waiting for the first picture';
+  return html`<div class=${`veil ${look}`}></div>
+    <figcaption><span class=${`picture-age ${look}`}>${text}</span></figcaption>`;
+}
+
+/** @param {number} age [s] */
+const secondsTo = (age) => (age < 10 ? `${age.toFixed(2)} s` : secondsText(age));
+
+/**
+ * @param {HTMLCanvasElement | null} canvas
+ * @param {number} robot
+ * @param {import('./mjpeg.js').Frame} frame
+ */
+function draw(canvas, robot, frame) {
+  captured.set(robot, frame.capturedMs);
+  if (!canvas) return;
+  if (canvas.width !== frame.bitmap.width || canvas.height !== frame.bitmap.height) {
+    canvas.width = frame.bitmap.width;
+    canvas.height = frame.bitmap.height;
+  }
+  canvas.getContext('2d')?.drawImage(frame.bitmap, 0, 0);
+  canvas.dataset.frame = String(frame.number);
+  frame.bitmap.close();
+}
+
+/** Whether the page can be seen: no stream is read for nobody. */
+function usePageSeen() {
+  const [seen, see] = useState(!document.hidden);
+  useEffect(() => {
+    const change = () => see(!document.hidden);
+    document.addEventListener('visibilitychange', change);
+    return () => document.removeEventListener('visibilitychange', change);
+  }, []);
+  return seen;
+}

@@ -1,0 +1,71 @@
+/** Take, start, drive, stop, release; and what the robot is doing. */
+import { html } from '../../vendor/preact.js';
+import { clock, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
+import { act } from '../net/actions.js';
+import { DriveSliders } from './drive_sliders.js';
+import { gamepad } from './gamepad.js';
+import { held, interrupted } from './hold.js';
+import { Stick } from './stick.js';
+
+/** @typedef {import('../types.js').Thing} Thing */
+
+/** @param {{robots: Thing[]}} props */
+export function Controls({ robots }) {
+  const may = maySteer.value;
+  const drives = seat.value?.drives ?? [];
+  const holds = drives.length > 0;
+  const limits = {
+    max_speed_mps: Math.min(...robots.map((robot) => robot.max_speed_mps || 0.5)),
+    max_turn_rate_radps: Math.min(...robots.map((robot) => robot.max_turn_rate_radps || 0.52)),
+  };
+  return html`<section class="panel controls" aria-label="Hands">
+    <div class="statuses"><span>Mode</span><${Mode} robots=${robots} /></div>
+    <div class="buttons">
+      <button type="button" disabled=${!may || holds}
+        onClick=${() => act('take', { robots: robots.map((robot) => robot.i) })}>Take control</button>
+      <button type="button" class="go" disabled=${!may || !holds} onClick=${() => act('start')}>Start</button>
+      <button type="button" disabled=${!may || !holds} onClick=${() => act('stop')}>Stop</button>
+      <button type="button" disabled=${!may || !holds} onClick=${() => act('release')}>Release control</button>
+    </div>
+    <p class="hint"><${Hint} holds=${holds} /></p>
+    <div class="steering"><${Stick} disabled=${!may} />
+      <${DriveSliders} limits=${limits} disabled=${!may} /></div>
+    <p class="keys soft">Hold <kbd>↑</kbd> <kbd>←</kbd> <kbd>→</kbd> or <kbd>W</kbd> <kbd>A</kbd> <kbd>D</kbd>,
+      the stick, a slider${gamepad.value ? ' or a shoulder button of the gamepad' : ''}; <kbd>Shift</kbd> slowly. Letting go stops.</p>
+  </section>`;
+}
+
+/** The modes of the robots on this page; announced when they change, and only then. */
+function Mode(/** @type {{robots: Thing[]}} */ { robots }) {
+  void rows.value;
+  const text =
+    robots.length === 1
+      ? modeOf(robots[0].i)
+      : robots.map((robot) => `${robot.label} ${modeOf(robot.i)}`).join(', ');
+  return html`<span role="status" aria-label="Mode" class="mode-status">${text}</span>`;
+}
+
+const PHASES = /** @type {Record<string, string>} */ ({
+  asking: 'Asking for control …',
+  held: 'You hold control. Start, then hold to drive.',
+  starting: 'Starting …',
+  driving: 'Driving: hold a key, the stick or a slider.',
+  stopping: 'Stopping …',
+});
+
+/** What to do next, or why nothing moves. @param {{holds: boolean}} props */
+function Hint({ holds }) {
+  if (!maySteer.value) return 'This address may only look. The address for driving is printed where the console was started.';
+  if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
+  if (clock.value.paused) return 'The world is paused.';
+  if (interrupted.value) return `${interrupted.value} The robot was stopped; take hold again to go on.`;
+  if (!holds) return heldByOther() || 'Take control of the robot first.';
+  const phase = seat.value?.phase ?? 'free';
+  if (held.value && phase === 'held') return 'Press Start first: the robot does not listen yet.';
+  return PHASES[phase] ?? '';
+}
+
+function heldByOther() {
+  const row = (rows.value?.robots ?? []).find((one) => one.holder && rowOf(one.i)?.mode === 'Teleoperation');
+  return row ? `${row.holder_label ?? row.holder} is driving a robot now.` : '';
+}

@@ -1,0 +1,63 @@
+/** One or two robots under a person's hands, their pictures, the map, and how late it all is. */
+import { html, useEffect } from '../../vendor/preact.js';
+import { connection, seat, scene } from '../store.js';
+import { driveLost } from '../net/actions.js';
+import { watch } from '../net/sockets.js';
+import { LinkPanel } from '../network/link_panel.js';
+import { MapBox } from '../map/map_box.js';
+import { driven } from '../shell/route.js';
+import { tourGoals } from '../tour/tour.js';
+import { CameraPicture } from './camera.js';
+import { Controls } from './controls.js';
+import { driveByGamepad } from './gamepad.js';
+import { interrupt, watchInterruptions } from './hold.js';
+import { driveByKeys } from './keys.js';
+import { Latency } from './latency.js';
+import { OrderInHand } from './order.js';
+import { RobotHead } from './robot_head.js';
+
+/** The page. */
+export function DrivePage() {
+  const robots = driven.value;
+  const key = robots.map((robot) => robot.i).join();
+  useEffect(() => {
+    watch(robots.map((robot) => robot.i));
+    return () => watch([]);
+  }, [key]);
+  useEffect(steering, []);
+  useEffect(() => {
+    if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
+  }, [connection.value, driveLost.value]);
+  const two = robots.length > 1;
+  return html`<main class=${two ? 'page drive-page two' : 'page drive-page'} id="main" tabindex="-1">
+    <h1 class="hidden">Drive</h1>
+    <section class="camera-region" aria-label="Camera">
+      ${robots.map(
+        (robot, n) => html`<div class="cockpit" key=${robot.i}>
+          <${RobotHead} robot=${robot} place=${n} />
+          <${CameraPicture} robot=${robot} /></div>`,
+      )}
+    </section>
+    <section class="map-region" aria-label="Map">
+      <${MapBox} cones=${() => driven.peek().map((robot) => robot.i)} keyboard=${false}
+        follows=${() => driven.peek()[0]?.i ?? null} goals=${tourGoals} />
+    </section>
+    <div class="side"><${Alert} /><${OrderInHand} /><${Controls} robots=${robots} /><${LinkPanel} /></div>
+    <${Latency} robots=${robots} />
+  </main>`;
+}
+
+/** Keys, gamepad, and all that interrupts them. */
+function steering() {
+  const ends = [driveByKeys(), driveByGamepad(), watchInterruptions()];
+  return () => {
+    interrupt('The page was left.');
+    ends.forEach((end) => end());
+  };
+}
+
+/** What the app shows a driver at once: a lost link, a refusal. */
+function Alert() {
+  const text = scene.value && seat.value?.alert;
+  return html`<div role="alert" class="seat-alert">${text && html`<p class="warning">${text}</p>`}</div>`;
+}

@@ -1,0 +1,128 @@
+/**
+ * Hold to drive: the robot moves only while something is held.
+ *
+ * Keys, pointer, sliders and gamepad each say what they want for as long as they are held; the
+ * newest that wants anything counts. Whatever interrupts (the window loses the focus, the page is
+ * hidden, the connection breaks, the screen is turned) stops at once, and what was held then counts
+ * for nothing until it has been let go: only a new gesture drives on.
+ */
+import { signal } from '../../vendor/preact.js';
+import { you } from '../store.js';
+import { steer } from '../net/wire.js';
+
+const EVERY_MS = 40;
+const LEAST_MS = 15;
+
+/** @typedef {{speed: number, turn: number}} Wish shares of the limits; turn to the left positive */
+
+/** What is wanted now. */
+export const wish = signal(/** @type {Wish} */ ({ speed: 0, turn: 0 }));
+/** Whether anything is held. */
+export const held = signal(false);
+/** Why driving was interrupted; empty once somebody takes hold again. */
+export const interrupted = signal('');
+
+/** @type {Map<string, Wish>} */
+const sources = new Map();
+/** @type {Set<() => void>} */
+const releases = new Set();
+let count = 0;
+let sent = 0;
+let timer = 0;
+
+/**
+ * A source wants something, as long as it is held.
+ * @param {string} source
+ * @param {Wish} wanted
+ */
+export function hold(source, wanted) {
+  sources.delete(source);
+  sources.set(source, wanted);
+  interrupted.value = '';
+  changed();
+}
+
+/** @param {string} source */
+export function letGo(source) {
+  if (sources.delete(source)) changed();
+}
+
+/**
+ * Be told when everything held counts for nothing any more.
+ * @param {() => void} release
+ * @returns {() => void} how to end that
+ */
+export function onRelease(release) {
+  releases.add(release);
+  return () => releases.delete(release);
+}
+
+/**
+ * Stop at once, whatever is held.
+ * @param {string} why
+ */
+export function interrupt(why) {
+  const was = held.value;
+  sources.clear();
+  for (const release of releases) release();
+  changed();
+  if (!was) return;
+  steer({ do: 'gone' });
+  interrupted.value = why;
+}
+
+function changed() {
+  const last = [...sources.values()].at(-1);
+  const before = wish.value;
+  const next = last ?? { speed: 0, turn: 0 };
+  const same = before.speed === next.speed && before.turn === next.turn;
+  if (!same) wish.value = next;
+  if (same && held.value === Boolean(last)) return;
+  held.value = Boolean(last);
+  if (!held.value || performance.now() - sent > LEAST_MS) send();
+  keepSending();
+}
+
+function keepSending() {
+  if (held.value && !timer) timer = window.setInterval(send, EVERY_MS);
+  if (!held.value && timer) {
+    window.clearInterval(timer);
+    timer = 0;
+  }
+}
+
+function send() {
+  count += 1;
+  sent = performance.now();
+  const { speed, turn } = wish.value;
+  steer({ do: 'input', n: count, speed, turn, held: held.value });
+}
+
+/** A last word that outlives the page, should the socket not carry it any more. */
+function sayGone() {
+  const body = JSON.stringify({ action: 'gone', client: you.peek()?.client });
+  navigator.sendBeacon?.('/api/actions', new Blob([body], { type: 'application/json' }));
+}
+
+/** Whatever interrupts. @returns {() => void} how to end that */
+export function watchInterruptions() {
+  const blur = () => interrupt('The window lost the focus.');
+  const hide = () => document.hidden && interrupt('The page was hidden.');
+  const leave = () => {
+    if (held.value) sayGone();
+    interrupt('The page was left.');
+  };
+  const turned = () => interrupt('The screen was turned.');
+  window.addEventListener('blur', blur);
+  window.addEventListener('pagehide', leave);
+  document.addEventListener('visibilitychange', hide);
+  document.addEventListener('freeze', leave);
+  window.screen?.orientation?.addEventListener?.('change', turned);
+  return () => {
+    window.removeEventListener('blur', blur);
+    window.removeEventListener('pagehide', leave);
+    document.removeEventListener('visibilitychange', hide);
+    document.removeEventListener('freeze', leave);
+    window.screen?.orientation?.removeEventListener?.('change', turned);
+  };
+}

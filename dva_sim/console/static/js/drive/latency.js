@@ -1,0 +1,84 @@
+/** How late everything is: commands, answers, pictures; for each robot that is driven. */
+import { html, useEffect, useMemo } from '../../vendor/preact.js';
+import { driveOf, link, rowOf } from '../store.js';
+import { worldNow } from '../net/world_time.js';
+import { Chart } from '../charts/chart.js';
+import { History } from '../charts/history.js';
+import { useEvery } from '../ui/every.js';
+import { msText } from '../ui/words.js';
+import { pictureAge } from './camera.js';
+
+const SAMPLE_MS = 200;
+const DASHES = [undefined, [6, 3]];
+
+/** @typedef {import('../types.js').Thing} Thing */
+
+const KINDS = /** @type {{title: string, hint: string, read: (i: number) => number | null}[]} */ ([
+  {
+    title: 'Command age',
+    hint: 'how old the command in force was when the robot applied it',
+    read: (i) => driveOf(i)?.command_age_ms ?? null,
+  },
+  {
+    title: 'Round trip',
+    hint: 'from a command sent to its answer',
+    read: (i) => driveOf(i)?.round_trip_ms ?? null,
+  },
+  {
+    title: 'Picture age',
+    hint: 'since the picture in sight was taken',
+    read: (i) => {
+      const age = pictureAge(i);
+      return Number.isFinite(age) ? age : null;
+    },
+  },
+]);
+
+/** @param {{robots: Thing[]}} props */
+export function Latency({ robots }) {
+  const key = robots.map((robot) => robot.i).join();
+  const histories = useMemo(() => KINDS.map(() => new History(robots.length)), [key]);
+  useEffect(() => {
+    const timer = window.setInterval(() => sample(histories, robots), SAMPLE_MS);
+    return () => window.clearInterval(timer);
+  }, [histories]);
+  const lines = robots.map((robot, n) => ({
+    label: robot.label,
+    colour: `pattern-${rowOf(robot.i)?.pattern}`,
+    dash: DASHES[n],
+  }));
+  return html`<section class="latency panel" aria-label="Latency">
+    <h2>Latency <${Floor} /></h2>
+    <div class="charts">${KINDS.map(
+      (kind, n) => html`<div title=${kind.hint}>
+        <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
+          read=${() => histories[n].read()} />
+        <${Figures} history=${histories[n]} robots=${robots} />
+      </div>`,
+    )}</div>
+  </section>`;
+}
+
+/** @param {History[]} histories @param {Thing[]} robots */
+function sample(histories, robots) {
+  if (document.hidden) return;
+  const time = worldNow() / 1000;
+  KINDS.forEach((kind, n) => histories[n].add(time, robots.map((robot) => kind.read(robot.i))));
+}
+
+/** What no pattern can be faster than. */
+function Floor() {
+  const setting = link.value;
+  if (!setting) return null;
+  const floor = 1000 * (setting.delay_s + setting.processing_s);
+  return html`<span class="count">a command takes at least ${msText(floor)}</span>`;
+}
+
+/** @param {{history: History, robots: Thing[]}} props */
+function Figures({ history, robots }) {
+  useEvery(500);
+  return html`<p class="figures">${robots.map(
+    (robot, n) => html`<span><i class=${`line line-${n} pattern-${rowOf(robot.i)?.pattern}`}></i>
+      ${robot.label} <b>${msText(history.last(n))}</b> <span class="soft p95">p95 ${msText(history.p95(n))}</span></span>`,
+  )}</p>`;
+}

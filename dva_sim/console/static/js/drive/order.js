@@ -1,0 +1,27 @@
+/** The order in hand: drive there, look, and say what is true. */
+import { html } from '../../vendor/preact.js';
+import { maySteer, rows, seat, thingAt } from '../store.js';
+import { act } from '../net/actions.js';
+import { roomAt } from '../map/shown.js';
+import { capital, plain } from '../ui/words.js';
+
+/** The newest order: of one's own seat, else the one that waits for somebody. */
+export function OrderInHand() {
+  const mine = seat.value?.order ?? null;
+  const order = mine ?? /** @type {any} */ (rows.value)?.order ?? null;
+  if (!order) return null;
+  const robot = thingAt(order.robot)?.label ?? 'a robot';
+  const room = roomAt(order.x_m, order.y_m);
+  const where = room ? `in ${room}` : `at ${order.x_m.toFixed(0)} m, ${order.y_m.toFixed(0)} m`;
+  const off = !maySteer.value || !mine;
+  return html`<section class="panel order" aria-label="Order in hand">
+    <h2>Order: event ${order.event}, ${plain(order.kind)}</h2>
+    <p>${capital(plain(order.kind))} reported ${where}. Drive ${robot} there, look, and say whether
+      it is true.${mine ? '' : ' It waits for whoever takes control.'}</p>
+    <div class="buttons">
+      <button type="button" disabled=${off} onClick=${() => act('confirm')}>Confirm</button>
+      <button type="button" disabled=${off} onClick=${() => act('refute')}>Refute</button>
+      <button type="button" disabled=${off} onClick=${() => act('decline')}>Decline</button>
+    </div>
+  </section>`;
+}

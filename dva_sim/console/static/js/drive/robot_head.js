@@ -1,0 +1,75 @@
+/** Above each picture: which robot, under which pattern, and what became of its commands. */
+import { html } from '../../vendor/preact.js';
+import { driveOf, modeOf, robots, rowOf, rows, seat } from '../store.js';
+import { PatternSelect } from '../network/pattern_select.js';
+import { chooseRobots, driven } from '../shell/route.js';
+import { ModeMark } from '../ui/icon.js';
+import { useEvery } from '../ui/every.js';
+
+/** @param {{robot: import('../types.js').Thing, place: number}} props */
+export function RobotHead({ robot, place }) {
+  void rows.value;
+  return html`<div class="robot-head">
+    <${ModeMark} mode=${modeOf(robot.i)} />
+    <${RobotSelect} robot=${robot} place=${place} />
+    <${PatternSelect} robot=${robot} />
+    ${place === 0 && driven.value.length < 2 && html`<${BesideButton} robot=${robot} />`}
+    ${place > 0 && html`<button type="button" class="plain" aria-label=${`Take ${robot.label} off the page`}
+      title=${`Take ${robot.label} off the page`} disabled=${isHeld()}
+      onClick=${() => chooseRobots([driven.peek()[0].label])}>×</button>`}
+    <${Watchdog} robot=${robot} /><${Stands} robot=${robot} />
+  </div>`;
+}
+
+/** Whether the person sits: other robots only after the release. */
+const isHeld = () => Boolean(seat.value?.drives.length);
+
+/** @param {{robot: import('../types.js').Thing, place: number}} props */
+function RobotSelect({ robot, place }) {
+  const change = (/** @type {any} */ event) => {
+    const labels = driven.peek().map((one) => one.label);
+    labels[place] = event.currentTarget.value;
+    chooseRobots(labels);
+  };
+  const taken = new Set(driven.value.filter((one) => one.i !== robot.i).map((one) => one.label));
+  return html`<label><span class="hidden">${place ? 'Second robot' : 'First robot'}</span>
+    <select value=${robot.label} onChange=${change} disabled=${isHeld()}>
+      ${robots.value
+        .filter((one) => !taken.has(one.label))
+        .map((one) => html`<option value=${one.label} selected=${one.i === robot.i}>${one.label}</option>`)}
+    </select></label>`;
+}
+
+/** @param {{robot: import('../types.js').Thing}} props */
+function BesideButton({ robot }) {
+  const other = robots.value.find((one) => one.i !== robot.i);
+  if (!other) return null;
+  return html`<button type="button" class="beside" disabled=${isHeld()}
+    title="Drive two robots with the same hand, each under its own pattern"
+    onClick=${() => chooseRobots([robot.label, other.label])}>+ ${other.label} beside it</button>`;
+}
+
+let heardAt = 0;
+/** @type {unknown} */
+let heardRows = null;
+
+/** How long it would go on without a word. @param {{robot: import('../types.js').Thing}} props */
+function Watchdog({ robot }) {
+  useEvery(100);
+  if (rows.value !== heardRows) [heardRows, heardAt] = [rows.value, performance.now()];
+  const told = rowOf(robot.i)?.watchdog_left_s;
+  if (told === null || told === undefined) return html`<span class="watchdog off">watchdog off</span>`;
+  const left = Math.max(0, told - Math.min(0.5, (performance.now() - heardAt) / 1000));
+  return html`<span class=${left < 1 ? 'watchdog low' : 'watchdog'} title="The robot stops by itself when it hears no command for so long">
+    <meter min="0" max="3" value=${left} aria-label=${`Watchdog of ${robot.label}`}></meter>watchdog ${left.toFixed(1)} s</span>`;
+}
+
+/** @param {{robot: import('../types.js').Thing}} props */
+function Stands({ robot }) {
+  const row = rowOf(robot.i);
+  const drive = driveOf(robot.i);
+  const speed = row?.set_speed_mps ?? 0;
+  const text = row?.stands ? `Stands: ${row.stands}` : `Set point ${speed.toFixed(2)} m/s`;
+  const counts = drive ? `${drive.sent} sent, ${drive.refused} refused, ${drive.timeouts} timed out` : '';
+  return html`<span class="stands">${text} <span class="soft">${counts}</span></span>`;
+}

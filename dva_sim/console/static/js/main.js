@@ -1,0 +1,9 @@
+/** Where the page begins. */
+import { connect, keepDriveSocket } from './net/sockets.js';
+import { showApp } from './shell/app.js';
+import { listenForKeys } from './shell/keys.js';
+
+showApp(/** @type {HTMLElement} */ (document.getElementById('app')));
+listenForKeys();
+connect();
+keepDriveSocket();

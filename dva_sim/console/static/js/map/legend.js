@@ -1,0 +1,48 @@
+/** What the marks of the map mean. */
+import { html } from '../../vendor/preact.js';
+import { hazards } from '../store.js';
+import { ModeMark, SeverityMark, StateMark } from '../ui/icon.js';
+import { capital, plain } from '../ui/words.js';
+
+const MODES = ['Idle', 'Mission', 'Teleoperation', 'Emergency'];
+const STATES = ['pending', 'assigned', 'on scene', 'confirmed', 'contained', 'refuted',
+  'escalated', 'expired']; // prettier-ignore
+
+/** Folded until somebody wants it. */
+export function Legend() {
+  return html`<details class="legend">
+    <summary>Legend</summary>
+    <div class="legend-body" tabindex="0" role="group" aria-label="Marks and colours">
+      <ul>
+        ${MODES.map((mode) => html`<li><${ModeMark} mode=${mode} />robot: ${mode.toLowerCase()}</li>`)}
+        <li><span class="dot guard"></span>guard</li>
+        <li><span class="dot bystander"></span>bystander</li>
+        <li><span class="cone"></span>what the camera sees</li>
+        <li><span class="dashes"></span>is sent there</li>
+      </ul>
+      <ul>
+        ${['critical', 'high', 'medium', 'low'].map(
+          (rank) => html`<li><${SeverityMark} severity=${rank} />event: ${rank}</li>`,
+        )}
+        <li><span class="field smoke"></span>smoke</li>
+        <li><span class="field gas"></span>gas</li>
+        <li><span class="field water"></span>water</li>
+        <li><span class="field fire"></span>heat</li>
+      </ul>
+      <ul>
+        ${STATES.map((state) => html`<li><${StateMark} state=${state} />${state}</li>`)}
+      </ul>
+      <${Fullest} />
+    </div>
+  </details>`;
+}
+
+/** What the strongest tint stands for. */
+function Fullest() {
+  const fields = hazards.value.fields.filter((field) => field.full);
+  if (!fields.length) return null;
+  return html`<p>Fullest tint: ${fields.map((field) => `${plain(field.kind)} ${field.full}`).join('; ')}</p>`;
+}
+
+/** @param {string} kind */
+export const hazardName = (kind) => capital(plain(kind));

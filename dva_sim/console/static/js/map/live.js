@@ -1,0 +1,304 @@
+/** What moves or changes on the map: hazards, events, trails, robots, people. */
+import { events, hazards, robots, scene, selection, tracks } from '../store.js';
+import { HAZARDS } from '../palette.js';
+import { colours } from '../shell/theme.js';
+import { ageText } from '../ui/words.js';
+import { worldNow } from '../net/world_time.js';
+import { drawBattery, drawName, drawPerson, drawRobot, isRoomy, modeColour, sizeOf } from './bodies.js';
+import { Sight } from './cone.js';
+import { Fields } from './fields.js';
+import { SEVERITIES, SOURCES, stateColour } from './marks.js';
+import { isOpen, thingsOf } from './shown.js';
+import { modeOf } from '../store.js';
+
+const EVENT_PX = 18;
+const HIT_PX = 12;
+const EVERY_SECOND = 1000;
+
+/** @typedef {import('./bodies.js').Pen} Pen */
+/** @typedef {import('./bodies.js').Body} Body */
+
+export class Live {
+  /**
+   * @param {() => number[]} cones robots whose cone of sight is drawn
+   * @param {() => import('../types.js').TourPlan | null} goals
+   */
+  constructor(cones, goals) {
+    this.cones = cones;
+    this.goals = goals;
+    this.fields = new Fields();
+    this.sight = new Sight(scene.peek()?.site.walls_m ?? []);
+    /** @type {Body[]} */
+    this.bodies = [];
+    this.second = 0;
+  }
+
+  /** @param {number} now */
+  isMoving(now) {
+    const second = Math.floor(now / EVERY_SECOND);
+    const ticks = second !== this.second && events.peek().some((event) => isOpen(event));
+    return ticks || tracks.isMoving(now);
+  }
+
+  update() {
+    this.fields.update(hazards.peek().fields, colours.peek());
+  }
+
+  /**
+   * @param {CanvasRenderingContext2D} ctx
+   * @param {import('./view.js').Affine} affine
+   * @param {number} now
+   */
+  draw(ctx, affine, now) {
+    this.second = Math.floor(now / EVERY_SECOND);
+    const pen = { ctx, affine, colours: colours.peek() };
+    this.fields.draw(ctx, affine);
+    this.bodies = placed(affine, now);
+    this.drawCones(pen, now);
+    this.drawTrails(pen);
+    this.drawGoals(pen);
+    this.drawOrders(pen);
+    this.drawSources(pen);
+    this.drawBodies(pen);
+    for (const event of events.peek()) this.drawEvent(pen, event);
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {number} now
+   */
+  drawCones({ ctx, affine, colours: palette }, now) {
+    affine.toMetres(ctx);
+    for (const i of this.cones()) {
+      const camera = robots.peek().find((robot) => robot.i === i)?.camera;
+      const eye = tracks.place(i, now);
+      if (!camera || !eye) continue;
+      const { path, reach } = this.sight.outline(eye, camera);
+      const fade = ctx.createRadialGradient(eye.x, eye.y, 0, eye.x, eye.y, reach);
+      const colour = palette[modeColour(modeOf(i))];
+      fade.addColorStop(0, `${colour}66`);
+      fade.addColorStop(1, `${colour}0a`);
+      ctx.fillStyle = fade;
+      ctx.fill(path);
+    }
+    affine.toPixels(ctx);
+  }
+
+  /** @param {Pen} pen */
+  drawTrails({ ctx, affine, colours: palette }) {
+    affine.toMetres(ctx);
+    ctx.lineWidth = 2 / affine.scale;
+    ctx.lineCap = ctx.lineJoin = 'round';
+    ctx.globalAlpha = 0.55;
+    for (const { thing } of this.bodies) {
+      if (thing.kind !== 'robot') continue;
+      const path = new Path2D();
+      tracks.last(thing.i)?.trace(path);
+      ctx.strokeStyle = palette[modeColour(modeOf(thing.i))];
+      ctx.stroke(path);
+    }
+    ctx.globalAlpha = 1;
+    affine.toPixels(ctx);
+  }
+
+  /** @param {Pen} pen */
+  drawGoals({ ctx, affine, colours: palette }) {
+    const tour = this.goals();
+    if (!tour) return;
+    tour.goals_m.forEach(([x, y], n) => {
+      const [left, top] = affine.pixel(x, y);
+      ctx.beginPath();
+      ctx.arc(left, top, Math.max(10, tour.radius_m * affine.scale), 0, 2 * Math.PI);
+      ctx.fillStyle = `${palette.focus}33`;
+      ctx.fill();
+      ctx.setLineDash([6, 4]);
+      ctx.lineWidth = 2;
+      ctx.strokeStyle = palette.focus;
+      ctx.stroke();
+      ctx.setLineDash([]);
+      label(ctx, palette, `Goal ${n + 1}`, left, top, 'center');
+    });
+  }
+
+  /**
+   * Who is sent where.
+   * @param {Pen} pen
+   */
+  drawOrders({ ctx, affine, colours: palette }) {
+    const byLabel = new Map(this.bodies.map((body) => [body.thing.label, body]));
+    ctx.lineWidth = 1.5;
+    ctx.setLineDash([2, 4]);
+    for (const event of events.peek()) {
+      if (!isOpen(event)) continue;
+      ctx.strokeStyle = palette[stateColour(event.state)] ?? palette.ink;
+      const [left, top] = affine.pixel(event.x_m, event.y_m);
+      for (const body of event.assigned.map((name) => byLabel.get(name))) {
+        if (!body) continue;
+        ctx.beginPath();
+        ctx.moveTo(body.left, body.top);
+        ctx.lineTo(left, top);
+        ctx.stroke();
+      }
+    }
+    ctx.setLineDash([]);
+  }
+
+  /** @param {Pen} pen */
+  drawSources({ ctx, affine, colours: palette }) {
+    const looks = /** @type {Record<string, {mark: string, colour: string}>} */ (HAZARDS);
+    for (const hazard of hazards.peek().hazards) {
+      const look = looks[hazard.kind] ?? { mark: 'X', colour: palette.warning };
+      const [left, top] = affine.pixel(hazard.x_m, hazard.y_m);
+      const s = 18 * affine.dpr;
+      ctx.setTransform(s, 0, 0, s, left * affine.dpr, top * affine.dpr);
+      ctx.globalAlpha = hazard.contained ? 0.45 : 1;
+      ctx.lineWidth = 0.1;
+      ctx.fillStyle = look.colour;
+      ctx.strokeStyle = palette.outline;
+      ctx.fill(SOURCES[look.mark] ?? SOURCES.X);
+      ctx.stroke(SOURCES[look.mark] ?? SOURCES.X);
+      ctx.globalAlpha = 1;
+    }
+    affine.toPixels(ctx);
+  }
+
+  /** @param {Pen} pen */
+  drawBodies(pen) {
+    const chosen = selection.peek();
+    const machines = this.bodies.filter((body) => body.thing.kind === 'robot');
+    const roomy = isRoomy(machines.length, pen.affine.scale);
+    for (const body of this.bodies) {
+      const mine = chosen?.kind === 'thing' && chosen.key === body.thing.i;
+      if (mine) ring(pen, body.left, body.top, body.size / 2 + 7);
+      if (body.thing.kind !== 'robot') drawPerson(pen, body);
+    }
+    for (const body of machines) drawRobot(pen, body);
+    for (const body of machines) drawBattery(pen, body, roomy);
+    for (const body of this.bodies) {
+      const mine = chosen?.kind === 'thing' && chosen.key === body.thing.i;
+      const named = body.thing.kind !== 'bystander' && roomy;
+      if (named || mine) drawName(pen, body, mine);
+    }
+  }
+
+  /**
+   * @param {Pen} pen
+   * @param {import('../types.js').SiteEvent} event
+   */
+  drawEvent(pen, event) {
+    const { ctx, affine, colours: palette } = pen;
+    const [left, top] = affine.pixel(event.x_m, event.y_m);
+    const chosen = selection.peek();
+    const mine = chosen?.kind === 'event' && chosen.key === event.number;
+    if (mine) ring(pen, left, top - 22, 15);
+    ctx.globalAlpha = isOpen(event) ? 1 : 0.55;
+    const s = EVENT_PX * affine.dpr;
+    ctx.setTransform(s, 0, 0, s, left * affine.dpr, (top - 22) * affine.dpr);
+    const shape = SEVERITIES[event.severity] ?? SEVERITIES.low;
+    ctx.lineWidth = 3 / EVENT_PX;
+    ctx.strokeStyle = palette.halo;
+    ctx.stroke(shape);
+    ctx.fillStyle = palette[event.severity] ?? palette.card;
+    ctx.fill(shape);
+    ctx.lineWidth = 1.5 / EVENT_PX;
+    ctx.strokeStyle = palette.outline;
+    ctx.stroke(shape);
+    affine.toPixels(ctx);
+    number(ctx, palette[`on-${event.severity}`] ?? palette.ink, event.number, left, top - 22);
+    const age = isOpen(event) || mine ? ` ${ageText(worldNow() - event.since_ms)}` : '';
+    label(ctx, palette, `${event.state}${age}`, left + EVENT_PX / 2 + 4, top - 22, 'left');
+    ctx.globalAlpha = 1;
+  }
+
+  /**
+   * What stands at a place of the map [px], the nearest within reach.
+   * @param {number} left
+   * @param {number} top
+   * @param {import('./view.js').Affine} affine
+   * @returns {import('../types.js').Selection}
+   */
+  hit(left, top, affine) {
+    let best = /** @type {import('../types.js').Selection} */ (null);
+    let least = Infinity;
+    const offer = (/** @type {number} */ far, /** @type {number} */ reach, /** @type {any} */ what) => {
+      if (far < reach && far < least) [least, best] = [far, what];
+    };
+    for (const body of this.bodies) {
+      const far = Math.hypot(body.left - left, body.top - top);
+      offer(far, HIT_PX + body.size / 2, { kind: 'thing', key: body.thing.i });
+    }
+    for (const event of events.peek()) {
+      const [x, y] = affine.pixel(event.x_m, event.y_m);
+      const far = Math.hypot(x - left, y - 22 - top);
+      offer(far, HIT_PX + EVENT_PX / 2, { kind: 'event', key: event.number });
+    }
+    return best;
+  }
+}
+
+/**
+ * @param {import('./view.js').Affine} affine
+ * @param {number} now
+ * @returns {Body[]}
+ */
+function placed(affine, now) {
+  const bodies = [];
+  for (const thing of thingsOf(['bystander', 'guard', 'robot'])) {
+    const place = tracks.place(thing.i, now);
+    if (!place) continue;
+    const [left, top] = affine.pixel(place.x, place.y);
+    const out = left < -40 || top < -40 || left > affine.width + 40 || top > affine.height + 40;
+    if (out) continue;
+    bodies.push({ thing, left, top, heading: place.heading, size: sizeOf(thing, affine.scale) });
+  }
+  return bodies;
+}
+
+/**
+ * @param {Pen} pen
+ * @param {number} left
+ * @param {number} top
+ * @param {number} radius
+ */
+function ring({ ctx, colours: palette }, left, top, radius) {
+  ctx.beginPath();
+  ctx.arc(left, top, radius, 0, 2 * Math.PI);
+  ctx.lineWidth = 2.5;
+  ctx.strokeStyle = palette.focus;
+  ctx.stroke();
+}
+
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {string} colour
+ * @param {number} value
+ * @param {number} left
+ * @param {number} top
+ */
+function number(ctx, colour, value, left, top) {
+  ctx.font = '600 10px system-ui, sans-serif';
+  ctx.textAlign = 'center';
+  ctx.textBaseline = 'middle';
+  ctx.fillStyle = colour;
+  ctx.fillText(String(value), left, top + 1);
+}
+
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Record<string, string>} palette
+ * @param {string} text
+ * @param {number} left
+ * @param {number} top
+ * @param {CanvasTextAlign} align
+ */
+function label(ctx, palette, text, left, top, align) {
+  ctx.font = '11px system-ui, sans-serif';
+  ctx.textAlign = align;
+  ctx.textBaseline = 'middle';
+  ctx.lineJoin = 'round';
+  ctx.lineWidth = 3;
+  ctx.strokeStyle = palette.halo;
+  ctx.strokeText(text, left, top);
+  ctx.fillStyle = palette.ink;
+  ctx.fillText(text, left, top);
+}

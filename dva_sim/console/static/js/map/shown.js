@@ -1,0 +1,67 @@
+/** Who and what is shown, in which order. */
+import { events, scene, tracks } from '../store.js';
+
+const CLOSED = new Set(['contained', 'refuted', 'expired']);
+const RANKS = ['critical', 'high', 'medium', 'low'];
+
+/** @param {import('../types.js').SiteEvent} event */
+export const isOpen = (event) => !CLOSED.has(event.state);
+
+/** Whether somebody has to do something about it. @param {import('../types.js').SiteEvent} event */
+export const isAlarm = (event) => event.state === 'pending' || event.state === 'escalated';
+
+/** Open ones first, then the most severe, then the oldest. */
+export function eventsInOrder() {
+  return [...events.value].sort(
+    (a, b) =>
+      Number(isOpen(b)) - Number(isOpen(a)) ||
+      RANKS.indexOf(a.severity) - RANKS.indexOf(b.severity) ||
+      a.number - b.number,
+  );
+}
+
+/** How many alarms there are of each severity. */
+export function alarms() {
+  const counts = /** @type {Record<string, number>} */ ({});
+  for (const rank of RANKS) counts[rank] = 0;
+  for (const event of events.value) if (isAlarm(event)) counts[event.severity] += 1;
+  return counts;
+}
+
+/** @param {string[]} kinds in the order of drawing */
+export function thingsOf(kinds) {
+  const things = scene.peek()?.things ?? [];
+  return kinds.flatMap((kind) => things.filter((thing) => thing.kind === kind));
+}
+
+/**
+ * The room of a place, in words.
+ * @param {number} x
+ * @param {number} y
+ */
+export function roomAt(x, y) {
+  const rooms = scene.peek()?.site.rooms ?? [];
+  const inside = rooms.filter((room) => contains(room.polygon_m, x, y));
+  return (inside.find((room) => !room.outdoor) ?? inside[0])?.name ?? '';
+}
+
+/** @param {number} i */
+export function roomOf(i) {
+  const place = tracks.last(i);
+  return place ? roomAt(place.x, place.y) : '';
+}
+
+/**
+ * @param {number[][]} polygon
+ * @param {number} x
+ * @param {number} y
+ */
+function contains(polygon, x, y) {
+  let inside = false;
+  for (let n = 0, before = polygon.length - 1; n < polygon.length; before = n, n += 1) {
+    const [x1, y1] = polygon[n];
+    const [x2, y2] = polygon[before];
+    if (y1 > y !== y2 > y && x < ((x2 - x1) * (y - y1)) / (y2 - y1) + x1) inside = !inside;
+  }
+  return inside;
+}

@@ -1,0 +1,63 @@
+/** What each line from the world changes in the page's state. */
+import { batch } from '../../vendor/preact.js';
+import { connection, events, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import { rememberClient } from './client_id.js';
+import { heardPong } from './round_trip.js';
+import { hear, hearAnything } from './world_time.js';
+
+const STORY_KEPT = 200;
+
+/** @type {Record<string, (line: any) => void>} */
+const LINES = {
+  snap,
+  pos: (line) => {
+    tracks.put(line.p, performance.now());
+    tracks.keep(new Set(line.p.map((/** @type {number[]} */ row) => row[0])));
+  },
+  d: (line) => {
+    tracks.put(line.p, performance.now());
+    tracks.drop(line.gone ?? []);
+  },
+  rows: (line) => (rows.value = line),
+  hazards: (line) => (hazards.value = line),
+  events: (line) => (events.value = line.events),
+  story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
+  seat: (line) => {
+    if (isMine(line)) seat.value = line;
+  },
+  you: (line) => {
+    you.value = { client: line.client, role: line.role };
+    rememberClient(line.client);
+  },
+  pictures: (line) => (pictures.value = line.ok ? '' : line.text),
+  pong: heardPong,
+  bye: (line) => (connection.value = line.why || 'the world has ended'),
+};
+
+/**
+ * Take note of a line.
+ * @param {any} line
+ */
+export function apply(line) {
+  if (typeof line.t === 'number') hear(line.t);
+  else hearAnything();
+  batch(() => LINES[line.k]?.(line));
+}
+
+/** @param {any} line */
+function isMine(line) {
+  return Array.isArray(line.drives) && (!line.seat || line.seat === you.value?.client);
+}
+
+/** @param {any} line */
+function snap(line) {
+  if (line.scene) scene.value = line.scene;
+  story.value = [];
+  seat.value = null;
+  const { pos, story: told, ...others } = line.state ?? {};
+  if (pos) LINES.pos({ p: pos });
+  if (told) story.value = told.slice(-STORY_KEPT);
+  for (const part of Object.values(others)) {
+    for (const inner of Array.isArray(part) ? part : [part]) LINES[inner?.k]?.(inner);
+  }
+}

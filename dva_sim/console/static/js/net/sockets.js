@@ -1,0 +1,112 @@
+/** The two sockets: one tells what is, the other carries what the person does. */
+import { effect } from '../../vendor/preact.js';
+import { connection, maySteer, you } from '../store.js';
+import { settle, socketLost } from './actions.js';
+import { apply } from './apply.js';
+import { rememberedClient } from './client_id.js';
+import { keepAsking } from './round_trip.js';
+import { isDriveSocket, replaceDriveSocket } from './wire.js';
+
+const FIRST_WAIT_MS = 250;
+const LONGEST_WAIT_MS = 4000;
+const RESYNC_EVERY_MS = 1000;
+
+/** @type {WebSocket | null} */
+let state = null;
+let wait = FIRST_WAIT_MS;
+let count = NaN;
+let asked = 0;
+/** @type {number[]} */
+let watched = [];
+
+/** @param {string} path */
+function address(path) {
+  return `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}${path}`;
+}
+
+/** Begin to listen, for as long as the page lives. */
+export function connect() {
+  const old = you.value?.client ?? rememberedClient();
+  const query = old ? `?client=${encodeURIComponent(old)}` : '';
+  const socket = new WebSocket(address(`/ws/state${query}`));
+  count = NaN;
+  state = socket;
+  let stopAsking = () => {};
+  socket.onopen = () => {
+    wait = FIRST_WAIT_MS;
+    connection.value = 'open';
+    stopAsking = keepAsking(tell);
+    tell({ do: 'watch', robots: watched });
+  };
+  socket.onmessage = (event) => receive(JSON.parse(event.data));
+  socket.onclose = () => {
+    stopAsking();
+    if (['open', 'connecting'].includes(connection.value)) connection.value = 'lost';
+    window.setTimeout(connect, wait);
+    wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
+  };
+}
+
+/** @param {any} line */
+function receive(line) {
+  if (typeof line.s === 'number') {
+    if (line.k !== 'snap' && !Number.isNaN(count) && line.s !== count + 1) resync();
+    count = line.s;
+  }
+  apply(line);
+}
+
+/** Ask for everything anew; not more often than it helps. */
+export function resync() {
+  const now = performance.now();
+  if (now - asked < RESYNC_EVERY_MS) return;
+  asked = now;
+  tell({ do: 'resync' });
+}
+
+/** @param {object} message */
+function tell(message) {
+  if (state?.readyState === WebSocket.OPEN) state.send(JSON.stringify(message));
+}
+
+/**
+ * Say whose pictures are being looked at.
+ * @param {number[]} robots
+ */
+export function watch(robots) {
+  watched = robots;
+  tell({ do: 'watch', robots });
+}
+
+/** Open the socket for driving whenever this page may, under the name that it has got. */
+export function keepDriveSocket() {
+  effect(() => {
+    const client = maySteer.value ? you.value?.client : null;
+    replaceDriveSocket(client ? open(client) : null);
+  });
+}
+
+/** @param {string} client */
+function open(client) {
+  const socket = new WebSocket(address(`/ws/drive?client=${encodeURIComponent(client)}`));
+  socket.onmessage = (event) => {
+    const line = JSON.parse(event.data);
+    if (line.k === 'done') settle(line);
+    else apply(line);
+  };
+  socket.onclose = () => {
+    const unexpected = isDriveSocket(socket);
+    socketLost(unexpected);
+    if (unexpected) window.setTimeout(() => reopen(socket, client), LONGEST_WAIT_MS / 4);
+  };
+  return socket;
+}
+
+/**
+ * Unless another one has taken its place meanwhile.
+ * @param {WebSocket} old
+ * @param {string} client
+ */
+function reopen(old, client) {
+  if (isDriveSocket(old) && you.value?.client === client) replaceDriveSocket(open(client));
+}

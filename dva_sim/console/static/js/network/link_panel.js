@@ -1,0 +1,107 @@
+/** The link that one chooses, and how fast the world runs. */
+import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
+import { clock, link, maySteer, scene } from '../store.js';
+import { act } from '../net/actions.js';
+import { Slider } from '../ui/slider.js';
+import { rateText } from '../ui/words.js';
+
+const SETTLE_MS = 120;
+const QUIET_MS = 1500;
+const FASTEST = 20;
+const EACH = 100; // steps of the rate's slider
+
+/**
+ * @typedef {{name: string, key: string, unit: number, step: number, limits: number[],
+ *   text: (value: number) => string, hint: string}} Knob
+ */
+
+const ms = (/** @type {number} */ value) => `${Math.round(value)} ms`;
+
+/** @type {Knob[]} */
+const KNOBS = [
+  { name: 'Delay', key: 'delay_s', unit: 1000, step: 10, limits: [0, 5], text: ms, hint: 'Between console and robots, one way' },
+  { name: 'Jitter', key: 'jitter_s', unit: 1000, step: 5, limits: [0, 1], text: ms,
+    hint: 'How much the delay varies' },
+  {
+    name: 'Loss', key: 'loss', unit: 100, step: 0.5, limits: [0, 0.5], hint: 'Share of packets that are lost',
+    text: (value) => `${Number(value.toFixed(1))} %`,
+  },
+  {
+    name: 'Processing time', key: 'processing_s', unit: 1000, step: 10, limits: [0, 3], text: ms,
+    hint: 'What the robot’s computer takes for each command',
+  },
+]; // prettier-ignore
+
+/** @param {{heading?: string}} props */
+export function LinkPanel({ heading = 'The link you choose' }) {
+  return html`<section class="panel link-panel" aria-label="What lies between">
+    <h2>${heading}</h2>
+    <${Presets} />
+    <div class="knobs">
+      ${KNOBS.map((knob) => html`<${LinkSlider} key=${knob.key} knob=${knob} />`)}
+      <${Bandwidth} /><${TimeFactor} />
+    </div>
+  </section>`;
+}
+
+/**
+ * What the slider shows: the world's value, unless the person has just moved it.
+ * @param {number} told
+ * @param {(value: number) => void} send
+ * @returns {[number, (value: number) => void]}
+ */
+function useOwn(told, send) {
+  const [own, keep] = useState(/** @type {number | null} */ (null));
+  const timers = useRef({ send: 0, forget: 0 });
+  useEffect(() => () => Object.values(timers.current).forEach((timer) => window.clearTimeout(timer)), []);
+  const set = (/** @type {number} */ value) => {
+    keep(value);
+    window.clearTimeout(timers.current.send);
+    window.clearTimeout(timers.current.forget);
+    timers.current.send = window.setTimeout(() => send(value), SETTLE_MS);
+    timers.current.forget = window.setTimeout(() => keep(null), QUIET_MS);
+  };
+  return [own ?? told, set];
+}
+
+/** @param {{knob: Knob}} props */
+function LinkSlider({ knob }) {
+  const setting = /** @type {any} */ (link.value ?? {});
+  const [least, most] = scene.value?.link_limits?.[knob.key] ?? knob.limits;
+  const [value, set] = useOwn((setting[knob.key] ?? 0) * knob.unit, (wanted) =>
+    act('link', { [knob.key]: wanted / knob.unit }),
+  );
+  return html`<${Slider} name=${knob.name} min=${least * knob.unit} max=${most * knob.unit}
+    step=${knob.step} value=${value} text=${knob.text} hint=${knob.hint}
+    disabled=${!maySteer.value} onInput=${set} />`;
+}
+
+/** From 10 kbit/s to 1 Gbit/s, each step a share more. */
+function Bandwidth() {
+  const [least, most] = scene.value?.link_limits?.rate_bps ?? [1e4, 1e9];
+  const decades = Math.log10(most / least);
+  const rateOf = (/** @type {number} */ step) => least * 10 ** ((decades * step) / EACH);
+  const told = link.value?.rate_bps ?? most;
+  const at = Math.round((EACH * Math.log10(told / least)) / decades);
+  const [value, set] = useOwn(at, (step) => act('link', { rate_bps: Math.round(rateOf(step)) }));
+  return html`<${Slider} name="Bandwidth" min=${0} max=${EACH} step=${1} value=${value}
+    text=${(/** @type {number} */ step) => rateText(rateOf(step))} hint="Of the link, in each direction"
+    disabled=${!maySteer.value} onInput=${set} />`;
+}
+
+function TimeFactor() {
+  const [value, set] = useOwn(clock.value.factor, (factor) => act('pace', { factor }));
+  return html`<${Slider} name="Time factor" min=${1} max=${FASTEST} step=${1} value=${value}
+    text=${(/** @type {number} */ factor) => `× ${Number(factor.toFixed(1))}`}
+    hint="How many times faster than real time the world runs" disabled=${!maySteer.value} onInput=${set} />`;
+}
+
+const PRESETS = [0, 100, 250, 500, 1000];
+
+function Presets() {
+  const now = Math.round(1000 * (link.value?.delay_s ?? 0));
+  return html`<div class="presets" role="group" aria-label="Usual delays">${PRESETS.map(
+    (delay) => html`<button type="button" aria-pressed=${now === delay} disabled=${!maySteer.value}
+      onClick=${() => act('link', { delay_s: delay / 1000 })}>${delay < 1000 ? `${delay} ms` : `${delay / 1000} s`}</button>`,
+  )}</div>`;
+}

@@ -1,0 +1,104 @@
+/** How late is it all? The link one chooses, and what becomes of each robot's commands. */
+import { html, useEffect, useMemo } from '../../vendor/preact.js';
+import { driveOf, modeOf, robots, rowOf, rows } from '../store.js';
+import { worldNow } from '../net/world_time.js';
+import { Chart } from '../charts/chart.js';
+import { History } from '../charts/history.js';
+import { driven } from '../shell/route.js';
+import { ModeMark } from '../ui/icon.js';
+import { isNumber, msText } from '../ui/words.js';
+import { LinkPanel } from './link_panel.js';
+import { PatternSelect } from './pattern_select.js';
+
+const SPAN_S = 60;
+const SAMPLE_MS = 500;
+const MOST_LINES = 4;
+const MOST_ROWS = 50;
+const DASHES = [undefined, [6, 3], [2, 3], [10, 3, 2, 3]];
+
+/** @typedef {import('../types.js').Thing} Thing */
+
+const KINDS = /** @type {{title: string, unit: string, least: number, read: (i: number) => number | null}[]} */ ([
+  { title: 'Command age', unit: 'ms', least: 100, read: (i) => driveOf(i)?.command_age_ms ?? null },
+  { title: 'Round trip', unit: 'ms', least: 100, read: (i) => driveOf(i)?.round_trip_ms ?? null },
+  { title: 'Commands applied', unit: 'per second', least: 10, read: (i) => rowOf(i)?.commands_hz ?? null },
+  { title: 'Commands waiting in the robot', unit: '', least: 5, read: (i) => rowOf(i)?.queue ?? null },
+  { title: 'Lost on the link', unit: 'so far', least: 5, read: (i) => rowOf(i)?.lost ?? null },
+]);
+
+/** The page. */
+export function NetworkPage() {
+  return html`<main class="page network-page" id="main" tabindex="-1">
+    <h1 class="hidden">Network</h1>
+    <${LinkPanel} />
+    <${Figures} />
+    <${Charts} />
+  </main>`;
+}
+
+/** The robots on the page for driving first, then the others. */
+function inOrder() {
+  const first = driven.value;
+  return [...first, ...robots.value.filter((robot) => !first.includes(robot))];
+}
+
+function Figures() {
+  void rows.value;
+  const list = inOrder();
+  const heads = ['Robot', 'Mode', 'Pattern', 'Commands', 'Waiting', 'Lost', 'Refused', 'Command age', 'Round trip'];
+  const units = ['', '', '', '1/s', '', '', '', 'ms', 'ms'];
+  return html`<section class="panel figures-panel" aria-label="Figures">
+    <h2>Each robot <span class="count">${rows.value?.dropped ?? 0} lines dropped on the way to this page</span></h2>
+    <div class="scrolls" tabindex="0" role="group" aria-label="Table, scrolls sideways"><table><thead><tr>
+      ${heads.map((head, n) => html`<th scope="col">${head}${units[n] && html`<small> ${units[n]}</small>`}</th>`)}
+    </tr></thead><tbody>
+      ${list.slice(0, MOST_ROWS).map((robot) => html`<${Row} key=${robot.i} robot=${robot} />`)}
+    </tbody></table></div>
+    ${list.length > MOST_ROWS && html`<p class="soft">and ${list.length - MOST_ROWS} more robots</p>`}
+  </section>`;
+}
+
+/** @param {{robot: Thing}} props */
+function Row({ robot }) {
+  const row = rowOf(robot.i);
+  const drive = driveOf(robot.i);
+  const number = (/** @type {number | null | undefined} */ value, digits = 0) =>
+    isNumber(value) ? /** @type {number} */ (value).toFixed(digits) : '–';
+  return html`<tr>
+    <th scope="row">${robot.label}</th>
+    <td><${ModeMark} mode=${modeOf(robot.i)} /> ${modeOf(robot.i)}</td>
+    <td><${PatternSelect} robot=${robot} /></td>
+    <td class="n">${number(row?.commands_hz, 1)}</td><td class="n">${number(row?.queue)}</td>
+    <td class="n">${number(row?.lost)}</td><td class="n">${number(row?.refused)}</td>
+    <td class="n">${msText(drive?.command_age_ms)}</td><td class="n">${msText(drive?.round_trip_ms)}</td>
+  </tr>`;
+}
+
+function Charts() {
+  const shown = inOrder().slice(0, MOST_LINES);
+  const key = shown.map((robot) => robot.i).join();
+  const histories = useMemo(() => KINDS.map(() => new History(shown.length, SPAN_S + 10)), [key]);
+  useEffect(() => {
+    const timer = window.setInterval(() => {
+      const time = worldNow() / 1000;
+      KINDS.forEach((kind, n) => histories[n].add(time, shown.map((robot) => kind.read(robot.i))));
+    }, SAMPLE_MS);
+    return () => window.clearInterval(timer);
+  }, [histories]);
+  void rows.value;
+  const lines = shown.map((robot, n) => ({
+    label: robot.label,
+    colour: `pattern-${rowOf(robot.i)?.pattern}`,
+    dash: DASHES[n],
+  }));
+  return html`<section class="panel" aria-label="Charts">
+    <h2>On one time axis <span class="count">the last ${SPAN_S} s of the world's time</span></h2>
+    <p class="figures">${shown.map(
+      (robot, n) => html`<span><i class=${`line line-${n} ${lines[n].colour}`}></i>${robot.label}</span>`,
+    )}</p>
+    ${KINDS.map(
+      (kind, n) => html`<${Chart} title=${kind.title} unit=${kind.unit} lines=${lines} span=${SPAN_S}
+        least=${kind.least} sync="network" read=${() => histories[n].read()} />`,
+    )}
+  </section>`;
+}

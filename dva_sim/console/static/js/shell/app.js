@@ -1,0 +1,80 @@
+/** The shell: bar, rail, warnings, and the page that the address names. */
+import { html, render } from '../../vendor/preact.js';
+import { clock, connection, notice, scene } from '../store.js';
+import { DrivePage } from '../drive/drive_page.js';
+import { Help } from '../help/help.js';
+import { MapPage } from '../map/map_page.js';
+import { NetworkPage } from '../network/network_page.js';
+import { Tour, TourButton } from '../tour/tour.js';
+import { Icon } from '../ui/icon.js';
+import { Bar } from './bar.js';
+import { addressOf, page } from './route.js';
+
+const PAGES = /** @type {[string, string, string][]} */ ([
+  ['map', 'Map', 'map'],
+  ['drive', 'Drive', 'gamepad-2'],
+  ['network', 'Network', 'activity'],
+]);
+const BODIES = /** @type {Record<string, any>} */ ({
+  map: MapPage,
+  drive: DrivePage,
+  network: NetworkPage,
+});
+
+/** @param {HTMLElement} where */
+export function showApp(where) {
+  where.replaceChildren();
+  render(html`<${App} />`, where);
+}
+
+function App() {
+  const Page = BODIES[page.value];
+  return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
+    <${Bar} /><${Rail} />
+    <div class="body"><${Warnings} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
+    <${Tour} /><${Help} />`;
+}
+
+/** @param {Event} event */
+function skip(event) {
+  event.preventDefault();
+  document.getElementById('main')?.focus();
+}
+
+function Rail() {
+  return html`<nav class="rail" aria-label="Pages">
+    ${PAGES.map(
+      ([name, title, icon]) => html`<a href=${addressOf(name)}
+        aria-current=${page.value === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
+    )}
+    <${TourButton} />
+  </nav>`;
+}
+
+function Waiting() {
+  const text =
+    connection.value === 'lost'
+      ? 'The world cannot be reached. Trying again …'
+      : 'Waiting for the world …';
+  return html`<main class="page waiting" id="main" tabindex="-1"><h1>dva-sim</h1><p>${text}</p></main>`;
+}
+
+/** What is wrong stands out, and says what follows from it. */
+function Warnings() {
+  const { lag_s: lag, held_by_lag: held } = clock.value;
+  const limit = Math.round(1000 * (scene.value?.lag_limit_s ?? 0.25));
+  const ended = !['open', 'connecting', 'lost'].includes(connection.value);
+  return html`<div class="warnings" role="alert">
+    ${held &&
+    html`<p class="warning">Robots are held: the world runs ${Math.round(1000 * lag)} ms behind
+      real time, and beyond ${limit} ms what you see is no longer what you steer. They can be
+      started again when it has caught up.</p>`}
+    ${connection.value === 'lost' &&
+    html`<p class="warning">The connection to the world is lost; what you see is old. Robots that
+      you drove have been stopped. Trying again …</p>`}
+    ${ended && html`<p class="warning">The world has ended: ${connection.value}</p>`}
+    ${notice.value &&
+    html`<p class="warning">${notice.value} <button type="button" class="plain"
+      aria-label="Dismiss" onClick=${() => (notice.value = '')}><${Icon} name="x" /></button></p>`}
+  </div>`;
+}

@@ -1,0 +1,81 @@
+/** What is always in sight: time, link, age of the data, alarms, who one is, emergency stop. */
+import { html } from '../../vendor/preact.js';
+import { clock, connection, link, maySteer, you } from '../store.js';
+import { act, emergencyStop } from '../net/actions.js';
+import { roundTrip } from '../net/round_trip.js';
+import { pageAge, worldNow } from '../net/world_time.js';
+import { alarms } from '../map/shown.js';
+import { Icon, SeverityMark } from '../ui/icon.js';
+import { useEvery } from '../ui/every.js';
+import { clockText, secondsText } from '../ui/words.js';
+import { dark, switchTheme } from './theme.js';
+import { openHelp } from '../help/help.js';
+
+const OLD_S = 1;
+
+/** The bar. */
+export function Bar() {
+  return html`<header class="bar">
+    <${Time} /><${Link} /><${Age} /><${Alarms} /><span class="gap"></span><${Who} />
+    <button type="button" class="plain" onClick=${openHelp} aria-label="Help" title="Help (?)">
+      <${Icon} name="circle-question-mark" /></button>
+    <button type="button" class="plain" onClick=${switchTheme}
+      aria-label=${dark.value ? 'Light colours' : 'Dark colours'}
+      title=${dark.value ? 'Light colours' : 'Dark colours'}>
+      <${Icon} name=${dark.value ? 'sun' : 'moon'} /></button>
+    <button type="button" class="emergency" onClick=${emergencyStop} title="Stops all robots at once (Shift+Esc)">
+      <${Icon} name="octagon-x" />Emergency stop</button>
+  </header>`;
+}
+
+function Time() {
+  useEvery(200);
+  const { factor, paused } = clock.value;
+  const name = paused ? 'Go on' : 'Pause';
+  return html`<span class="item time" title="Time of the world, and how fast it runs">
+    <span class="figure">${clockText(worldNow())}</span>
+    <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
+    <button type="button" class="plain" disabled=${!maySteer.value} aria-label=${name} title=${name}
+      onClick=${() => act('pace', { paused: !paused })}>
+      <${Icon} name=${paused ? 'play' : 'pause'} /></button>
+  </span>`;
+}
+
+function Link() {
+  const setting = link.value;
+  const modelled = (setting?.kind ?? 'modelled') === 'modelled';
+  const delay = setting ? `${Math.round(1000 * setting.delay_s)} ms` : '–';
+  const trace = setting?.trace ? `, ${setting.trace}` : '';
+  const loss = setting?.loss ? `, ${Number((100 * setting.loss).toFixed(1))} % lost` : '';
+  return html`<span class=${modelled ? 'item link modelled' : 'item link'} role="status"
+    aria-label="Link" title="The link that lies between the console and the robots, one way">
+    ${modelled ? 'modelled' : 'real'} ${delay}${loss}${trace}</span>`;
+}
+
+function Age() {
+  useEvery(250);
+  const age = pageAge();
+  const old = age > OLD_S || connection.value !== 'open';
+  const known = Number.isFinite(age);
+  const error = roundTrip.value.error;
+  const more = Number.isNaN(error) ? '' : `; to the server and back ${roundTrip.value.ms.toFixed(1)} ms, clocks ±${error.toFixed(1)} ms`;
+  return html`<span class=${old ? 'item age old' : 'item age'} title=${`How old the newest word from the world is${more}`}>
+    page ${known ? secondsText(age) : '–'}</span>`;
+}
+
+function Alarms() {
+  const counts = alarms();
+  return html`<a class="item alarms" href="#/map" title="Events that nobody has dealt with yet, by severity">
+    ${Object.entries(counts).map(
+      ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
+        <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
+    )}</a>`;
+}
+
+function Who() {
+  const me = you.value;
+  if (!me) return null;
+  const role = me.role === 'drive' ? 'may drive' : 'may only look';
+  return html`<span class="item who" title="Who you are here, and what your address allows">
+    ${me.client}, ${role}</span>`;
+}

@@ -1,0 +1,19 @@
+/** Keys that act on every page. */
+import { emergencyStop } from '../net/actions.js';
+import { openHelp } from '../help/help.js';
+
+const WRITING = 'input:not([type=range]), textarea, select';
+
+/** From now on. */
+export function listenForKeys() {
+  window.addEventListener('keydown', (event) => {
+    if (event.key === 'Escape' && event.shiftKey) {
+      event.preventDefault();
+      if (!event.repeat) emergencyStop();
+    }
+    if (event.key === '?' && !isWriting(event.target)) openHelp();
+  });
+}
+
+/** @param {EventTarget | null} target */
+export const isWriting = (target) => target instanceof Element && target.matches(WRITING);

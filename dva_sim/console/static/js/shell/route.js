@@ -1,0 +1,35 @@
+/** Which page is shown, in the address: a reload or a sent link shows the same. */
+import { computed, signal } from '../../vendor/preact.js';
+import { robots } from '../store.js';
+
+const PAGES = ['map', 'drive', 'network'];
+const MOST_AT_ONCE = 2;
+const hash = signal(location.hash);
+window.addEventListener('hashchange', () => (hash.value = location.hash));
+
+const parts = computed(() => {
+  const [path, query = ''] = hash.value.replace(/^#\/?/, '').split('?');
+  return { path, query: new URLSearchParams(query) };
+});
+
+export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : 'map'));
+
+/** The robots that are looked at or driven: those of the address, else the first. */
+export const driven = computed(() => {
+  const wanted = (parts.value.query.get('robots') ?? '').split(',');
+  const found = wanted.flatMap((label) => robots.value.filter((robot) => robot.label === label));
+  const some = found.length ? found : robots.value.slice(0, 1);
+  return some.slice(0, MOST_AT_ONCE);
+});
+
+/** @param {string} name */
+export const addressOf = (name) => {
+  const chosen = parts.value.query.get('robots');
+  return `#/${name}${chosen ? `?robots=${encodeURIComponent(chosen)}` : ''}`;
+};
+
+/** @param {string[]} labels */
+export function chooseRobots(labels) {
+  const unique = [...new Set(labels.filter(Boolean))].slice(0, MOST_AT_ONCE);
+  location.hash = `#/drive?robots=${unique.map(encodeURIComponent).join(',')}`;
+}

@@ -1,0 +1,61 @@
+/** The newest state of the world, as signals: components read them, messages write them. */
+import { computed, signal } from '../vendor/preact.js';
+import { Tracks } from './map/tracks.js';
+
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').Scene | null>} */
+export const scene = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').Rows | null>} */
+export const rows = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').Hazards>} */
+export const hazards = signal({ hazards: [], fields: [] });
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').SiteEvent[]>} */
+export const events = signal([]);
+/** @type {import('../vendor/preact.js').Signal<{t: number, who: string, what: string}[]>} */
+export const story = signal([]);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */
+export const seat = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
+export const you = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
+export const selection = signal(null);
+/** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
+export const connection = signal('connecting');
+/** Why there are no camera pictures; empty while there are. */
+export const pictures = signal('');
+/** What went wrong last, or was refused; empty when there is nothing to tell. */
+export const notice = signal('');
+
+/** Where everything that moves is; not a signal, for it is drawn, not rendered. */
+export const tracks = new Tracks();
+
+export const clock = computed(
+  () => rows.value?.clock ?? { factor: 1, paused: false, lag_s: 0, held_by_lag: false },
+);
+export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
+export const robots = computed(
+  () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
+);
+export const maySteer = computed(() => you.value?.role === 'drive');
+
+const robotRows = computed(
+  () => new Map((rows.value?.robots ?? []).map((row) => [row.i, row])),
+);
+const doings = computed(
+  () => new Map((rows.value?.people ?? []).map((person) => [person.i, person.doing])),
+);
+
+/** @param {number} i */
+export const thingAt = (i) => scene.value?.things.find((thing) => thing.i === i);
+/** @param {string} label */
+export const thingNamed = (label) => scene.value?.things.find((thing) => thing.label === label);
+/** @param {number} i */
+export const rowOf = (i) => robotRows.value.get(i);
+/** @param {number} i */
+export const doingOf = (i) => doings.value.get(i) ?? '';
+/** @param {number} i */
+export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
+/**
+ * The mode of a robot, as its driver hears it first, else as everybody does.
+ * @param {number} i
+ */
+export const modeOf = (i) => driveOf(i)?.mode || rowOf(i)?.mode || 'Idle';

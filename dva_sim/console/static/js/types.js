@@ -1,0 +1,53 @@
+/**
+ * What the page is told, by name. Lengths in metres, angles in radians, times in milliseconds of
+ * the world's clock, unless a name says otherwise.
+ *
+ * @typedef {{i: number, id: string, label: string, kind: string, radius_m: number,
+ *   max_speed_mps: number, max_turn_rate_radps: number,
+ *   camera?: {field_of_view_deg: number, range_m: number, rate_hz: number}}} Thing
+ *
+ * @typedef {{name: string, polygon_m: number[][], floor: string, outdoor: boolean}} Room
+ * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
+ *   cells: string, heading_rad?: number}} Raster
+ * @typedef {{name: string, extent_m: number[], rooms: Room[], walls_m: number[][],
+ *   solids_m: number[][][], doors_m: number[][], exits_m: number[][], raster?: Raster}} Site
+ *
+ * @typedef {{delay_s: number, jitter_s: number, loss: number, rate_bps: number | null,
+ *   processing_s: number, kind?: string, trace?: string | null}} LinkSetting
+ * @typedef {{robots: number[], goals_m: number[][], radius_m: number}} TourPlan
+ * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
+ *   patterns: {name: string, title: string}[], link: LinkSetting,
+ *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
+ *   lag_limit_s: number, tour?: TourPlan | null}} Scene
+ *
+ * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean}} Clock
+ * @typedef {{i: number, mode: string, pattern: string, battery: number | null,
+ *   holder: string | null, holder_label?: string | null, session_age_s?: number | null,
+ *   watchdog_left_s: number | null, stands: string, set_speed_mps: number,
+ *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
+ *   refused: number}} RobotRow
+ * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
+ *   people: {i: number, doing: string}[]}} Rows
+ *
+ * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
+ *   severity: number, contained: boolean}} Hazard
+ * @typedef {Raster & {kind: string, full: number | string}} Field
+ * @typedef {{hazards: Hazard[], fields: Field[]}} Hazards
+ *
+ * @typedef {{number: number, kind: string, x_m: number, y_m: number, room: string,
+ *   severity: string, state: string, since_ms: number, reported_ms: number,
+ *   assigned: string[]}} SiteEvent
+ *
+ * @typedef {{i: number, pattern: string, phase: string, mode: string, session?: number,
+ *   wanted: number[], command: number[], sent: number, answered: number, timeouts: number,
+ *   refused: number, superseded: number, command_age_ms: number | null,
+ *   round_trip_ms: number | null, picture_ms: number | null, loop_ms: number | null}} SeatDrive
+ * @typedef {{event: number, kind: string, robot: number, x_m: number, y_m: number}} Order
+ * @typedef {{t: number, seat: string, phase: string, order: Order | null, alert: string,
+ *   drives: SeatDrive[]}} Seat
+ *
+ * @typedef {{client: string, role: string}} You
+ * @typedef {{id: string, ok: boolean, text: string}} Done
+ * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
+ */
+export {};

@@ -1,0 +1,156 @@
+"""A browser, and worlds to look at with it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from patience import PATIENCE_S, becomes
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+MISSING = "these tests need Chromium: apt-get install chromium (make test leaves them out)"
+FAKE = Path(__file__).parents[1] / "fake_world.py"
+
+expect.set_options(timeout=1000 * PATIENCE_S / 4)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker("browser")
+
+
+class World(NamedTuple):
+    """Where a world is shown.
+
+    Attributes:
+        drive: Address with the token for driving.
+        look: The same for looking only.
+    """
+
+    drive: str
+    look: str
+
+    @property
+    def base(self) -> str:
+        """Without a token."""
+        return self.drive.partition("?")[0]
+
+
+@contextmanager
+def running(folder: Path, command: list[str]) -> Iterator[World]:
+    """A world from its first word until the test is over."""
+    out = folder / f"world-{len(list(folder.iterdir()))}.out"
+    with out.open("wb") as file:
+        process = subprocess.Popen([sys.executable, *command], stdout=file, stderr=file)
+    try:
+        told = re.compile(r"^(Console|Look only): +(\S+)", re.MULTILINE)
+        becomes(lambda: "Console:" in out.read_text() or process.poll() is not None)
+        becomes(lambda: out.read_text().endswith("\n"))
+        found = dict(told.findall(out.read_text()))
+        assert "Console" in found, out.read_text()
+        yield World(found["Console"], found.get("Look only", found["Console"]))
+    finally:
+        process.terminate()
+        process.wait(PATIENCE_S)
+
+
+@pytest.fixture(scope="session")
+def fake(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., World]]:
+    """Invented worlds, each started once for all tests that want it."""
+    known: dict[tuple[str, ...], tuple[Any, World]] = {}
+    folder = tmp_path_factory.mktemp("worlds")
+
+    def start(*words: str) -> World:
+        if words not in known:
+            manager = running(folder, [str(FAKE), *words])
+            known[words] = manager, manager.__enter__()
+        return known[words][1]
+
+    yield start
+    for manager, _ in known.values():
+        manager.__exit__(None, None, None)
+
+
+@pytest.fixture
+def own_world(tmp_path: Path) -> Iterator[Callable[..., World]]:
+    """Worlds that nobody else looks at."""
+    managers: list[Any] = []
+
+    def start(*command: str) -> World:
+        managers.append(running(tmp_path, list(command)))
+        return managers[-1].__enter__()
+
+    yield start
+    for manager in managers:
+        manager.__exit__(None, None, None)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """The system's own."""
+    path = next((found for name in NAMES if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.fail(MISSING, pytrace=False)
+    with sync_playwright() as playwright:
+        arguments = ["--no-sandbox", "--disable-gpu"]
+        browser = playwright.chromium.launch(executable_path=path, args=arguments)
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A person's browser: pages with what went wrong on them.
+
+    Attributes:
+        errors: What the console of the pages said, and what no script caught.
+    """
+
+    def __init__(self, context: BrowserContext) -> None:
+        self.context = context
+        self.errors: list[str] = []
+
+    def open(self, address: str, page: str = "map") -> Page:
+        """Go to a page and wait until the world is there."""
+        tab = self.context.new_page()
+        tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        tab.on("console", lambda said: self._note(said.type, said.text))
+        tab.goto(f"{address}#/{page}")
+        expect(
+            tab.get_by_role("region", name="Map").or_(tab.locator(".network-page"))
+        ).to_be_visible()
+        return tab
+
+    def _note(self, kind: str, text: str) -> None:
+        if kind == "error":
+            self.errors.append(text)
+
+
+@pytest.fixture
+def visits(chromium: Browser) -> Iterator[Callable[..., Visit]]:
+    """As many browsers as are asked for; none may have complained in the end."""
+    made: list[Visit] = []
+
+    def visit(width: int = 1280, height: int = 800, **options: Any) -> Visit:
+        size: Any = {"width": width, "height": height}
+        made.append(Visit(chromium.new_context(viewport=size, **options)))
+        return made[-1]
+
+    yield visit
+    for each in made:
+        each.context.close()
+    assert [error for each in made for error in each.errors] == []
+
+
+@pytest.fixture
+def visit(visits: Callable[..., Visit]) -> Visit:
+    """One browser."""
+    return visits()

@@ -1,0 +1,241 @@
+"""Taking a robot, holding to drive, letting go, and everything that interrupts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from patience import becomes
+from playwright.sync_api import Page, expect
+
+@pytest.fixture
+def page(fake, visit) -> Iterator[Page]:
+    """The page for driving, its robot taken and started."""
+    page = visit.open(fake("--robots", "3", "--people", "4").drive, "drive")
+    listen(page)
+    take(page)
+    yield page
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+
+
+def listen(page: Page) -> None:
+    """Note what the page sends to steer by."""
+    page.evaluate(
+        """() => { window.sent = []; const send = WebSocket.prototype.send;
+        WebSocket.prototype.send = function (text) {
+          window.sent.push(JSON.parse(text)); return send.call(this, text); }; }"""
+    )
+
+
+def take(page: Page) -> None:
+    """Take control and start."""
+    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+
+
+def inputs(page: Page) -> list[dict[str, object]]:
+    """What was steered so far."""
+    return [line for line in page.evaluate("window.sent") if line.get("do") == "input"]
+
+
+def actions(page: Page) -> list[str]:
+    """What was asked for so far."""
+    return [line["do"] for line in page.evaluate("window.sent") if line.get("do") != "ping"]
+
+
+@contextmanager
+def held(page: Page, key: str) -> Iterator[None]:
+    """A key, as long as the block lasts."""
+    page.keyboard.down(key)
+    yield
+    page.keyboard.up(key)
+
+
+@pytest.mark.parametrize(
+    ("keys", "speed", "turn"),
+    [
+        (["ArrowUp"], 1, 0),
+        (["KeyW"], 1, 0),
+        (["ArrowUp", "ArrowLeft"], 1, 1),
+        (["KeyW", "KeyD"], 1, -1),
+        (["ArrowLeft", "ArrowRight"], 0, 0),
+        (["Shift", "ArrowUp"], 0.4, 0),
+        (["ArrowDown"], 0, 0),  # there is no reverse
+    ],
+)
+def test_keys_steer_while_they_are_held(page: Page, keys: list[str], speed, turn) -> None:
+    for key in keys:
+        page.keyboard.down(key)
+    assert becomes(lambda: len(inputs(page)) > 5)
+    last = inputs(page)[-1]
+    assert (last["speed"], last["turn"], last["held"]) == (speed, turn, True)
+
+    for key in keys:
+        page.keyboard.up(key)
+    assert becomes(lambda: inputs(page)[-1]["held"] is False)
+    assert inputs(page)[-1]["speed"] == 0
+
+
+def test_a_robot_moves_while_a_key_is_held(page: Page) -> None:
+    with held(page, "ArrowUp"):
+        expect(page.locator(".stands")).to_contain_text("Set point 0.50 m/s")
+        expect(page.get_by_role("slider", name="Speed")).to_have_value("0.5")
+    expect(page.get_by_role("slider", name="Speed")).to_have_value("0")
+
+
+@pytest.mark.parametrize(
+    "interruption",
+    [
+        "window.dispatchEvent(new Event('blur'))",
+        "window.dispatchEvent(new Event('pagehide'))",
+        "document.dispatchEvent(new Event('freeze'))",
+        "Object.defineProperty(document, 'hidden', {value: true, configurable: true});"
+        "document.dispatchEvent(new Event('visibilitychange'));"
+        "Object.defineProperty(document, 'hidden', {value: false, configurable: true});",
+        "screen.orientation.dispatchEvent(new Event('change'))",
+    ],
+)
+def test_what_interrupts_stops_at_once_and_a_held_key_does_not_go_on(page, interruption) -> None:
+    with held(page, "ArrowUp"):
+        assert becomes(lambda: inputs(page))
+        page.evaluate(interruption)
+        assert becomes(lambda: "gone" in actions(page))
+        assert inputs(page)[-1]["held"] is False
+        count = len(inputs(page))
+        page.keyboard.down("ArrowUp")  # the repeat of a key that is still down
+        page.wait_for_timeout(200)
+        assert len(inputs(page)) == count
+        expect(page.locator(".hint")).to_contain_text("take hold again")
+
+
+def test_a_new_press_drives_again_after_an_interruption(page: Page) -> None:
+    with held(page, "ArrowUp"):
+        assert becomes(lambda: inputs(page))
+        page.evaluate("window.dispatchEvent(new Event('blur'))")
+    with held(page, "ArrowUp"):
+        assert becomes(lambda: inputs(page)[-1]["held"] is True)
+
+
+def test_the_stick_steers_while_a_pointer_holds_it(page: Page) -> None:
+    box = page.locator(".stick").bounding_box()
+    assert box
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 0.21 * box["width"], y - box["height"])
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["speed"] == 1)
+    assert inputs(page)[-1]["turn"] == pytest.approx(-0.5, abs=0.03)  # to the right
+    page.mouse.up()
+    assert becomes(lambda: inputs(page)[-1]["held"] is False)
+
+
+def test_a_slider_springs_back_when_the_pointer_lets_it_go(page: Page) -> None:
+    slider = page.get_by_role("slider", name="Speed")
+    box = slider.bounding_box()
+    assert box
+
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + box["height"] / 2)
+    page.mouse.down()
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    assert inputs(page)[-1]["speed"] == pytest.approx(0.5, abs=0.05)
+    page.mouse.up()
+    assert becomes(lambda: inputs(page)[-1]["held"] is False)
+    expect(slider).to_have_value("0")
+
+
+def test_a_slider_set_by_assistive_technology_counts_while_it_has_the_focus(page: Page) -> None:
+    page.get_by_role("slider", name="Speed").fill("0.3")
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    page.get_by_role("slider", name="Turn rate").fill("-15")  # to the right
+    assert becomes(lambda: inputs(page)[-1]["turn"] == pytest.approx(-0.5, abs=0.02))
+
+    page.get_by_role("button", name="Stop", exact=True).focus()
+    assert becomes(lambda: inputs(page)[-1]["held"] is False)
+
+
+def test_keys_of_a_slider_spring_back_too(page: Page) -> None:
+    slider = page.get_by_role("slider", name="Speed")
+    slider.focus()
+    page.keyboard.down("ArrowRight")
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    page.keyboard.up("ArrowRight")
+    assert becomes(lambda: inputs(page)[-1]["held"] is False)
+
+
+def test_input_comes_25_times_a_second_while_something_is_held(page: Page) -> None:
+    with held(page, "ArrowUp"):
+        assert becomes(lambda: len(inputs(page)) > 40)
+    numbers = [line["n"] for line in inputs(page)]
+
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def test_emergency_stop_and_its_key_stop_all_robots(page: Page) -> None:
+    for press in (
+        lambda: page.get_by_role("button", name="Emergency stop").click(),
+        lambda: page.keyboard.press("Shift+Escape"),
+    ):
+        with page.expect_response("**/api/emergency") as answer:
+            press()
+        assert answer.value.json()["ok"]
+        assert '"all"' in (answer.value.request.post_data or "")
+        expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+        page.get_by_role("button", name="Start", exact=True).click()
+        expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+
+
+def test_two_robots_get_the_same_hand_under_two_patterns(fake, visit) -> None:
+    page = visit.open(fake("--robots", "3", "--people", "4").drive, "drive")
+    listen(page)
+    page.get_by_role("button", name="robot-2 beside it").click()
+    page.get_by_label("Pattern of robot-1").select_option("req-rep")
+    page.get_by_label("Pattern of robot-2").select_option("latest-wins")
+    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="Start", exact=True).click()
+
+    mode = page.get_by_role("status", name="Mode")
+    expect(mode).to_have_text("robot-1 Teleoperation, robot-2 Teleoperation")
+    taken = [line for line in page.evaluate("window.sent") if line.get("do") == "take"]
+    assert taken[0]["robots"] == [0, 1]
+    with held(page, "ArrowUp"):
+        for place in (0, 1):
+            expect(page.locator(".stands").nth(place)).to_contain_text("Set point 0.50 m/s")
+    expect(page.get_by_role("img", name="What robot-2 sees")).to_be_visible()
+    page.get_by_role("button", name="Release control").click()
+    expect(mode).not_to_contain_text("Teleoperation")
+
+
+def test_a_reload_keeps_control_but_drives_no_further(page: Page) -> None:
+    who = page.locator(".who").inner_text()
+    with held(page, "ArrowUp"):
+        assert becomes(lambda: inputs(page))
+        page.reload()
+        expect(page.get_by_role("button", name="Release control")).to_be_enabled()
+        expect(page.get_by_role("slider", name="Speed")).to_have_value("0")
+    expect(page.locator(".who")).to_have_text(who)
+
+
+def test_the_picture_tells_its_age_and_goes_on(page: Page) -> None:
+    picture = page.get_by_role("img", name="What robot-1 sees")
+    expect(page.locator(".picture-age")).to_contain_text("s old")
+    first = picture.get_attribute("data-frame")
+
+    assert becomes(lambda: picture.get_attribute("data-frame") != first)
+
+
+def test_charts_draw_what_was_measured(page: Page) -> None:
+    region = page.get_by_role("region", name="Latency")
+    expect(region.locator("canvas")).to_have_count(3)
+    assert becomes(lambda: "ms" in region.locator(".figures b").first.inner_text())
+    assert becomes(lambda: page.evaluate(COLOURED) > 20)
+
+
+COLOURED = """() => { const c = document.querySelector('.latency canvas');
+  const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;
+  for (let i = 0; i < d.length; i += 4)
+    if (d[i + 3] > 200 && Math.max(d[i], d[i+1], d[i+2]) - Math.min(d[i], d[i+1], d[i+2]) > 90) n++;
+  return n; }"""

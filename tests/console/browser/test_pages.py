@@ -1,0 +1,155 @@
+"""The pages for everyone: names, themes, sizes, keys, and no fault that axe-core finds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, Response, expect
+
+AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text()
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+PAGES = {"map": "Map", "drive": "Drive", "network": "Network"}
+
+
+def faults(page: Page) -> list[str]:
+    """What axe-core holds to be serious, or worse."""
+    page.evaluate(AXE)
+    options = json.dumps(
+        {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}
+    )
+    found = page.evaluate(f"axe.run(document, {options})")["violations"]
+    grave = [fault for fault in found if fault["impact"] in {"serious", "critical"}]
+    return [f"{fault['id']}: {node['html'][:160]}" for fault in grave for node in fault["nodes"]]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("width", [360, 1280, 2560])
+def test_axe_finds_nothing_serious(fake, visits, scheme: str, name: str, width: int) -> None:
+    page = visits(width, 800, color_scheme=scheme).open(fake().drive, name)
+    page.get_by_text("Legend").first.click() if name == "map" else None
+
+    assert faults(page) == []
+
+
+def test_axe_finds_a_fault_that_is_planted(fake, visit) -> None:
+    page = visit.open(fake().drive)
+    page.evaluate("document.querySelector('.map-buttons button').removeAttribute('aria-label')")
+    page.evaluate("document.querySelector('.map-buttons button').removeAttribute('title')")
+
+    assert any("button-name" in fault for fault in faults(page))
+
+
+def test_axe_finds_nothing_serious_in_help_and_tour(fake, visit) -> None:
+    page = visit.open(fake().drive, "drive")
+    page.get_by_role("button", name="Help").click()
+    expect(page.get_by_role("dialog", name="Help")).to_be_visible()
+
+    assert faults(page) == []
+
+
+@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("width", [360, 740, 1280, 2560, 3840])
+def test_nothing_is_wider_than_the_screen(fake, visits, name: str, width: int) -> None:
+    page = visits(width, 740).open(fake().drive, name)
+
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('.body').scrollWidth") <= width
+    stop = page.get_by_role("button", name="Emergency stop").bounding_box()
+    assert stop is not None
+    assert 0 <= stop["x"] <= width - stop["width"]
+    assert stop["height"] >= 36
+
+
+def test_public_names_are_on_their_pages_once(fake, visit) -> None:
+    page = visit.open(fake().drive, "drive")
+
+    for link in PAGES.values():
+        expect(page.get_by_role("link", name=link)).to_have_count(1)
+    for button in ("Take control", "Release control", "Start", "Stop", "Emergency stop"):
+        expect(page.get_by_role("button", name=button, exact=True)).to_have_count(1)
+    for slider in ("Speed", "Turn rate", "Delay", "Jitter", "Loss", "Time factor"):
+        expect(page.get_by_role("slider", name=slider)).to_have_count(1)
+    for status in ("Mode", "Link"):
+        expect(page.get_by_role("status", name=status)).to_have_count(1)
+    for region in ("Camera", "Map", "Latency"):
+        expect(page.get_by_role("region", name=region)).to_have_count(1)
+
+
+@pytest.mark.parametrize("slider", ["Delay", "Jitter", "Loss", "Bandwidth", "Time factor"])
+def test_sliders_of_the_link_are_on_the_page_network_too(fake, visit, slider: str) -> None:
+    page = visit.open(fake().drive, "network")
+
+    expect(page.get_by_role("slider", name=slider)).to_have_count(1)
+
+
+def test_pages_are_reached_by_their_links_and_stay_after_a_reload(fake, visit) -> None:
+    page = visit.open(fake().drive)
+
+    page.get_by_role("link", name="Network").click()
+    expect(page.get_by_role("heading", name="Network", level=1)).to_be_attached()
+    page.reload()
+    expect(page.get_by_role("heading", name="Network", level=1)).to_be_attached()
+
+
+def test_colours_change_by_a_button_and_stay(fake, visits) -> None:
+    page = visits(color_scheme="light").open(fake().drive)
+
+    def background() -> str:
+        return str(page.evaluate("getComputedStyle(document.body).backgroundColor"))
+
+    assert background() == "rgb(247, 247, 245)"
+    page.get_by_role("button", name="Dark colours").click()
+    assert background() == "rgb(22, 25, 29)"
+    page.reload()
+    expect(page.get_by_role("button", name="Light colours")).to_be_visible()
+    assert background() == "rgb(22, 25, 29)"
+
+
+def test_focus_can_be_seen_on_everything_that_tab_reaches(fake, visit) -> None:
+    page = visit.open(fake().drive, "drive")
+    reached = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        tag, name, outline = page.evaluate(
+            "(e => [e.tagName, e.innerText || e.id, getComputedStyle(e).outlineStyle])"
+            "(document.activeElement)"
+        )
+        assert outline != "none" or tag == "BODY", name
+        reached.add(name)
+
+    assert {"Emergency stop", "Drive", "Take control", "slider-speed", "slider-delay"} <= reached
+
+
+def test_a_robot_is_taken_and_released_by_keys(fake, visit) -> None:
+    page = visit.open(fake().drive, "drive")
+
+    page.get_by_role("button", name="Take control").focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Release control")).to_be_enabled()
+    page.get_by_role("button", name="Release control").press("Space")
+    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+
+
+def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit) -> None:
+    answers: list[Response] = []
+    page = visit.context.new_page()
+    page.on("response", lambda answer: answers.append(answer))  # as a bound method it fails
+    page.goto(f"{fake().drive}#/map")
+    expect(page.get_by_role("region", name="Map")).to_be_visible()
+    weights = {answer.url: len(answer.body()) for answer in answers if answer.status == 200}
+
+    assert all(url.startswith(fake().base) for url in weights)
+    assert any("leaflet.js" in url for url in weights)
+    assert sum(weights.values()) < 700_000
+
+
+def test_every_page_obeys_its_content_security_policy(fake, visit) -> None:
+    page = visit.open(fake().drive)
+    for name in ("Drive", "Network", "Map"):
+        page.get_by_role("link", name=name).click()
+        expect(page.get_by_role("heading", name=name, level=1)).to_be_attached()
+
+    assert visit.errors == []  # a blocked script or style says so in the console

@@ -1,0 +1,140 @@
+"""What clients say, read with suspicion; and what of it waits for the simulation."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from dva_sim.console.web.actions import ACTIONS, Bucket, Refused, asked_of, id_of, read
+from dva_sim.console.web.outbox import MOST, OutgoingLines
+from dva_sim.console.web.pipes import Lines
+
+LABELS = {"robot-1": 0, "robot-2": 3}
+
+
+def test_robots_are_known_by_index_or_label():
+    asked = asked_of("take", {"robots": ["robot-2", 0, 0]}, LABELS)
+    assert asked == {"do": "take", "robots": [3, 0]}
+
+
+def test_an_emergency_is_for_all_unless_it_says_otherwise():
+    assert asked_of("emergency", {}, LABELS) == {"do": "emergency", "robots": "all"}
+    assert asked_of("emergency", {"robots": [3]}, LABELS)["robots"] == [3]
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "word"),
+    [
+        ("fly", {}, "no such action"),
+        (None, {}, "no such action"),
+        (["take"], {}, "no such action"),
+        ("take", {}, "robots is missing"),
+        ("take", {"robots": [1]}, "robot of this run"),
+        ("take", {"robots": [True]}, "robot of this run"),
+        ("take", {"robots": ["<script>"]}, "robot of this run"),
+        ("take", {"robots": [[]]}, "robot of this run"),
+        ("take", {"robots": "robot-1"}, "list of robots"),
+        ("take", {"robots": [0] * 65}, "list of robots"),
+        ("take", [], "arguments should be an object"),
+        ("start", {"now": 1}, "no such argument"),
+        ("link", {"delay_s": -1}, "delay_s should be a number from 0 to 60"),
+        ("link", {"delay_s": float("nan")}, "should be a number"),
+        ("link", {"loss": "0.1"}, "should be a number"),
+        ("link", {"loss": True}, "should be a number"),
+        ("link", {"rate_bps": 10**400}, "should be a number"),
+        ("pattern", {"robot": 0, "name": "../../x y"}, "should be a name"),
+        ("pattern", {"robot": 0}, "name is missing"),
+        ("pace", {"paused": 1}, "true or false"),
+        ("input", {"n": 1, "speed": 0, "turn": 0, "held": True}, "no such action"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_line(name, given, word):
+    with pytest.raises(Refused, match=word) as error:
+        asked_of(name, given, LABELS)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"n": 1, "speed": 1.01, "turn": 0, "held": True},
+        {"n": 1, "speed": 0, "turn": float("nan"), "held": True},
+        {"n": 1.5, "speed": 0, "turn": 0, "held": True},
+        {"n": 2**60, "speed": 0, "turn": 0, "held": True},
+        {"n": 1, "speed": 0, "turn": 0, "held": "yes"},
+        {"n": 1, "speed": 0, "turn": 0},
+    ],
+)
+def test_input_beyond_its_limits_never_reaches_the_simulation(given):
+    with pytest.raises(Refused):
+        asked_of("input", given, LABELS, silent=True)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[1]", "1", "null", '{"a": NaN}', '{"a": Infinity}', "[" * 9000, b"\xff\xfe"]
+)
+def test_what_is_no_json_object_is_refused(text):
+    with pytest.raises(Refused):
+        read(text)
+
+
+def test_ids_are_short_words():
+    assert id_of("a-1.b:c_D") == "a-1.b:c_D"
+    for value in (None, "", "a b", "x" * 65, 7, "a\n"):
+        with pytest.raises(Refused):
+            id_of(value)
+
+
+def test_a_client_may_say_a_burst_and_then_so_many_a_second():
+    bucket = Bucket(10.0, 20)
+    assert [bucket.takes(100.0) for _ in range(21)].count(True) == 20
+    assert bucket.takes(100.5)
+    assert [bucket.takes(100.5) for _ in range(9)].count(True) == 3  # the refused one cost, too
+
+
+def waiting(lines):
+    found = []
+    while (data := lines.next()) is not None:
+        assert data.endswith(b"\n")
+        found.append(json.loads(data))
+    return found
+
+
+def test_of_inputs_the_newest_waits_and_the_urgent_goes_first():
+    lines = OutgoingLines()
+    for n in range(100):
+        lines.put({"do": "input", "client": "c1", "n": n})
+    lines.put({"do": "link", "client": "c1"})
+    lines.put({"do": "input", "client": "c2", "n": 7})
+    lines.put({"do": "emergency", "client": "c3"})
+    found = [(line["do"], line.get("n")) for line in waiting(lines)]
+    assert found == [("emergency", None), ("link", None), ("input", 99), ("input", 7)]
+
+
+def test_input_of_a_page_that_is_gone_is_forgotten():
+    lines = OutgoingLines()
+    lines.put({"do": "input", "client": "c1", "n": 1})
+    lines.put({"do": "gone", "client": "c1"})
+    assert [line["do"] for line in waiting(lines)] == ["gone"]
+
+
+def test_actions_that_find_no_room_are_refused_but_an_emergency_still_does():
+    lines = OutgoingLines()
+    assert all(lines.put({"do": "link", "client": "c1", "n": n}) for n in range(MOST))
+    assert not lines.put({"do": "link", "client": "c1"})
+    assert lines.put({"do": "emergency", "client": "c1"})
+    assert lines.refused == 1
+
+
+def test_every_action_of_the_contract_is_known():
+    words = {"take", "release", "start", "stop", "emergency", "link", "pattern", "pace"}
+    assert words | {"confirm", "refute", "decline"} <= set(ACTIONS)
+
+
+def test_lines_come_whole_out_of_any_pieces():
+    lines, found = Lines(), []
+    for byte in b'{"a":1}\n{"b":2}\n\n{"c"':
+        found += lines.feed(bytes([byte]))
+    assert found == [b'{"a":1}', b'{"b":2}', b""]
+    assert lines.feed(b":3}\n") == [b'{"c":3}']

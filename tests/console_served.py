@@ -1,0 +1,245 @@
+"""A web process with the test in the place of the simulation, and clients that may be rude."""
+
+from __future__ import annotations
+
+import base64
+import http.client
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, NamedTuple
+
+from patience import PATIENCE_S
+from websockets.sync.client import ClientConnection, connect
+
+from dva_sim.console.frames import ALIVE, Picture, pack
+
+HOSTILE = "<script>alert(1)</script>"
+LABELS = ("robot-1", "robot-2", HOSTILE)
+Line = dict[str, Any]
+
+
+class Answer(NamedTuple):
+    """What came back for a request."""
+
+    status: int
+    headers: dict[str, str]
+    body: bytes
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.body)
+
+
+def scene(labels: tuple[str, ...] = LABELS, **more: Any) -> Line:
+    """The first line of a small run."""
+    things = [
+        {"i": i, "id": f"02:00:00:00:00:{i:02X}", "label": label, "kind": "robot"}
+        for i, label in enumerate(labels)
+    ]
+    things.append({"i": len(labels), "id": "guard-1", "label": "guard-1", "kind": "guard"})
+    origin = {"latitude_deg": 38.66, "longitude_deg": -9.2}
+    site = {"name": "nowhere", "extent_m": [0, 0, 10, 10], "origin": origin}
+    return {"k": "scene", "t": 0, "scenario": "test", "site": site, "things": things, **more}
+
+
+def places(t: int, *rows: list[int]) -> Line:
+    """A line `pos`."""
+    return {"k": "pos", "t": t, "p": list(rows)}
+
+
+class Served:
+    """A web process; the test says what the simulation would say.
+
+    Args:
+        words: More options.
+        begins: Whether the scene is told at once.
+    """
+
+    def __init__(self, *words: str, begins: bool = True) -> None:
+        self.end, theirs = socket.socketpair()
+        self.pictures, their_pictures = socket.socketpair()
+        numbers = theirs.fileno(), their_pictures.fileno()
+        command = [sys.executable, "-m", "dva_sim.console.web", "--fd", str(numbers[0])]
+        command += ["--pictures-fd", str(numbers[1]), *words]
+        self.process = subprocess.Popen(command, pass_fds=numbers, stderr=subprocess.PIPE)
+        theirs.close()
+        their_pictures.close()
+        self._rest = b""
+        self._asked: list[Line] = []
+        self.serving = self.next_asked("serving")
+        self.port: int = self.serving["port"]
+        self.drive, self.look = (_token(self.serving[role]) for role in ("drive", "look"))
+        if begins:
+            self.say(scene())
+
+    # --- the simulation's side -----------------------------------------------------------
+
+    def say(self, *lines: Line) -> None:
+        """Say something as the simulation."""
+        for line in lines:
+            self.end.sendall(json.dumps(line).encode() + b"\n")
+
+    def hear(self, wait: float) -> bool:
+        """Take what is asked for within a moment: False if the process is gone."""
+        ready, _, _ = select.select([self.end], [], [], wait)
+        if not ready:
+            return True
+        data = self.end.recv(1 << 16)
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        self._asked += [json.loads(line) for line in lines]
+        return bool(data)
+
+    def next_asked(self, *kinds: str) -> Line:
+        """The next line of some kinds that the simulation is asked; others are forgotten."""
+        ends = time.monotonic() + PATIENCE_S
+        while time.monotonic() < ends:
+            while self._asked:
+                line = self._asked.pop(0)
+                if line["do"] in kinds:
+                    return line
+            if not self.hear(0.5):
+                break
+        raise TimeoutError(f"nobody asked for {' or '.join(kinds)}")
+
+    def asked_so_far(self) -> list[Line]:
+        """All that was asked and not looked at."""
+        while self.hear(0.0) and select.select([self.end], [], [], 0.05)[0]:
+            pass
+        found, self._asked = self._asked, []
+        return found
+
+    def show(self, robot: int, number: int, jpeg: bytes, captured: int = 0) -> None:
+        """Draw a picture, as the process would that draws."""
+        self.pictures.sendall(pack(Picture(robot, number, captured, captured + 50, jpeg)))
+
+    def live(self) -> None:
+        """Say that somebody draws."""
+        self.pictures.sendall(pack(Picture(ALIVE, 0, 0, 0, b"")))
+
+    # --- clients -------------------------------------------------------------------------
+
+    def ask(
+        self,
+        path: str,
+        method: str = "GET",
+        body: Any = None,
+        token: str | None = None,
+        host: str | None = None,
+        **headers: str,
+    ) -> Answer:
+        """A request, as rude as wanted; header names have `_` for `-`."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        data = body if isinstance(body, bytes | None) else json.dumps(body).encode()
+        sent = {name.replace("_", "-"): value for name, value in headers.items()}
+        sent["Host"] = host or f"127.0.0.1:{self.port}"
+        if token:
+            sent["Cookie"] = f"dva_sim_{self.port}={token}"
+        if data is not None:
+            sent.setdefault("Content-Type", "application/json")
+        try:
+            connection.request(method, path, data, sent)
+            found = connection.getresponse()
+            return Answer(found.status, {k.lower(): v for k, v in found.getheaders()}, found.read())
+        finally:
+            connection.close()
+
+    def socket(
+        self, path: str, token: str | None = None, origin: str | None = "own", **more: Any
+    ) -> ClientConnection:
+        """A WebSocket of a page."""
+        own = f"http://127.0.0.1:{self.port}"
+        headers = {"Cookie": f"dva_sim_{self.port}={token}"} if token else {}
+        connection = connect(
+            f"ws://127.0.0.1:{self.port}{path}",
+            origin=own if origin == "own" else origin,  # type: ignore[arg-type]
+            additional_headers=headers | more,
+            open_timeout=PATIENCE_S,
+            compression=None,
+            max_size=None,
+        )
+        return connection.__enter__()  # it is closed by whoever asked for it
+
+    def page(self, token: str = "", **more: Any) -> Page:
+        """A page that is open and has its first snapshot."""
+        return Page(self, token or self.drive, **more)
+
+    def deaf(self, path: str, token: str) -> socket.socket:
+        """A WebSocket that reads nothing but the answer to its handshake."""
+        raw = socket.create_connection(("127.0.0.1", self.port), PATIENCE_S)
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        key = base64.b64encode(os.urandom(16)).decode()
+        raw.sendall(
+            f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nUpgrade: websocket\r\n"
+            f"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: {key}\r\n"
+            f"Cookie: dva_sim_{self.port}={token}\r\n\r\n".encode()
+        )
+        head = b""
+        while not head.endswith(b"\r\n\r\n"):
+            head += raw.recv(1)
+        assert b" 101 " in head.splitlines()[0], head
+        return raw
+
+    def stop(self) -> str:
+        """End it; what it complained about."""
+        with suppress(OSError):
+            self.say({"k": "bye", "why": "the test is over"})
+        try:
+            _, errors = self.process.communicate(timeout=PATIENCE_S)
+        finally:
+            self.process.kill()
+            self.end.close()
+            self.pictures.close()
+        return errors.decode()
+
+
+class Page:
+    """The state socket of a page."""
+
+    def __init__(self, served: Served, token: str, path: str = "/ws/state") -> None:
+        self.served, self.token = served, token
+        self.ws = served.socket(path, token)
+        self.you = self.next("you")
+        self.client: str = self.you["client"]
+
+    def next(self, *kinds: str) -> Line:
+        """The next message of some kinds."""
+        while True:
+            line: Line = json.loads(self.ws.recv(PATIENCE_S))
+            if line["k"] in kinds:
+                return line
+
+    def driving(self) -> ClientConnection:
+        """Its driving socket."""
+        return self.served.socket(f"/ws/drive?client={self.client}", self.token)
+
+    def close(self) -> None:
+        self.ws.close()
+
+
+@contextmanager
+def serving(*words: str, begins: bool = True) -> Iterator[Served]:
+    """A web process for a while; it complains about nothing."""
+    served = Served(*words, begins=begins)
+    try:
+        yield served
+    finally:
+        complaints = served.stop()
+    assert complaints == ""
+
+
+def _token(address: str) -> str:
+    return str(address).partition("?token=")[2]
+
+
+def killed(process: subprocess.Popen[bytes]) -> None:
+    """End a process the hard way."""
+    process.send_signal(signal.SIGKILL)
+    process.wait(PATIENCE_S)
