@@ -49,7 +49,6 @@ DRIVES = {
     "refused": "ended, the robot obeyed no more",
 }
 EVENTS = 30  # of a shift in its table; the lines below it count them all
-PART = ".part"  # what a live run leaves whose supervisor was killed
 TRIALS = 20  # of a task in its table; likewise
 EVENT_HEADS = ("detected", "kind", "where", "outcome", "looked", "after", "acted")
 COLUMNS = {
@@ -380,12 +379,11 @@ def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = con
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    if file.suffix == PART:
-        from dva_sim.live.recording import finish  # late: start-up
+    from dva_sim.live.recording import whole  # late: start-up
 
-        file, part = file.with_suffix(""), file
-        finish(part, file, own_code=False)
-        where.print(f"{file} made of {part}", soft_wrap=True)
+    file, given = whole(file), file
+    if file != given:
+        where.print(f"{file} made of {given}", soft_wrap=True)
     opened = open_recording(file, pictures)
     run = opened.playback
     tell_story(run, where)

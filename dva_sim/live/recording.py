@@ -318,6 +318,18 @@ def finish(part: Path, target: Path, own_code: bool = True) -> float:
     return playback.duration
 
 
+def whole(file: Path) -> Path:
+    """A recording to replay; what a live run left whose supervisor was killed is made one first.
+
+    Raises:
+        DvaSimError: it cannot be made one.
+    """
+    if file.suffix != PART:
+        return file
+    finish(file, file.with_suffix(""), own_code=False)
+    return file.with_suffix("")
+
+
 class _Told:
     """The lines of a run, sorted.
 
