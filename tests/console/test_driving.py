@@ -100,6 +100,7 @@ def test_a_robot_has_one_holder_and_the_second_is_told_who(page):
     assert not done
     assert "console-1" in text
     assert page.do("take", robots=[1], client="c2")[0]
+    page.let(1.0)
     holders = {row["i"]: row["holder_label"] for row in page.told("rows")[-1]["robots"]}
     assert holders == {0: "console-1", 1: "console-2"}
 
@@ -179,6 +180,7 @@ def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
     page.let(2.0)
     done, text = page.do("confirm")
     assert done, text
+    page.let(0.2)
     event = page.told("events")[-1]["events"][0]
     assert event["state"] == "confirmed"
     assert page.seat()["order"] is None

@@ -6,6 +6,7 @@ from dva_sim.simulation.scenario.contradictions import (
     contradictions,
     mean_processing_s,
     request_timeout_s,
+    start_needs_s,
     time_out_s,
 )
 from dva_sim.simulation.scenario.loading import FOLDER, build, check_policy, load, locate_files
@@ -42,5 +43,6 @@ __all__ = [
     "request_timeout_s",
     "robot_profiles",
     "site_of",
+    "start_needs_s",
     "time_out_s",
 ]
