@@ -28,10 +28,8 @@ from dva_sim.experiments.report.episode import (
 from dva_sim.experiments.report.figures.trial import name_and_unit
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import resolved
-from dva_sim.recordings import check_target
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.moments import story
-from dva_sim.recordings.writing import PART
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
@@ -384,13 +382,11 @@ def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = con
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    if file.suffix == PART:
-        from dva_sim.live.recording import finish  # late: start-up
+    from dva_sim.live.recording import whole  # late: start-up
 
-        file, part = file.with_suffix(""), file
-        check_target(file, way=f"rename it, or {part}")
-        finish(part, file, own_code=False)
-        where.print(f"{file} made of {part}", soft_wrap=True)
+    file, given = whole(file), file
+    if file != given:
+        where.print(f"{file} made of {given}", soft_wrap=True)
     opened = open_recording(file, pictures)
     run = opened.playback
     tell_story(run, where)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from office import Office
 from transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
 
 from dva_sim.agents.device import HEARTBEAT, AgentDevice
+from dva_sim.network import sockets
+from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.simulation.full import dva_server
@@ -135,6 +138,37 @@ def test_waves_of_devices_that_vanish_leave_no_file_open(monkeypatch: pytest.Mon
     finally:
         world.close()
     assert max(levels[1:]) <= levels[0]
+
+
+def memory() -> float:
+    """How much of it this process has [MB]."""
+    pages = Path("/proc/self/statm").read_text().split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@pytest.mark.skipif(not FILES.exists(), reason="no list of memory")
+def test_the_memory_of_connections_that_are_closed_goes_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sockets, "GIVE_BACK", 0.1)
+    network = sockets.SocketNetwork(LiveClock())
+    try:
+        network.introduce(ROBOT, "127.0.0.1:9")
+        sockets.give_back_memory()
+        before = memory()
+        heard = [network.subscribe(DVA, ROBOT, f"{n}|", print) for n in range(300)]
+        network.clock.run(network.clock.now + 0.1)
+        taken = memory() - before
+        for subscription in heard:
+            subscription.close()
+        heard.clear()
+        network.clock.run(network.clock.now + 300 * sockets.LOOK_ASIDE / sockets.CLOSED_AT_ONCE)
+        network.clock.run(network.clock.now + 1.0)
+        kept = memory() - before
+    finally:
+        network.close()
+    assert taken > 5.0
+    assert kept < taken / 2
 
 
 def files() -> int:

@@ -61,17 +61,17 @@ async def run(options: argparse.Namespace) -> None:
     if options.pictures_fd is not None:
         await cameras.open(options.pictures_fd)
     telling = asyncio.ensure_future(cameras.keep_telling())
-    closing = asyncio.ensure_future(_close_when(ended, hub, simulation))
+    closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     app = make_app(access, hub, cameras, StaticFiles())
     await serve(make_server(app), sock, _after(closing))
     telling.cancel()
-    cameras.close()
     simulation.close()
 
 
-async def _close_when(ended: asyncio.Event, hub: Hub, simulation: Simulation) -> None:
+async def _close_when(ended: asyncio.Event, hub: Hub, cameras: Cameras) -> None:
     await ended.wait()
-    await hub.close(simulation.why or "the console was ended")
+    cameras.close()
+    await hub.close(hub.simulation.why or "the console was ended")
     await asyncio.sleep(FAREWELL)
 
 

@@ -96,7 +96,8 @@ class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]
     )
 
     def emit(self, record: logging.LogRecord) -> None:
-        if not record.getMessage().startswith(self.NOISE):
+        cut_off = record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError)
+        if not cut_off and not record.getMessage().startswith(self.NOISE):
             super().emit(record)
 
 

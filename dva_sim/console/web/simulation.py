@@ -94,6 +94,8 @@ class Simulation:
     def _end(self) -> None:
         self.why = self.why or "the simulation has ended"
         self.ended.set()
+        for key in list(self._pending):
+            self._answer({"k": "done", "id": key, "ok": False, "text": self.why})
 
     def _answer(self, line: Answer) -> None:
         for told in self._pending.pop(str(line.get("id")), ()):

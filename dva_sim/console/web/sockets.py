@@ -13,7 +13,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 STALLED = 5.0  # without a byte taken, a page is dropped [s]
-FAREWELL = 2.0  # for what is on its way to a page that was dropped [s]
+FAREWELL = 10.0  # for what is on its way to a page that was dropped [s]
 WIRE = "dva_sim.wire"
 
 

@@ -50,6 +50,7 @@ class PictureStream(Response):
                     message = {"type": "http.response.body", "body": part, "more_body": True}
                     async with asyncio.timeout(STALLED):
                         await send(message)
+            await send({"type": "http.response.body", "body": b""})
 
 
 async def _left(receive: Receive) -> None:

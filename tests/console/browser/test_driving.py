@@ -9,6 +9,7 @@ import pytest
 from patience import becomes
 from playwright.sync_api import Page, expect
 
+
 @pytest.fixture
 def page(fake, visit) -> Iterator[Page]:
     """The page for driving, its robot taken and started."""

@@ -27,22 +27,23 @@
  *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
  *   refused: number}} RobotRow
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
- *   people: {i: number, doing: string}[]}} Rows
+ *   people: {i: number, doing: string}[], order?: Order | null}} Rows
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard
- * @typedef {Raster & {kind: string, full: number | string}} Field
+ * @typedef {Raster & {kind: string, full?: {value: number, unit: string}}} Field
  * @typedef {{hazards: Hazard[], fields: Field[]}} Hazards
  *
  * @typedef {{number: number, kind: string, x_m: number, y_m: number, room: string,
  *   severity: string, state: string, since_ms: number, reported_ms: number,
- *   assigned: string[]}} SiteEvent
+ *   assigned: string[], over?: boolean}} SiteEvent
  *
  * @typedef {{i: number, pattern: string, phase: string, mode: string, session?: number,
  *   wanted: number[], command: number[], sent: number, answered: number, timeouts: number,
  *   refused: number, superseded: number, command_age_ms: number | null,
  *   round_trip_ms: number | null, picture_ms: number | null, loop_ms: number | null}} SeatDrive
- * @typedef {{event: number, kind: string, robot: number, x_m: number, y_m: number}} Order
+ * @typedef {{event: number, kind: string, robot: number, x_m: number, y_m: number,
+ *   room?: string}} Order
  * @typedef {{t: number, seat: string, phase: string, order: Order | null, alert: string,
  *   drives: SeatDrive[]}} Seat
  *

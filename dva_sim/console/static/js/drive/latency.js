@@ -13,19 +13,22 @@ const DASHES = [undefined, [6, 3]];
 
 /** @typedef {import('../types.js').Thing} Thing */
 
-const KINDS = /** @type {{title: string, hint: string, read: (i: number) => number | null}[]} */ ([
+const KINDS = /** @type {{title: string, hint: string, none: string, read: (i: number) => number | null}[]} */ ([
   {
     title: 'Command age',
+    none: 'no command yet',
     hint: 'how old the command in force was when the robot applied it',
     read: (i) => driveOf(i)?.command_age_ms ?? null,
   },
   {
     title: 'Round trip',
+    none: 'no answers',
     hint: 'from a command sent to its answer',
     read: (i) => driveOf(i)?.round_trip_ms ?? null,
   },
   {
     title: 'Picture age',
+    none: 'no picture',
     hint: 'since the picture in sight was taken',
     read: (i) => {
       const age = pictureAge(i);
@@ -53,7 +56,7 @@ export function Latency({ robots }) {
       (kind, n) => html`<div title=${kind.hint}>
         <${Chart} title=${kind.title} unit="ms" lines=${lines} least=${100}
           read=${() => histories[n].read()} />
-        <${Figures} history=${histories[n]} robots=${robots} />
+        <${Figures} history=${histories[n]} robots=${robots} none=${kind.none} />
       </div>`,
     )}</div>
   </section>`;
@@ -74,11 +77,22 @@ function Floor() {
   return html`<span class="count">a command takes at least ${msText(floor)}</span>`;
 }
 
-/** @param {{history: History, robots: Thing[]}} props */
-function Figures({ history, robots }) {
+/**
+ * @param {History} history
+ * @param {number} n
+ * @param {string} none what it means that there is no value
+ */
+function value(history, n, none) {
+  const last = history.last(n);
+  if (last === null) return html`<span class="soft">${none}</span>`;
+  return html`<b>${msText(last)}</b> <span class="soft p95">p95 ${msText(history.p95(n))}</span>`;
+}
+
+/** @param {{history: History, robots: Thing[], none: string}} props */
+function Figures({ history, robots, none }) {
   useEvery(500);
   return html`<p class="figures">${robots.map(
     (robot, n) => html`<span><i class=${`line line-${n} pattern-${rowOf(robot.i)?.pattern}`}></i>
-      ${robot.label} <b>${msText(history.last(n))}</b> <span class="soft p95">p95 ${msText(history.p95(n))}</span></span>`,
+      ${robot.label} ${value(history, n, none)}</span>`,
   )}</p>`;
 }

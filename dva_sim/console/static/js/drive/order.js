@@ -8,10 +8,10 @@ import { capital, plain } from '../ui/words.js';
 /** The newest order: of one's own seat, else the one that waits for somebody. */
 export function OrderInHand() {
   const mine = seat.value?.order ?? null;
-  const order = mine ?? /** @type {any} */ (rows.value)?.order ?? null;
+  const order = mine ?? rows.value?.order ?? null;
   if (!order) return null;
   const robot = thingAt(order.robot)?.label ?? 'a robot';
-  const room = roomAt(order.x_m, order.y_m);
+  const room = order.room || roomAt(order.x_m, order.y_m);
   const where = room ? `in ${room}` : `at ${order.x_m.toFixed(0)} m, ${order.y_m.toFixed(0)} m`;
   const off = !maySteer.value || !mine;
   return html`<section class="panel order" aria-label="Order in hand">

@@ -116,12 +116,16 @@ export function drawBattery({ ctx, colours }, body, always) {
   ctx.fillRect(left, top, BATTERY.width * share, BATTERY.height);
 }
 
+/** @typedef {{left: number, top: number, width: number}} Place of a name that is written */
+
 /**
+ * The name above a body, or below it where another name stands already; else none.
  * @param {Pen} pen
  * @param {Body} body
  * @param {boolean} strong
+ * @param {Place[]} written
  */
-export function drawName({ ctx, colours }, body, strong) {
+export function drawName({ ctx, colours }, body, strong, written) {
   ctx.font = `${strong ? 600 : 400} ${NAME_PX}px system-ui, sans-serif`;
   ctx.textAlign = 'center';
   ctx.textBaseline = 'bottom';
@@ -129,9 +133,28 @@ export function drawName({ ctx, colours }, body, strong) {
   ctx.lineWidth = 3;
   ctx.strokeStyle = colours.halo;
   ctx.fillStyle = colours.ink;
-  const top = body.top - 0.6 * body.size - 3;
+  const width = ctx.measureText(body.thing.label).width;
+  const above = body.top - 0.6 * body.size - 3;
+  const below = body.top + 0.6 * body.size + NAME_PX + 10;
+  const left = body.left - width / 2;
+  const top = [above, below].find((y) => strong || isFree(written, { left, top: y, width }));
+  if (top === undefined) return;
+  written.push({ left, top, width });
   ctx.strokeText(body.thing.label, body.left, top);
   ctx.fillText(body.thing.label, body.left, top);
+}
+
+/**
+ * @param {Place[]} written
+ * @param {Place} place
+ */
+function isFree(written, { left, top, width }) {
+  return !written.some(
+    (other) =>
+      Math.abs(other.top - top) < NAME_PX + 2 &&
+      other.left < left + width + 3 &&
+      left < other.left + other.width + 3,
+  );
 }
 
 /**

@@ -2,7 +2,7 @@
 import { html } from '../../vendor/preact.js';
 import { hazards } from '../store.js';
 import { ModeMark, SeverityMark, StateMark } from '../ui/icon.js';
-import { capital, plain } from '../ui/words.js';
+import { plain } from '../ui/words.js';
 
 const MODES = ['Idle', 'Mission', 'Teleoperation', 'Emergency'];
 const STATES = ['pending', 'assigned', 'on scene', 'confirmed', 'contained', 'refuted',
@@ -41,8 +41,8 @@ export function Legend() {
 function Fullest() {
   const fields = hazards.value.fields.filter((field) => field.full);
   if (!fields.length) return null;
-  return html`<p>Fullest tint: ${fields.map((field) => `${plain(field.kind)} ${field.full}`).join('; ')}</p>`;
+  return html`<p>Fullest tint: ${fields.map(fullest).join('; ')}</p>`;
 }
 
-/** @param {string} kind */
-export const hazardName = (kind) => capital(plain(kind));
+/** @param {import('../types.js').Field} field */
+const fullest = ({ kind, full }) => `${plain(kind)} ${full?.value} ${full?.unit}`;

@@ -174,10 +174,12 @@ export class Live {
     }
     for (const body of machines) drawRobot(pen, body);
     for (const body of machines) drawBattery(pen, body, roomy);
-    for (const body of this.bodies) {
+    /** @type {import('./bodies.js').Place[]} */
+    const written = [];
+    for (const body of [...machines, ...this.bodies.filter((one) => one.thing.kind !== 'robot')]) {
       const mine = chosen?.kind === 'thing' && chosen.key === body.thing.i;
       const named = body.thing.kind !== 'bystander' && roomy;
-      if (named || mine) drawName(pen, body, mine);
+      if (named || mine) drawName(pen, body, mine, written);
     }
   }
 

@@ -5,9 +5,9 @@ const CLOSED = new Set(['contained', 'refuted', 'expired']);
 const RANKS = ['critical', 'high', 'medium', 'low'];
 
 /** @param {import('../types.js').SiteEvent} event */
-export const isOpen = (event) => !CLOSED.has(event.state);
+export const isOpen = (event) => !(event.over ?? CLOSED.has(event.state));
 
-/** Whether somebody has to do something about it. @param {import('../types.js').SiteEvent} event */
+/** Whether nobody has done anything about it. @param {import('../types.js').SiteEvent} event */
 export const isAlarm = (event) => event.state === 'pending' || event.state === 'escalated';
 
 /** Open ones first, then the most severe, then the oldest. */
