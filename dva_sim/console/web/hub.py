@@ -15,7 +15,7 @@ from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import Bucket, Refused, asked_of, id_of, read, robots
+from dva_sim.console.web.actions import BadMessage, Bucket, asked_of, id_of, read, robots
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say, wire_of
@@ -86,7 +86,7 @@ class Hub:
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
             self.watching()
         else:
-            raise Refused("no such message; there are: ping, resync, watch")
+            raise BadMessage("no such message; there are: ping, resync, watch")
         client.wake.set()
 
     def _leave(self, client: Client) -> None:
@@ -152,7 +152,7 @@ class Hub:
                 return
             asked["id"] = id_of(key)
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
-        except Refused as error:
+        except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
             driver.answer(encode(line | {"text": str(error)}))
 
@@ -192,11 +192,11 @@ class Hub:
         while (text := await heard(ws)) is not None:
             try:
                 if isinstance(text, bytes):
-                    raise Refused("is not text")
+                    raise BadMessage("is not text")
                 if not bucket.takes(time.monotonic()):
-                    raise Refused("too many messages")
+                    raise BadMessage("too many messages")
                 hear(text)
-            except Refused as error:
+            except BadMessage as error:
                 wire_of(ws).drop(REFUSED, str(error)[:100])
                 return
 
