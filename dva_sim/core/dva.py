@@ -132,7 +132,7 @@ class Dva:
         elif isinstance(body, m.TaskAnnouncement):
             self.dispatcher.auctions.no_bid(body.event_id, send.to)
             sends = self.dispatcher.decide(now)
-        elif isinstance(body, m.Relocation):
+        elif isinstance(body, m.RelocationOrder):
             self.dispatcher.situations.forget_move(send.to)
         elif isinstance(body, m.GetSensorInfo):
             self.sensing.told(send.to, None, now)

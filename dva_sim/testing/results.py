@@ -50,8 +50,10 @@ class Shape:
     is_constant: bool = False
 
 
-def _contrast(factor: str, first: str, second: str, measure: str, over: str = "") -> dict[str, Any]:
-    found = {"part": PART, "measure": measure, "factor": factor, "contrast": [first, second]}
+def _contrast(
+    factor: str, levels: tuple[str, str], *, measure: str, over: str = ""
+) -> dict[str, Any]:
+    found = {"part": PART, "measure": measure, "factor": factor, "contrast": [*levels]}
     return found | ({"over": over} if over else {})
 
 
@@ -62,7 +64,9 @@ _GRID: Final[Mapping[str, tuple[Level, ...]]] = {
     "link.delay_s": _DELAYS,
     "profile": ("default", "slow", "fast"),
 }
-_ALONG: Final = _contrast("pattern", "req-rep", "latest-wins", "drive_time_s", "link.delay_s")
+_ALONG: Final = _contrast(
+    "pattern", ("req-rep", "latest-wins"), measure="drive_time_s", over="link.delay_s"
+)
 _POLICIES: Final = ("random", "nearest_idle", "min_eta")
 _LOADS: Final[Mapping[str, tuple[Level, ...]]] = {
     "dispatch.policy": _POLICIES,
@@ -74,7 +78,7 @@ SHAPES: Final[Mapping[str, Shape]] = {
     "lines along a delay, in three panels": Shape(_GRID, _ALONG),
     "two words": Shape(
         {"control": ("direct", "supervised")},
-        _contrast("control", "direct", "supervised", "drive_time_s"),
+        _contrast("control", ("direct", "supervised"), measure="drive_time_s"),
     ),
     "one configuration": Shape(),
     "one person": Shape(_GRID, _ALONG, persons=1, trials=1),
@@ -83,13 +87,15 @@ SHAPES: Final[Mapping[str, Shape]] = {
     "no value at all": Shape(_GRID, _ALONG, missing=1.0),
     "shifts": Shape(
         _LOADS,
-        _contrast("dispatch.policy", "random", "min_eta", "response_mean_s", "intensity"),
+        _contrast(
+            "dispatch.policy", ("random", "min_eta"), measure="response_mean_s", over="intensity"
+        ),
         model="timed",
         trials=1,
     ),
     "transports": Shape(
         _CARRIERS,
-        _contrast("transport", "tcp", "udp", "movement_time_s", "flows"),
+        _contrast("transport", ("tcp", "udp"), measure="movement_time_s", over="flows"),
         model="transports",
     ),
 }

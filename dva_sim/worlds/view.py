@@ -67,6 +67,7 @@ ARC_POINTS = 9
 def draw_site(
     ax: Axes,
     site: Site,
+    *,
     labels: bool = True,
     coverage: bool = False,
     views: bool = False,
