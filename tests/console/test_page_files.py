@@ -75,7 +75,13 @@ def test_a_module_of_the_pages_keeps_the_rules_of_the_house(file: Path) -> None:
 
     assert len(text.splitlines()) <= 300
     assert text.startswith(("/**", "//")), "says what it is for"
-    for word in ("innerHTML", "outerHTML", "insertAdjacentHTML", "dangerouslySet", "document.write"):
+    for word in (
+        "innerHTML",
+        "outerHTML",
+        "insertAdjacentHTML",
+        "dangerouslySet",
+        "document.write",
+    ):
         assert word not in text
     assert not re.search(r"https?://", text)
 
