@@ -22,7 +22,7 @@ from websockets.sync.client import ClientConnection, connect
 from dva_sim.console.frames import ALIVE, Picture, pack
 
 HOSTILE = "<script>alert(1)</script>"
-LABELS = ("robot-1", "robot-2", HOSTILE)
+LABELS = ("robot-1", "robot-2", HOSTILE, "robot-4", "robot-5")
 Line = dict[str, Any]
 
 
@@ -157,7 +157,7 @@ class Served:
         """A WebSocket of a page."""
         own = f"http://127.0.0.1:{self.port}"
         headers = {"Cookie": f"dva_sim_{self.port}={token}"} if token else {}
-        return connect(
+        connection = connect(
             f"ws://127.0.0.1:{self.port}{path}",
             origin=own if origin == "own" else origin,  # type: ignore[arg-type]
             additional_headers=headers | more,
@@ -165,6 +165,7 @@ class Served:
             compression=None,
             max_size=None,
         )
+        return connection.__enter__()  # it is closed by whoever asked for it
 
     def page(self, token: str = "", **more: Any) -> Page:
         """A page that is open and has its first snapshot."""
@@ -173,7 +174,7 @@ class Served:
     def deaf(self, path: str, token: str) -> socket.socket:
         """A WebSocket that reads nothing but the answer to its handshake."""
         raw = socket.create_connection(("127.0.0.1", self.port), PATIENCE_S)
-        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 32768)
         key = base64.b64encode(os.urandom(16)).decode()
         raw.sendall(
             f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nUpgrade: websocket\r\n"

@@ -1,19 +1,24 @@
-"""Options that several commands have: one name, one form, one meaning and one completion for each.
+"""Options of commands: those of a function of `dva_sim`, and others that several commands have.
 
-Numbers are read here too, so that a wrong one is told with what would be right. Nothing heavy is
-imported: every command begins here.
+A function declares name, type, default and words of an option, once. `FORMS` is what only a command
+line has of it: short name, placeholder, range and completion. Numbers are read here too, so that a
+wrong one is told with what would be right. Nothing heavy is imported: every command begins here.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
-from collections.abc import Callable
-from pathlib import Path
-from typing import Annotated, Any
+from collections.abc import Callable, Sequence
+from functools import cache
+from inspect import Parameter
+from typing import Annotated, Any, TypeVar, get_args
 
 import typer
 from typer import Argument, Option
+
+from dva_sim import api
 
 Completer = Callable[[str], list[str]]
 
@@ -76,6 +81,100 @@ def _within(least: int, most: int) -> str:
     return f"of at least {least}" if most == MOST_SEED else f"from {least} to {most}"
 
 
+MOST_JOBS = 1024
+
+# By the name in a function. Units are placeholders here, so that `limit_s` is `--limit SECONDS`.
+FORMS: dict[str, dict[str, Any]] = {
+    "at": {"metavar": "SECONDS"},
+    "camera": {"metavar": "ROBOT"},
+    "export.out": {"metavar": "PATH"},
+    "figure": {"metavar": "FILE:CLASS"},
+    "first": {"metavar": "A"},
+    "format": {"metavar": "csv|parquet"},
+    "jobs": {"names": ("-j", "--jobs"), "parser": whole(1, MOST_JOBS)},
+    "limit_s": {"names": ("--limit",), "metavar": "SECONDS"},
+    "out": {"names": ("-o", "--out"), "metavar": "FOLDER"},
+    "panels": {"parser": whole(1, 24)},
+    "pilot": {"metavar": "PERSONS", "parser": whole(1)},
+    "ros2": {"metavar": "FOLDER"},
+    "rows": {"parser": whole(1)},
+    "scenario": {"autocompletion": SCENARIOS},
+    "scheduler": {"metavar": "tcp://HOST:PORT"},
+    "second": {"metavar": "B"},
+    "set": {"metavar": "KEY=VALUE"},
+    "side_by_side": {"metavar": "PATTERN,PATTERN"},
+    "study": {"autocompletion": STUDIES},
+}
+# All else is as its type has it, by the first of these words in that.
+_USUAL: dict[str, tuple[Any, dict[str, Any]]] = {
+    "several": (list[str], {"metavar": "NAME"}),
+    "bool": (bool, {}),
+    "Path": (str, {"metavar": "FILE"}),
+    "str": (str, {"metavar": "NAME"}),
+    "int": (int, {"metavar": "N", "parser": whole()}),
+    "float": (float, {"metavar": "NUMBER", "parser": number()}),
+}
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def takes(function: Callable[..., Any], but: Sequence[str] = ()) -> Callable[[Command], Command]:
+    """A command that takes what a function takes, by the same names, and what it adds itself.
+
+    It has parameters for what it looks at, and hands over all else that it is given.
+
+    Args:
+        function: One of `dva_sim`.
+        but: What only programs have.
+    """
+
+    def declare(command: Command) -> Command:
+        there = inspect.signature(function).parameters.items()
+        taken = {name: _as_option(function, p) for name, p in there if name not in but}
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        added = [p for p in own if p.name not in taken and p.kind is not Parameter.VAR_KEYWORD]
+        every = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*taken.values(), *added)]
+        declared: Any = command
+        declared.__signature__ = inspect.Signature(every)
+        return command
+
+    return declare
+
+
+def option_of(function: Callable[..., Any], name: str) -> Any:
+    """An option as the command of a function has it, for a command that has no function."""
+    parameter = inspect.signature(function).parameters[name]
+    return get_args(_as_option(function, parameter).annotation)[1]
+
+
+def _as_option(function: Callable[..., Any], parameter: Parameter) -> Parameter:
+    """A parameter with type, form and words of an option, or of an argument if it has to be given.
+
+    Its annotation is read as text, since what that names is imported later, if at all.
+    """
+    name, default, several = parameter.name, parameter.default, parameter.default == ()
+    form = FORMS.get(name, {}) | FORMS.get(f"{function.__name__}.{name}", {})
+    words = _words(function).get(name, "")
+    if default is Parameter.empty and "names" not in form:
+        place = Argument(**{"metavar": name.upper()} | form, help=words)
+        return parameter.replace(annotation=Annotated[str, place])
+    told = ["several"] if several else re.findall(r"\w+", str(parameter.annotation))
+    kind, usual = next(_USUAL[word] for word in _USUAL if word in told)
+    asked = {"names": (f"--{name.replace('_', '-')}",), "help": words} | usual | form
+    if several:
+        asked["help"] = f"{words.removesuffix('.')}; may be given again."
+    option = Option(*asked.pop("names"), **asked)
+    return parameter.replace(annotation=Annotated[kind | None if default is None else kind, option])
+
+
+@cache
+def _words(function: Callable[..., Any]) -> dict[str, str]:
+    """Of each argument the first sentence that the docstring says of it."""
+    text = inspect.getdoc(function) or ""
+    told = re.findall(r"^    (\w+): (.+(?:\n {8}.+)*)", text, re.MULTILINE)
+    return {name: re.split(r"(?<=\.)\s+(?=[A-Z])", some)[0].replace("`", "") for name, some in told}
+
+
+# --- of commands that no function stands behind, and what only a terminal has ---------------
 def count(help: str, *names: str, metavar: str = "N", least: int = 0, most: int = MOST_SEED) -> Any:
     """An option that takes a whole number."""
     return Option(*names, metavar=metavar, parser=whole(least, most), help=help)
@@ -96,46 +195,12 @@ def folder(help: str) -> Any:
     return Option(metavar="FOLDER", help=help)
 
 
-MOST_JOBS = 1024
+Jobs = Annotated[int | None, option_of(api.run, "jobs")]
+RunSeed = Annotated[int, option_of(api.episode, "seed")]
+ScenarioName = Annotated[str, option_of(api.episode, "scenario")]
+Sets = Annotated[list[str] | None, option_of(api.episode, "set")]
 
-StudyName = Annotated[
-    str, Argument(metavar="STUDY", autocompletion=STUDIES, help="A study by name or path.")
-]
-ScenarioName = Annotated[
-    str, Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path.")
-]
-ResultsFolder = Annotated[Path, Argument(metavar="FOLDER", help="A results folder.")]
-
-Sets = Annotated[
-    list[str] | None,
-    Option("--set", metavar="KEY=VALUE", help="Change one key; may be given again."),
-]
-Jobs = Annotated[
-    int | None,
-    count(
-        "How many processes; default: one for each core.", "-j", "--jobs", least=1, most=MOST_JOBS
-    ),
-]
-Overwrite = Annotated[bool, Option("--overwrite", help="Replace what is there.")]
+Overwrite = Annotated[bool, option_of(api.episode, "overwrite")]
+Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
-Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
-RunSeed = Annotated[int, count("The run's random seed.", "--seed")]
-Results = Annotated[
-    Path | None,
-    Option("-o", "--out", metavar="FOLDER", help="Results folder; default: results/STUDY."),
-]
-
-Video = Annotated[Path | None, file("Write a film: .gif or .mp4.")]
-Still = Annotated[Path | None, file("Draw one moment: .png, .pdf or .svg.")]
-Strip = Annotated[Path | None, file("Draw several moments in one figure, likewise.")]
-At = Annotated[
-    str | None,
-    Option(metavar="SECONDS", help="Moment of --still, or moments of --strip: 10,20,30."),
-]
-Panels = Annotated[int, count("How many moments a strip has.", least=1, most=24)]
-Camera = Annotated[
-    str | None,
-    Option(metavar="ROBOT", help="--still shows what this robot's camera sees."),
-]
-Inset = Annotated[bool, Option("--inset", help="Show in --video what a robot's camera sees.")]

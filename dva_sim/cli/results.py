@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
-from typer import Argument, Option
+from typer import Option
 
-from dva_sim.cli.options import Json, Overwrite, Quiet, ResultsFolder, Verbose, count
+from dva_sim import api
+from dva_sim.cli.options import Json, Quiet, Verbose, takes
 from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 
 
+@takes(api.report)
 def report(
-    folder: ResultsFolder,
-    pdf: Annotated[bool, Option("--pdf", help="As PDF too, for print.")] = False,
-    figure: Annotated[
-        list[str] | None,
-        Option("--figure", metavar="FILE:CLASS", help="With a figure of one's own; repeatable."),
-    ] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    folder: str, pdf: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: Any
 ) -> None:
     """Make the report of a results folder again.
 
@@ -32,24 +27,14 @@ def report(
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
         dva-sim report small --figure risk.py:Risk  # with a figure of one's own
     """
-    from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
-    from dva_sim.experiments.report.report import write_report  # late: start-up
-
     with loudness(quiet, verbose):
-        page = write_report(folder, pdf, figures=load_figures(figure or ()))
-        tell_files(folder, *WRITTEN)
+        page = api.report(folder, pdf=pdf, **asked)
+        tell_files(page.parent, *WRITTEN)
         typer.echo(f"Report: {page}{' and report.pdf' if pdf else ''}")
 
 
-def show(
-    folder: ResultsFolder,
-    table: Annotated[str | None, Option(metavar="NAME", help="Show the rows of a table.")] = None,
-    rows: Annotated[int, count("How many of them.", least=1)] = 20,
-    columns: Annotated[
-        bool, Option("--columns", help="Say what the columns mean, of one table or all.")
-    ] = False,
-    as_json: Json = False,
-) -> None:
+@takes(api.show)
+def show(folder: str, table: str | None, rows: int, columns: bool, as_json: Json = False) -> None:
     """Show a results folder in the terminal.
 
     It shows the answer and every cell, or a table, or what the columns mean. Of a study that
@@ -61,14 +46,14 @@ def show(
         dva-sim show small --columns  # what the columns of every table mean
         dva-sim show small --json  # the same for other programs
     """
+    if not as_json:
+        api.show(folder, table=table, rows=rows, columns=columns)
+        return
     from dva_sim.cli import results_json  # late: start-up
     from dva_sim.experiments.execution.checkpoint import load_so_far  # late: start-up
-    from dva_sim.experiments.report import terminal  # late: start-up
 
     results = load_so_far(folder)
-    if not as_json:
-        terminal.show(results, table, columns, rows)
-    elif columns:
+    if columns:
         print_json(results_json.columns(results, [] if table is None else [table]))
     else:
         print_json(
@@ -78,23 +63,8 @@ def show(
         )
 
 
-def export(
-    folder: ResultsFolder,
-    out: Annotated[
-        Path,
-        Option(
-            "-o", "--out", metavar="PATH", help="X.csv or X.parquet for one table, or a folder."
-        ),
-    ],
-    table: Annotated[
-        list[str] | None,
-        Option(metavar="NAME", help="Only this one; may be given again."),
-    ] = None,
-    form: Annotated[
-        str | None, Option("--format", metavar="csv|parquet", help="In a folder; default: csv.")
-    ] = None,
-    overwrite: Overwrite = False,
-) -> None:
+@takes(api.export)
+def export(**asked: Any) -> None:
     """Write tables of results for other programs.
 
     In a folder, columns.csv says what the columns mean.
@@ -103,16 +73,14 @@ def export(
         dva-sim export small -o small.csv  # one row for each run
         dva-sim export small -o tables --format parquet  # every table
     """
-    from dva_sim.experiments.results.export import export as write  # late: start-up
-    from dva_sim.experiments.results.results import Results  # late: start-up
-
-    for path in write(Results.load(folder), out, table or [], form, overwrite):
+    for path in api.export(**asked):
         print(path)
 
 
+@takes(api.compare)
 def compare(
-    first: Annotated[Path, Argument(metavar="A", help="A results folder.")],
-    second: Annotated[Path, Argument(metavar="B", help="What is compared with it.")],
+    first: str,
+    second: str,
     measure: Annotated[
         list[str] | None,
         Option(
@@ -143,8 +111,8 @@ def compare(
     from dva_sim.cli import comparison  # late: start-up
 
     code = comparison.compare(
-        first,
-        second,
+        Path(first),
+        Path(second),
         measures=measure or [],
         by=by or [],
         fail_if=fail_if or [],

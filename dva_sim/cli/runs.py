@@ -4,59 +4,34 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
 
+from dva_sim import api
 from dva_sim.cli.options import (
     SCENARIOS,
-    At,
-    Camera,
-    Inset,
     Overwrite,
-    Panels,
     Quiet,
     RunSeed,
     ScenarioName,
     Sets,
-    Still,
-    Strip,
     Verbose,
-    Video,
     choice,
     count,
     file,
     folder,
     number,
+    takes,
 )
 from dva_sim.cli.verbosity import loudness
 
 _MOST_PORT = 64_999
 
 
-def episode(
-    scenario: ScenarioName,
-    seed: RunSeed = 1,
-    set_: Sets = None,
-    video: Video = None,
-    still: Still = None,
-    strip: Strip = None,
-    at: At = None,
-    panels: Panels = 6,
-    camera: Camera = None,
-    inset: Inset = False,
-    side_by_side: Annotated[
-        str | None,
-        Option(metavar="PATTERN,PATTERN", help="Run the same seed under two patterns."),
-    ] = None,
-    record: Annotated[
-        Path | None, file("Keep the run as a file: .mcap, for replay and viewers.")
-    ] = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> None:
+@takes(api.episode)
+def episode(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
     """Run one scenario and tell its story.
 
     Examples:
@@ -67,30 +42,16 @@ def episode(
     """
     from dva_sim.cli import stories  # late: start-up
     from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
-    from dva_sim.recordings.pictures import Wanted  # late: start-up
     from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
 
-    pictures, changes = Wanted(video, still, strip, at, panels, camera, inset), set_ or []
-    with loudness(quiet, verbose), mistakes_of(scenario, changes, seed):
-        stories.episode(
-            EpisodeRequest(scenario, seed, changes, side_by_side, pictures, record, overwrite)
-        )
+    request = EpisodeRequest.of(**asked)
+    with loudness(quiet, verbose), mistakes_of(request.scenario, request.changes, request.seed):
+        stories.episode(request)
 
 
+@takes(api.replay)
 def replay(
-    file: Annotated[
-        Path, Argument(metavar="FILE", help="A recording: .mcap, or the .mcap.part of a live run.")
-    ],
-    video: Video = None,
-    still: Still = None,
-    strip: Strip = None,
-    at: At = None,
-    panels: Panels = 6,
-    camera: Camera = None,
-    inset: Inset = False,
-    ros2: Annotated[Path | None, folder("Write a ROS 2 bag; the folder is new.")] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    file: str, ros2: str | None, quiet: Quiet = False, verbose: Verbose = False, **pictures: Any
 ) -> None:
     """Tell and draw a recorded run from its file alone.
 
@@ -102,7 +63,7 @@ def replay(
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     with loudness(quiet, verbose):
-        stories.replay(file, Wanted(video, still, strip, at, panels, camera, inset), ros2)
+        stories.replay(Path(file), Wanted.of(**pictures), None if ros2 is None else Path(ros2))
 
 
 def live(
@@ -193,7 +154,7 @@ def console(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run a scenario in real time on a page in the browser, and drive its robots.
+    """Drive a scenario's robots in real time, on a page in the browser.
 
     Examples:
         dva-sim console  # two robots, two guards, a fire and a leak

@@ -28,10 +28,8 @@ from dva_sim.experiments.report.episode import (
 from dva_sim.experiments.report.figures.trial import name_and_unit
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import resolved
-from dva_sim.recordings import check_target
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.moments import story
-from dva_sim.recordings.writing import PART
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
@@ -135,12 +133,16 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
     counts = f"{row['messages']} messages, {row['violations']} safety rules broken"
     counts += f" ({CHECKED_IN_SHORT})"
     lines.append(f"{row['simulated_s']:.0f} s {how}, {counts}")
-    if failures := row["plugin_failures"]:
-        lines.append(
-            f"{failures} times a class of yours (policy, operator, filter, ...) gave no answer"
-        )
+    lines += _failed(row)
     print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)
+
+
+def _failed(row: Row) -> list[str]:
+    """What classes of the user's got wrong, if they did."""
+    times = row.get("plugin_failures", row.get("policy_failed"))
+    whose = "a class of yours (policy, operator, filter, ...)"
+    return [f"{times} times {whose} gave no answer, or none that is allowed"] if times else []
 
 
 def tell_full(run: Played, console: Console) -> None:
@@ -192,7 +194,8 @@ def tell_shift(run: Played, console: Console) -> None:
     console.rule(f"{scenario.dispatch.policy}, seed {run.seed}")
     if recording.columns:
         console.print(_first_events(recording))
-    print_lines(_shift_lines(recording), console)
+    row = run.tables["runs"][0]
+    print_lines([*_shift_lines(recording), *_failed(row)], console)
     broken = sum(recording.violations.values())
     console.print(
         f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages} messages, "
@@ -200,7 +203,7 @@ def tell_shift(run: Played, console: Console) -> None:
         soft_wrap=True,
     )
     if is_verbose() and scenario.keep == "events":
-        tell_measures(run.tables["runs"][0], _columns(run))
+        tell_measures(row, _columns(run))
 
 
 def _first_events(recording: TimedRecording) -> Table:
@@ -259,7 +262,7 @@ def tell_session(run: Played, console: Console) -> None:
     assert isinstance(scenario, TransportScenario)
     console.rule(f"{scenario.transport.kind}, {scenario.operator.strategy}, seed {run.seed}")
     console.print(_flows(run.tables["flows"]))
-    print_lines(_session_lines(row), console)
+    print_lines([*_session_lines(row), *_failed(row)], console)
     console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
     tell_measures(row, _columns(run))
 
@@ -313,9 +316,7 @@ def tell_task(run: Played, console: Console) -> None:
     if len(trials) > TRIALS:
         console.print(f"... and {len(trials) - TRIALS} more")
     console.print(f"{_count(row['trials'])}: {', '.join(_task_lines(row))}", soft_wrap=True)
-    if row["plugin_failures"]:
-        failures = row["plugin_failures"]
-        console.print(f"{failures} times a class of yours gave no answer")
+    print_lines(_failed(row), console)
     console.print(f"{row['simulated_s']:.0f} s simulated in {run.took_s:.2f} s", soft_wrap=True)
     tell_measures(row, _columns(run))
 
@@ -381,13 +382,11 @@ def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = con
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    if file.suffix == PART:
-        from dva_sim.live.recording import finish  # late: start-up
+    from dva_sim.live.recording import whole  # late: start-up
 
-        file, part = file.with_suffix(""), file
-        check_target(file, way=f"rename it, or {part}")
-        finish(part, file, own_code=False)
-        where.print(f"{file} made of {part}", soft_wrap=True)
+    file, given = whole(file), file
+    if file != given:
+        where.print(f"{file} made of {given}", soft_wrap=True)
     opened = open_recording(file, pictures)
     run = opened.playback
     tell_story(run, where)

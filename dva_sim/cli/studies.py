@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer import Option
 
-from dva_sim.cli.options import Jobs, Quiet, Results, Sets, StudyName, Verbose, count, number
+from dva_sim import api
+from dva_sim.cli.options import Jobs, Quiet, Verbose, takes
 from dva_sim.cli.verbosity import loudness
 
 
@@ -33,29 +34,12 @@ def demo(
     raise typer.Exit(show_it(out, jobs))
 
 
+@takes(api.run, but=("progress", "report"))
 def run(
-    study: StudyName,
-    out: Results = None,
-    set_: Sets = None,
-    seed: Annotated[int | None, count("Random seed of the whole study.", "--seed")] = None,
-    jobs: Jobs = None,
-    scheduler: Annotated[
-        str | None,
-        Option(metavar="tcp://HOST:PORT", help="Use a dask.distributed cluster instead."),
-    ] = None,
-    limit: Annotated[
-        float,
-        Option(metavar="SECONDS", parser=number(), help="A run that takes longer has failed."),
-    ] = 600,
-    quick: Annotated[bool, Option("--quick", help="The study's small version.")] = False,
-    full: Annotated[bool, Option("--full", help="The study's larger version.")] = False,
-    pilot: Annotated[
-        int | None,
-        count("Only so many persons, with a random seed of their own.", metavar="PERSONS", least=1),
-    ] = None,
     dry_run: Annotated[bool, Option("--dry-run", help="Only say what would run.")] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    **asked: Any,
 ) -> None:
     """Run a study, or go on with it, and write its report.
 
@@ -70,17 +54,7 @@ def run(
     from dva_sim.cli import study_runs  # late: start-up
     from dva_sim.experiments.execution.runner import RunRequest  # late: start-up
 
-    request = RunRequest(
-        study,
-        out,
-        changes=[*(set_ or []), *([f"seed={seed}"] if seed is not None else [])],
-        quick=quick,
-        full=full,
-        pilot=pilot,
-        jobs=jobs,
-        scheduler=scheduler,
-        limit_s=limit,
-    )
+    request = RunRequest(**asked)
     with loudness(quiet, verbose):
         if dry_run:
             study_runs.plan(request)
@@ -89,9 +63,8 @@ def run(
     raise typer.Exit(code)
 
 
-def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name or path of the new study.")],
-) -> None:
+@takes(api.new)
+def new(name: str) -> None:
     """Write a study to begin with, which runs as it stands.
 
     Comments in it say what can be changed.
@@ -99,19 +72,11 @@ def new(
     Examples:
         dva-sim new mine  # writes mine.yaml here
     """
-    from dva_sim.experiments.study.loading import write_study  # late: start-up
-
-    typer.echo(told(write_study(name)))
+    typer.echo(told(api.new(name)))
 
 
-def register(
-    study: StudyName,
-    full: Annotated[bool, Option("--full", help="The study's larger version.")] = False,
-    again: Annotated[
-        bool,
-        Option("--again", help="In place of an earlier registration; the report will say so."),
-    ] = False,
-) -> None:
+@takes(api.register)
+def register(study: str, full: bool, again: bool) -> None:
     """Fix a study's hypotheses and size before it is run.
 
     The run then confirms or refutes the hypotheses.
@@ -125,13 +90,8 @@ def register(
     typer.echo(write_down(open_study(study, version="full" if full else None), again))
 
 
-def tune(
-    study: StudyName,
-    out: Results = None,
-    jobs: Jobs = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> None:
+@takes(api.tune, but=("progress",))
+def tune(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
     """Choose the values that a study has tuned.
 
     They are tried on persons who take no part in the study, and kept beside it.
@@ -142,7 +102,7 @@ def tune(
     from dva_sim.cli import study_runs  # late: start-up
 
     with loudness(quiet, verbose):
-        code = study_runs.tune(study, out, jobs)
+        code = study_runs.tune(**asked)
     raise typer.Exit(code)
 
 

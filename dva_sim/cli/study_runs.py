@@ -60,19 +60,19 @@ def run(request: RunRequest) -> ExitCode:
     return ExitCode.RUNS_FAILED if failures or distrusted else ExitCode.OK
 
 
-def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
+def tune(study: str, out: str | None, jobs: int | None) -> ExitCode:
     """Choose what a study has tuned, and write it beside the study; the exit code."""
     from dva_sim.experiments.analysis.tuning import tune as try_all  # late: start-up
 
-    study = open_study(name)
-    trials = tuning_study(study)
-    folder = out if out is not None else folder_of_tuning(name)
+    asked = open_study(study)
+    trials = tuning_study(asked)
+    folder = Path(out or folder_of_tuning(study))
     say(f"[bold]{escape(trials.question)}[/bold]")
     before = dry_run(trials, folder, jobs=jobs)
     say(_plan(before, folder))
     try:
         with _shown("trying", before.runs) as show:
-            tuned = try_all(study, folder, jobs=jobs, progress=show)
+            tuned = try_all(asked, folder, jobs=jobs, progress=show)
     except KeyboardInterrupt as stopped:
         return _stopped(stopped)
     for seen in tuned.seen:
@@ -81,7 +81,7 @@ def tune(name: str, out: Path | None, jobs: int | None) -> ExitCode:
     for choice in tuned.chosen:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")
-    say(f"Kept in {save_tuned(study, tuned)}")
+    say(f"Kept in {save_tuned(asked, tuned)}")
     return ExitCode.OK
 
 

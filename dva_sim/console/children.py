@@ -14,7 +14,7 @@ from dva_sim.console.pipes import LinePipe
 from dva_sim.kernel.errors import ERROR, RunsFailed
 
 SERVING_WITHIN = 30.0  # from the start of the web process to its first word [s]
-END_WITHIN = 1.2  # for a child to end by itself once it is asked to [s]
+END_WITHIN = 0.8  # for a child to end by itself once it is asked to [s]
 MOST_SAID = 10_000  # of what a child says on standard error [B]
 
 

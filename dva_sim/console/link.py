@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
-from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.scenario import Scenario, start_needs_s, time_out_s
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {
     "delay_s": (0.0, 5.0),
@@ -31,7 +31,8 @@ def read(given: Mapping[str, Any]) -> dict[str, float]:
         value = given.get(key)
         if value is None:
             continue
-        if not isinstance(value, int | float) or not least <= value <= most:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not least <= value <= most:
             raise ConfigError(f"{key} should be a number from {least:g} to {most:g}")
         values[key] = float(value)
     return values
@@ -67,8 +68,16 @@ def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
 
 
 def with_link(scenario: Scenario, link: LinkConfig, processing: float | None) -> Scenario:
-    """A scenario over another link, to ask what time-outs that needs."""
+    """A scenario over another link, with time-outs as they are, or as long as that needs."""
     robot = scenario.robot
     if processing is not None:
         robot = robot.model_copy(update={"processing_s": processing})
-    return scenario.model_copy(update={"link": link, "robot": robot})
+    made = scenario.model_copy(update={"link": link, "robot": robot})
+    needed = time_out_s(start_needs_s(made))
+    waits = {
+        key: getattr(scenario, key).model_copy(
+            update={"timeout_s": max(needed, getattr(scenario, key).timeout_s or 0.0)}
+        )
+        for key in ("request", "command")
+    }
+    return made.model_copy(update=waits)

@@ -20,7 +20,7 @@ from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
 
 WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
-LAST_WORDS = 0.3  # of virtual time, for robots that are told to stop [s]
+LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
 FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")

@@ -26,7 +26,12 @@ from dva_sim.console.seat_lines import SeatLines
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.simulation.scenario import Scenario, command_timeout_s, phone_profile
+from dva_sim.simulation.scenario import (
+    Scenario,
+    command_timeout_s,
+    mean_processing_s,
+    phone_profile,
+)
 
 Line = dict[str, Any]
 Tell = Callable[..., object]
@@ -44,6 +49,7 @@ class World:
         scenario: What the run consists of.
         name: Of the scenario.
         seed: Decides all luck.
+        clock: Its time; default: real time.
 
     Attributes:
         clock: Virtual time, at its pace.
@@ -55,12 +61,14 @@ class World:
         ConfigError: the site cannot hold the team, or the events.
     """
 
-    def __init__(self, scenario: Scenario, name: str, seed: int) -> None:
+    def __init__(
+        self, scenario: Scenario, name: str, seed: int, clock: PacedClock | None = None
+    ) -> None:
         if scenario.transport == "zeromq" and scenario.network_depth == "auto":
             # A later link may lose or delay anything: only the segments are right for all.
             scenario = scenario.model_copy(update={"network_depth": "segment"})
         self.scenario, self.name, self.seed = scenario, name, seed
-        self.clock, self.recorder = PacedClock(), ConsoleRecorder()
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
         watched = Watched(self.clock, self.recorder, cameras, PEOPLE, keeps=False)
         self.run = Run(scenario, seed, watched=watched)
@@ -145,13 +153,10 @@ class World:
             "jitter_s": link.jitter_s,
             "loss": link.loss,
             "rate_bps": link.rate_bps,
-            "processing_s": self.wanted.get("processing_s", self._processing()),
+            "processing_s": self.wanted.get("processing_s", mean_processing_s(self.scenario)),
             "kind": "modelled",
             "trace": trace or link.delay_log,
         }
-
-    def _processing(self) -> float:
-        return max((_mean(robot.processing_s) for robot in self.run.stage.robots), default=0.0)
 
     def clock_line(self) -> Line:
         """How time goes by."""
@@ -311,7 +316,3 @@ def camera_url(base: str, label: str) -> str:
 def topic_of(url: str) -> str | None:
     """The frames of a console's cameras, whose URL is one for browsers."""
     return FRAME if url.startswith("http") else None
-
-
-def _mean(service: Any) -> float:
-    return float(getattr(service, "mean_s", service))

@@ -30,7 +30,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings.writing import PART, write_recording
+from dva_sim.recordings.writing import PART, check_target, write_recording
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.hazards import draw_incidents
@@ -343,6 +343,20 @@ def finish(part: Path, target: Path, own_code: bool = True) -> float:
     write_recording(playback, target, about=about, traces=told.traces)
     part.unlink(missing_ok=True)
     return playback.duration
+
+
+def whole(file: Path) -> Path:
+    """A recording to replay; what a live run left whose supervisor was killed is made one first.
+
+    Raises:
+        DvaSimError: it cannot be made one.
+    """
+    if file.suffix != PART:
+        return file
+    target = file.with_suffix("")
+    check_target(target, way=f"rename it, or {file}")
+    finish(file, target, own_code=False)
+    return target
 
 
 class _Told:

@@ -162,6 +162,7 @@ class LiveClock(Clock):
 
 
 MOST_BEHIND = 1.0  # so far a paced clock runs after the wall clock; what is more is given up [s]
+HEEDED = 0.02  # what is less late is in time [s]
 FASTEST = 20.0  # that a paced clock goes, as a multiple of real time
 
 
@@ -175,7 +176,7 @@ class PacedClock(LiveClock):
         factor: How many virtual seconds go by in a real one.
 
     Attributes:
-        on_late: Told by how much real time an event came too late [s]; asked for each that does.
+        on_late: Told by how much real time an event comes too late [s], if more than `HEEDED`.
         given_up: Real time that was never made up for, in all [s].
     """
 
@@ -246,15 +247,27 @@ class PacedClock(LiveClock):
 
     def _catch_up(self, end: float) -> None:
         """See `LiveClock`; whoever heeds the lag hears of it before what comes too late happens."""
-        due = self.env.peek()
+        env = self.env
+        for _ in range(AT_ONCE):
+            due = env.peek()
+            if due > min(self._real(), end):
+                break
+            self._look_behind(int(due))
+            env.step()
+            if not self._running:
+                return
+        env._now = max(env._now, min(self._real(), end, env.peek()))
+
+    def _look_behind(self, due: int) -> None:
+        """By how much an event comes too late that was due at a time."""
         behind = (self._real() - due) / US / self._factor
-        if behind > 0.0 and due < math.inf:
-            self._worst = max(self._worst, behind)
+        if behind > self._worst:
+            self._worst = behind
+        if behind > HEEDED:
             self.on_late(behind)
-            if behind > MOST_BEHIND:
-                self.given_up += behind - MOST_BEHIND
-                self._rebase(int(due + MOST_BEHIND * self._factor * US))
-        super()._catch_up(end)
+        if behind > MOST_BEHIND:
+            self.given_up += behind - MOST_BEHIND
+            self._rebase(int(due + MOST_BEHIND * self._factor * US))
 
 
 class _Pulse:

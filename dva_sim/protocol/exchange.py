@@ -110,7 +110,7 @@ class Hearing(Enum):
 
 
 class Nuisances:
-    """Who sends what is no message, and is listened to less and less; pure.
+    """Who sends what is refused as it arrives, and is listened to less and less; pure.
 
     Each connection has a count of its bad messages that goes down with time, and is halved by
     each good one. Above `UNANSWERED` nobody tells it any more what was wrong; above `UNREAD` it is

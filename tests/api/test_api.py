@@ -3,16 +3,15 @@
 import asyncio
 import inspect
 import json
+import pickle
 import sys
 from pathlib import Path
 
 import numpy as np
 import patience
 import pytest
-import typer
 
 import dva_sim
-from dva_sim import cli
 from dva_sim.experiments.study.loading import pairs_of
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
@@ -141,33 +140,6 @@ def test_a_script_needs_no_guard(study):
     assert python(str(script), folder=study.parent) == "4 1\n"
 
 
-# Options of the command line that a notebook has elsewhere, or under a name with its unit.
-ELSEWHERE = {
-    "run": {"dry_run": dva_sim.dry_run, "limit": "limit_s"},
-    "compare": {"measure": dva_sim.Comparison.frame, "by": dva_sim.Comparison.frame}
-    | {"fail_if": dva_sim.Comparison.judge},
-}
-COMMANDS = ["run", "new", "register", "tune", "report", "show", "export", "compare"]
-
-
-PRINTED = {"quiet", "verbose", "json"}  # of what a terminal shows; functions show nothing
-
-
-@pytest.mark.parametrize("name", [*COMMANDS, "episode", "replay"])
-def test_commands_and_functions_have_the_same_words(name):
-    command = typer.main.get_command(cli.app).commands[name]
-    options = {p.opts[-1].removeprefix("--").replace("-", "_") for p in command.params}
-    function = getattr(dva_sim, name)
-    known = set(inspect.signature(function).parameters)
-    for option in options - PRINTED:
-        other = ELSEWHERE.get(name, {}).get(option)
-        if callable(other):
-            assert option in {other.__name__, *inspect.signature(other).parameters}
-        else:
-            assert (other or option) in known, option
-    assert known - options <= {"progress", "limit_s"} | ({"report"} if name == "run" else set())
-
-
 def test_a_dry_run_asks_as_a_run_does():
     asked = inspect.signature(dva_sim.dry_run).parameters
     there = inspect.signature(dva_sim.run).parameters
@@ -230,10 +202,26 @@ def test_nothing_is_printed(study, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_importing_the_package_loads_nothing_heavy():
-    heavy = ["numpy", "pydantic", "duckdb", "scipy", "matplotlib", "rich", "dva_sim.api"]
-    code = f"import sys, dva_sim; print([name for name in {heavy} if name in sys.modules])"
-    assert python("-c", code, folder=".") == "[]\n"
+HEAVY = ["numpy", "pydantic", "duckdb", "scipy", "matplotlib", "rich", "dva_sim.experiments"]
+
+
+@pytest.mark.parametrize(("module", "absent"), [("dva_sim", "dva_sim.api"), ("dva_sim.cli", "zmq")])
+def test_importing_the_package_or_the_commands_loads_nothing_heavy(module, absent):
+    code = f"import sys, {module}; print({{*{HEAVY}, {absent!r}}} & {{*sys.modules}})"
+    assert python("-c", code, folder=".") == "set()\n"
+
+
+def test_what_functions_return_can_be_kept_and_is_known_by_its_class(results):
+    once = dva_sim.episode("drive-to-event", set={"horizon_s": 2})
+    again = pickle.loads(pickle.dumps(once))
+    assert isinstance(again, dva_sim.Episode)
+    assert again.measures == pytest.approx(once.measures, nan_ok=True)
+    assert isinstance(results, dva_sim.Results)
+    assert pickle.loads(pickle.dumps(results)).manifest == results.manifest
+    earlier = [pickle.loads(f"cdva_sim.api\n{name}\n.".encode()) for name in ("Episode", "Results")]
+    assert earlier == [dva_sim.Episode, dva_sim.Results]
+    with pytest.raises(AttributeError, match="no attribute 'Fly'"):
+        _ = dva_sim.api.Fly
 
 
 def test_what_is_there_is_told_and_nothing_else_is_found():

@@ -29,7 +29,8 @@ BLOCKS, ROUND_TRIPS = 30, 200  # in turns, so that noise hits both
 # Goal: 1.6. A loop that polls, with a ROUTER that does nothing, comes to that by itself; the rest
 # is the code that runs at both ends, each time after a sleep in which it has left the caches.
 MOST = 8.0
-COMMAND = m.SetTeleOp(0.1, 0.05, 86320)
+TICK = 86_320  # [ms]
+COMMAND = m.SetTeleOp(0.1, 0.05, TICK)
 SETTINGS = {"robot.processing_s": 0, "robot.watchdog_s": 60, "robot.max_age_s": 120}
 
 
@@ -48,7 +49,7 @@ def be_a_robot() -> None:
     field = Field(stage(network))
     field.populate()
     robot = field.robots[ROBOT]
-    robot.controller.clock_offset = 0.0  # so that the command's tick is never too old
+    robot.controller.clock_offset = TICK / 1000  # so that the command's tick is never to come
     grant = m.PermissionGrant(OPERATOR, "teleoperation", SESSION)
     message = m.Message(ROBOT, 1, DVA, "12:00:00", SESSION, grant)
     assert robot.controller.handle(message, 0.0, 0.0, False).code == m.OK

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from office import Office
 from transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
 
 from dva_sim.agents.device import HEARTBEAT, AgentDevice
+from dva_sim.network import sockets
+from dva_sim.network.realtime import LiveClock
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.simulation.full import dva_server
@@ -63,16 +66,21 @@ class Site:
         return self.entries[id_tag].silent
 
 
-def registration(device: AgentDevice) -> m.Registration:
-    return m.Registration(device.label, device.device_type, device.address)
+def site_with(
+    id_tag: str, world: World, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Site, AgentDevice]:
+    """A site whose DVA knows one device."""
+    site = Site(world, monkeypatch)
+    device = site.device(id_tag)
+    device.ask(DVA, m.Registration(device.label, device.device_type, device.address))
+    world.run_until(lambda: id_tag in site.entries)
+    return site, device
 
 
 def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = Site(world, monkeypatch)
-    phone = site.device(PHONE)
-    phone.ask(DVA, registration(phone))
+    site, phone = site_with(PHONE, world, monkeypatch)
     site.beating.add(PHONE)
     site.hears(PHONE)
     site.beating.clear()
@@ -92,10 +100,7 @@ def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
 def test_who_is_forgotten_learns_that_and_registers_again(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = Site(world, monkeypatch)
-    phone = site.device(PHONE)
-    phone.ask(DVA, registration(phone))
-    world.run_until(lambda: PHONE in site.entries)
+    site, phone = site_with(PHONE, world, monkeypatch)
     site.be_quick()
     world.run_until(lambda: PHONE not in site.entries)
     site.be_patient()
@@ -110,10 +115,7 @@ def test_who_is_forgotten_learns_that_and_registers_again(
 def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = Site(world, monkeypatch)
-    robot = site.device(ROBOT)
-    robot.ask(DVA, registration(robot))
-    world.run_until(lambda: ROBOT in site.entries)
+    site, _ = site_with(ROBOT, world, monkeypatch)
     world.leave(ROBOT)
     failed: list[bool] = []
     site.dva.device.ask(ROBOT, m.GetSensorInfo(), on_failure=lambda: failed.append(True))
@@ -135,6 +137,37 @@ def test_waves_of_devices_that_vanish_leave_no_file_open(monkeypatch: pytest.Mon
     finally:
         world.close()
     assert max(levels[1:]) <= levels[0]
+
+
+def memory() -> float:
+    """How much of it this process has [MB]."""
+    pages = Path("/proc/self/statm").read_text().split()[1]
+    return int(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@pytest.mark.skipif(not FILES.exists(), reason="no list of memory")
+def test_the_memory_of_connections_that_are_closed_goes_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sockets, "GIVE_BACK", 0.1)
+    network = sockets.SocketNetwork(LiveClock())
+    try:
+        network.introduce(ROBOT, "127.0.0.1:9")
+        sockets.give_back_memory()
+        before = memory()
+        heard = [network.subscribe(DVA, ROBOT, f"{n}|", print) for n in range(300)]
+        network.clock.run(network.clock.now + 0.1)
+        taken = memory() - before
+        for subscription in heard:
+            subscription.close()
+        heard.clear()
+        network.clock.run(network.clock.now + 300 * sockets.LOOK_ASIDE / sockets.CLOSED_AT_ONCE)
+        network.clock.run(network.clock.now + 1.0)
+        kept = memory() - before
+    finally:
+        network.close()
+    assert taken > 5.0
+    assert kept < taken / 2
 
 
 def files() -> int:

@@ -141,8 +141,11 @@ class CommandSender:
         """The robot says who holds it, for those whom nobody answers."""
         message = self._device.read(data, self.drive.robot) if self._on else None
         if message is not None and isinstance(body := message.body, RobotHolder):
-            now, sent = self.clock.now, self.drive.sent
+            now, sent, was_late = self.clock.now, self.drive.sent, self.refusals.late
             self._heed(self.refusals.held(body.holder, body.code, now, sent))
+            if self._on and self.refusals.late and not was_late:
+                self._device.recorder.counters["alerts: every command comes late"] += 1
+                self._device.tell("is told that every command comes late", "drive")
 
     def _heed(self, why: str) -> None:
         if why and self._on and self._heeds:

@@ -15,7 +15,7 @@ from dva_sim.agents.operator.held_robot import Console, HeldRobot, Said, ask_eme
 from dva_sim.protocol import messages as m
 
 MOST_ROBOTS = 2  # that one person drives by the same input
-DECLINED_AFTER = 15.0  # an order to a seat in which nobody sits [s]
+DECLINED_AFTER = 30.0  # an order to a seat in which nobody sits [s]
 THERE = 3.0  # so near the place of an event a robot has arrived [m]
 
 

@@ -14,6 +14,9 @@ from dva_sim.protocol import messages as m
 ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # whether the permission holds is for the DVA to say
 PASSES = (m.STALE, m.OUT_OF_ORDER)  # such a command came late: the next may not
 LATE_FOR = 10.0  # but if nothing else has come for so long, and `ENOUGH` of them, none will [s]
+SAYS_LATE_FOR = 40.0
+"""The same of what is published [s]: the app alerts after `LATE_FOR`, but a robot that is only slow
+ends the drive itself by then, when it has obeyed nothing for 30 s."""
 ENOUGH = 3  # answers in a row of any other kind, as of sends without an answer
 TAKEN = "somebody else holds the robot"
 
@@ -26,11 +29,13 @@ class Refusals:
         me: Id of the device that drives.
         codes: How often commands were answered with each code but OK.
         last: The code that ended it.
+        late: Whether every command has come late for `LATE_FOR`.
     """
 
     me: str
     codes: Counter[int] = field(default_factory=Counter)
     last: int | None = None
+    late: bool = False
     _in_vain: int = 0
     _late: int = 0
     _late_since: float = 0.0
@@ -50,7 +55,7 @@ class Refusals:
             return ""
         self.codes[m.BAD_MESSAGE if code is None else code] += 1
         if code in PASSES:
-            return self._too_late(code, now)
+            return self._too_late(code, now, LATE_FOR)
         self._in_vain += 1
         if code not in m.OBEYS_NO_MORE and self._in_vain < ENOUGH:
             return ""
@@ -72,10 +77,11 @@ class Refusals:
         ours, goes_on, self._sent = holder == self.me, sent > self._sent, sent
         if ours and (code == m.OK or code in PASSES):
             self._confirmed, self._doubtful = True, 0
-            self._late *= code != m.OK
+            if code == m.OK:
+                self._late, self.late = 0, False
             if code == m.OK or not goes_on:
                 return ""
-            why = self._too_late(code, now)
+            why = self._too_late(code, now, SAYS_LATE_FOR)
             self.codes[code] += bool(why)
             return why
         self._doubtful += 1
@@ -84,13 +90,14 @@ class Refusals:
         self.codes[code if ours else m.NOT_PERMITTED] += 1
         return self._over(code) if ours else self._over(m.NOT_PERMITTED, TAKEN if holder else "")
 
-    def _too_late(self, code: int, now: float) -> str:
+    def _too_late(self, code: int, now: float, limit: float) -> str:
         """One more that came late, and none that did not since the first of them."""
         if self._late == 0:
             self._late_since = now
         self._late += 1
-        late = self._late >= ENOUGH and now - self._late_since >= LATE_FOR
-        return self._over(code, f"{m.CODE_NAMES[code]} for {LATE_FOR:g} s") if late else ""
+        since = now - self._late_since if self._late >= ENOUGH else 0.0
+        self.late = since >= LATE_FOR
+        return self._over(code, f"{m.CODE_NAMES[code]} for {limit:g} s") if since >= limit else ""
 
     def _over(self, code: int | None, why: str = "") -> str:
         self.last = code

@@ -1,10 +1,10 @@
 """A robot's computer: it takes one message at a time, each for its processing time.
 
 That time is always the same, or drawn from a distribution. Whoever holds the robot has every second
-turn, and all strangers together, however many, a fifth of the time while it is driven: what
-they can take from the holder must not grow with their connections, which cost them nothing. An
-emergency waits for nobody but the one message that is being worked on, and one processing
-answers all that have come by its end: more of them cannot stop the robot any better.
+turn, and all strangers together, however many, at most a fifth of the time while it is driven, if
+they can behind the holder's messages: what they take must not grow with their connections, which
+cost them nothing. An emergency waits for the one message that is being worked on, and one
+processing answers all that have come by its end: more of them cannot stop the robot any better.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
+OTHERS = 64  # messages that may wait of all but the holder: each look at them has its price
 EACH = 8  # messages that may wait of a connection that is not the holder's
 REST = 4.0  # how long strangers rest after a message of theirs, in times of its processing
+AFTER_HOLDER = 1.0  # and for so long they wait for a message of its holder, to come behind it [s]
 TICK = 1e-6  # of the clock [s]
 
 
@@ -83,7 +85,7 @@ class FairQueue:
     where there is no room at all, the newest of the longest line makes some, strangers first.
 
     Args:
-        limit: How many messages of the holder may wait, and how many of all others.
+        limit: How many messages of the holder may wait; of others no more than `OTHERS`.
         standing: Of a message, by now: a grant that comes meanwhile counts.
     """
 
@@ -112,9 +114,10 @@ class FairQueue:
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
         if standing is not Standing.HOLDER and sum(mine) >= EACH:
             return letter
-        if self._length >= self._limit:
+        places = self._limit if standing is Standing.HOLDER else min(self._limit, OTHERS)
+        if self._length >= places:
             beside = self._beside(standing is Standing.HOLDER)
-            if sum(map(len, beside.values())) >= self._limit:
+            if sum(map(len, beside.values())) >= places:
                 worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
                 if (standing, mine[letter.moves] + 1) >= self._rank(line):
                     return letter
@@ -127,11 +130,15 @@ class FairQueue:
         return self._standing(line[0]), len(line)
 
     def pop(self, standing: Standing) -> Letter | None:
-        """The next one of a standing, control first; its line waits until all others had a turn."""
+        """The next one of a standing; its line then waits until all others have had their turn.
+
+        The holder's control comes before its commands. With strangers that would let some keep
+        others out.
+        """
         lines = [key for key, line in self._lines.items() if self._standing(line[0]) is standing]
         if not lines:
             return None
-        key = min(lines, key=lambda one: one[1])
+        key = min(lines, key=lambda one: one[1]) if standing is Standing.HOLDER else lines[0]
         self._lines.move_to_end(key)
         return self._take(key)
 
@@ -160,8 +167,8 @@ def _nobody_waits(_: Letter) -> None:
 class CommandQueue:
     """Emergencies first, but for every second turn; the holder's next after each of another.
 
-    The holder's next message waits for one message of others at most, for two where one of the
-    holder's own was being worked on; while emergencies come, for as many of these in addition.
+    The holder's next message waits for one message of others at most, for two messages where one
+    of the holder's own is being worked on, and for four while emergencies come.
 
     Args:
         clock: The run's clock.
@@ -169,7 +176,7 @@ class CommandQueue:
         handle: Takes each letter when its processing is done.
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
-        limit: How many messages of the holder may wait, of all others, and emergencies.
+        limit: How many messages of the holder may wait, and how many emergencies.
         read: Reads what arrives, before it waits: what is None was refused, and takes no time.
             Without it all is taken as bytes, and only emergencies are read.
         standing: Of a message, by now.
@@ -203,7 +210,7 @@ class CommandQueue:
         self._emergencies: list[Letter] = []
         self._waiting = FairQueue(limit, standing)
         self._last, self._turns = Standing.HOLDER, [Standing.DVA, Standing.STRANGER]
-        self._rested = 0.0  # strangers are, from then on [s]
+        self._rested = -math.inf  # strangers are, from then on [s]
         self.longest = self.superseded = self.overflowed = 0
 
     def __len__(self) -> int:
@@ -271,7 +278,7 @@ class CommandQueue:
             if self._paused:
                 self._take_more()
             duration = self.service()
-            if self._last is Standing.STRANGER and not self._was_urgent:
+            if duration > 0.0 and self._last is Standing.STRANGER and not self._was_urgent:
                 self._rested = self._clock.now + (1.0 + REST) * duration
             if duration > 0.0:
                 self._clock.call_after(duration, self._done, letters)
@@ -303,12 +310,17 @@ class CommandQueue:
         return None
 
     def _strangers_rest(self) -> bool:
-        """Whether they have to wait although nobody else does; then there is an end to it."""
-        if self._clock.now >= self._rested - TICK or not self._driven():
+        """Whether they have to wait although nobody else does.
+
+        Behind a message of the holder there is most time until its next one.
+        """
+        behind_holder = self._busy and self._last is Standing.HOLDER
+        until = self._rested + (0.0 if behind_holder else AFTER_HOLDER)
+        if self._clock.now >= until - TICK or not self._driven():
             return False
         if not self._waking:
             self._waking = True
-            self._clock.call_at(self._rested, self._wake)
+            self._clock.call_at(self._rested + AFTER_HOLDER, self._wake)
         return True
 
     def _wake(self) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from dva_sim.console.web.access import Entrance, Tokens, rules
 from dva_sim.console.web.app import make_app
-from dva_sim.console.web.camera import Cameras
+from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.server import listen, make_server, serve
 from dva_sim.console.web.simulation import Simulation
@@ -52,7 +52,7 @@ async def run(options: argparse.Namespace) -> None:
     access = rules(options.host, port, options.name, tokens)
     simulation = Simulation()
     hub = Hub(simulation)
-    cameras = Cameras(simulation, hub.clients.watched)
+    cameras = CameraStreams(simulation, hub.clients.watched)
     hub.watching = cameras.tell
     ended = simulation.ended
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
@@ -61,17 +61,17 @@ async def run(options: argparse.Namespace) -> None:
     if options.pictures_fd is not None:
         await cameras.open(options.pictures_fd)
     telling = asyncio.ensure_future(cameras.keep_telling())
-    closing = asyncio.ensure_future(_close_when(ended, hub, simulation))
+    closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     app = make_app(access, hub, cameras, StaticFiles())
     await serve(make_server(app), sock, _after(closing))
     telling.cancel()
-    cameras.close()
     simulation.close()
 
 
-async def _close_when(ended: asyncio.Event, hub: Hub, simulation: Simulation) -> None:
+async def _close_when(ended: asyncio.Event, hub: Hub, cameras: CameraStreams) -> None:
     await ended.wait()
-    await hub.close(simulation.why or "the console was ended")
+    cameras.close()
+    await hub.close(hub.simulation.why or "the console was ended")
     await asyncio.sleep(FAREWELL)
 
 

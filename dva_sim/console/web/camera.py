@@ -18,14 +18,14 @@ from dva_sim.console.web.simulation import Simulation
 BOUNDARY = "dva-sim-frame"
 LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
 SILENCE = 3.0  # of who draws, after which there is no picture [s]
-STARTING = 20.0  # before the first word [s]
+STARTING = 60.0  # before the first word, which comes when the site is built [s]
 REPEATED = 1.0  # so often is said again who is watched [s]
 ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
 FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
 MOST_VIEWERS = 64
 
 
-class Cameras:
+class CameraStreams:
     """The newest picture of each robot that is looked at.
 
     Args:
@@ -47,6 +47,7 @@ class Cameras:
         self._deadline = 0.0
         self._ok = True
         self._notified: set[asyncio.Task[None]] = set()
+        self._is_over = False
         self.skipped = 0
 
     async def open(self, number: int) -> None:
@@ -62,6 +63,9 @@ class Cameras:
         for picture in self._unpacker.feed(data):
             if picture.robot != ALIVE:
                 self._newest[picture.robot] = picture, now
+        self._wake()
+
+    def _wake(self) -> None:
         task = asyncio.ensure_future(self._notify())
         self._notified.add(task)
         task.add_done_callback(self._notified.discard)
@@ -127,8 +131,7 @@ class Cameras:
         try:
             yield f"--{BOUNDARY}\r\n".encode()
             shown: Picture | None = None
-            while True:
-                picture = await self._after(robot, shown)
+            while (picture := await self._after(robot, shown)) is not None:
                 if shown is not None and picture.number > shown.number + 1:
                     self.skipped += picture.number - shown.number - 1
                 shown = picture
@@ -150,19 +153,21 @@ class Cameras:
         finally:
             self._look_away(robot)
 
-    async def _after(self, robot: int, shown: Picture | None) -> Picture:
-        """The newest picture once it is another one."""
+    async def _after(self, robot: int, shown: Picture | None) -> Picture | None:
+        """The newest picture once it is another one; None if there will be no more."""
 
         def is_new() -> bool:
             return robot in self._newest and self._newest[robot][0] is not shown
 
         async with self._drawn:
-            await self._drawn.wait_for(is_new)
-        return self._newest[robot][0]
+            await self._drawn.wait_for(lambda: self._is_over or is_new())
+        return None if self._is_over else self._newest[robot][0]
 
     def close(self) -> None:
-        """Take no more pictures."""
+        """Take no more pictures, and end all streams."""
+        self._is_over = True
         self._pipe.close()
+        self._wake()
 
 
 def part(picture: Picture) -> bytes:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -15,7 +15,7 @@ from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import Bucket, Refused, asked_of, id_of, read, robots
+from dva_sim.console.web.actions import BadMessage, Bucket, asked_of, id_of, read, robots
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say, wire_of
@@ -23,10 +23,10 @@ from dva_sim.console.web.state import body_of, encode
 
 LOOKS_RATE, LOOKS_BURST = 20.0, 60  # messages of a page that looks [1/s]
 DRIVES_RATE, DRIVES_BURST = 150.0, 300  # of one that drives [1/s]
-TOO_MUCH, NONSENSE, STUCK, LEAVING = 1008, 1008, 1013, 1001
+REFUSED, STUCK, LEAVING = 1008, 1013, 1001  # why a socket is closed
 
 Next = Callable[[], str | None]
-Hear = Callable[[str], Awaitable[None]]
+Hear = Callable[[str], None]
 
 
 class Hub:
@@ -64,7 +64,7 @@ class Hub:
         await ws.accept()
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
-        async def hear(text: str) -> None:
+        def hear(text: str) -> None:
             self._hear_looker(client, text)
 
         def following() -> str | None:
@@ -86,7 +86,7 @@ class Hub:
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
             self.watching()
         else:
-            raise Refused("no such message; there are: ping, resync, watch")
+            raise BadMessage("no such message; there are: ping, resync, watch")
         client.wake.set()
 
     def _leave(self, client: Client) -> None:
@@ -122,7 +122,7 @@ class Hub:
             driver.seat("{" + known.body)
         await ws.accept()
 
-        async def hear(text: str) -> None:
+        def hear(text: str) -> None:
             self._hear_driver(client, driver, text)
 
         try:
@@ -152,7 +152,7 @@ class Hub:
                 return
             asked["id"] = id_of(key)
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
-        except Refused as error:
+        except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
             driver.answer(encode(line | {"text": str(error)}))
 
@@ -190,13 +190,14 @@ class Hub:
     async def _receive(self, ws: WebSocket, hear: Hear, bucket: Bucket) -> None:
         """Messages of a page, as long as they make sense and are not too many."""
         while (text := await heard(ws)) is not None:
-            if not bucket.takes(time.monotonic()):
-                wire_of(ws).drop(TOO_MUCH, "too many messages")
-                return
             try:
-                await hear(text)
-            except Refused as error:
-                wire_of(ws).drop(NONSENSE, str(error)[:100])
+                if isinstance(text, bytes):
+                    raise BadMessage("is not text")
+                if not bucket.takes(time.monotonic()):
+                    raise BadMessage("too many messages")
+                hear(text)
+            except BadMessage as error:
+                wire_of(ws).drop(REFUSED, str(error)[:100])
                 return
 
     async def close(self, why: str) -> None:

@@ -13,7 +13,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 STALLED = 5.0  # without a byte taken, a page is dropped [s]
-FAREWELL = 2.0  # for what is on its way to a page that was dropped [s]
+FAREWELL = 10.0  # for what is on its way to a page that was dropped [s]
 WIRE = "dva_sim.wire"
 
 
@@ -69,11 +69,12 @@ async def say(ws: WebSocket, text: str) -> bool:
         sending.cancel()
 
 
-async def heard(ws: WebSocket) -> str | None:
-    """The next message of a page; None if it is gone, or sends what is no text."""
+async def heard(ws: WebSocket) -> str | bytes | None:
+    """The next message of a page; None if it is gone."""
     try:
         message = await ws.receive()
     except (WebSocketDisconnect, RuntimeError):
         return None
-    text = message.get("text")
-    return text if isinstance(text, str) else None
+    text: str | None = message.get("text")
+    data: bytes | None = message.get("bytes")
+    return data if text is None else text

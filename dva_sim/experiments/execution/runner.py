@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABL
 from dva_sim.experiments.results.tables import design_row, write_tables
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, StudyJob
+from dva_sim.experiments.study.loading import Settings, pairs_of
 from dva_sim.experiments.study.own_measures import own_measures
 from dva_sim.experiments.study.stopping import is_enough, rounds
 from dva_sim.experiments.study.study import Study, Version
@@ -238,29 +239,23 @@ def _tidy(out: Path) -> None:
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A study, which variant of it, where to, and on which processes.
-
-    Attributes:
-        study: By name or path.
-        out: Results folder; None for `results/` and the study's name.
-        changes: Keys to change, as `key=value`.
-        quick: The study's small version.
-        full: The study's larger version.
-        pilot: Only so many persons, with a random seed of their own.
-        jobs: Processes of this machine; by default one for each core.
-        scheduler: Address of a dask.distributed cluster to use instead.
-        limit_s: A run that takes longer, by the wall clock, has failed.
-    """
+    """A study, which variant of it, where to, and on which processes: options of `dva_sim.run`."""
 
     study: str | Path
-    out: Path | None = None
-    changes: Sequence[str] = ()
-    quick: bool = False
-    full: bool = False
-    pilot: int | None = None
+    out: str | Path | None = None
+    set: Settings = ()
+    seed: int | None = None
     jobs: int | None = None
     scheduler: str | None = None
     limit_s: float = LIMIT_S
+    quick: bool = False
+    full: bool = False
+    pilot: int | None = None
+
+    @cached_property
+    def changes(self) -> list[str]:
+        """Keys to change, as `key=value`."""
+        return pairs_of(self.set, self.seed)
 
     @property
     def version(self) -> Version | None:
@@ -277,7 +272,7 @@ class RunRequest:
     def folder(self) -> Path:
         """Where results go; if nobody says, each variant of a study has its own folder."""
         marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
-        return self.out or Path("results") / "-".join(filter(None, marks))
+        return Path(self.out or Path("results") / "-".join(filter(None, marks)))
 
     def plan(
         self, study: Study, cells: Sequence[DesignCell], probe: Simulate | None = None

@@ -12,12 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from dva_sim.experiments.study.loading import Settings, pairs_of
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import resolved
 from dva_sim.network.patterns import known_patterns
 from dva_sim.recordings import Opened, check_target, read_recording, write_recording
-from dva_sim.recordings.pictures import Wanted
+from dva_sim.recordings.pictures import Wanted, joined
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, simulate
 from dva_sim.simulation.models import AnyScenario, Model, Tables, model_for, model_of
@@ -57,7 +58,7 @@ class EpisodeRequest:
     Attributes:
         scenario: By name or path.
         seed: Of the run.
-        changes: Keys to change, as `key=value`.
+        set: Keys to change.
         side_by_side: Two patterns to play the same seed under, separated by a comma.
         pictures: What to draw.
         record: File to keep the run in, `.mcap`.
@@ -69,11 +70,34 @@ class EpisodeRequest:
 
     scenario: str
     seed: int = 1
-    changes: Sequence[str] = ()
+    set: Settings = ()
     side_by_side: str | None = None
     pictures: Wanted = field(default_factory=Wanted)
     record: Path | None = None
     overwrite: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        scenario: str | Path,
+        seed: int,
+        *,
+        set: Settings,
+        side_by_side: str | Sequence[str] | None,
+        record: str | Path | None,
+        overwrite: bool,
+        **pictures: Any,
+    ) -> EpisodeRequest:
+        """From the options of `dva_sim.episode`; those that are not named here are of `Wanted`."""
+        return cls(
+            str(scenario),
+            seed,
+            set,
+            None if side_by_side is None else joined(side_by_side),
+            Wanted.of(**pictures),
+            None if record is None else Path(record),
+            overwrite,
+        )
 
     def __post_init__(self) -> None:
         if self.record is not None:
@@ -83,13 +107,18 @@ class EpisodeRequest:
         if self.side_by_side is not None and self.pictures.camera is not None:
             raise ConfigError("--camera shows one run; it does not go with --side-by-side")
 
+    @cached_property
+    def changes(self) -> list[str]:
+        """Keys to change, as `key=value`."""
+        return pairs_of(self.set)
+
     def scenarios(self) -> list[AnyScenario]:
         """What is to be played: one scenario, or two that differ by their pattern.
 
         Raises:
             ConfigError: it is not there or not valid, or its model has not what is asked for.
         """
-        document, changes = scenarios.load(self.scenario), parse_changes(list(self.changes))
+        document, changes = scenarios.load(self.scenario), parse_changes(self.changes)
         model = model_of(document)
         built = model.build(document, changes)
         if not isinstance(built, Scenario):

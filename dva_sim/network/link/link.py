@@ -81,7 +81,9 @@ class Link:
             ConfigError: a recorded delay cannot be read.
         """
         way = config.toward(self._direction)
-        before = self._newest_arrival(now)
+        before = self._last_arrival
+        if self._wobble is None:
+            before = max(before, self._serialiser.last_departure() + self._base)
         self._take(way)
         if isinstance(self._line, ConstantRate):
             self._line.change_rate(now, way.rate_bps)
@@ -90,14 +92,6 @@ class Link:
             self._last_arrival = max(self._last_arrival, before)
             self._wobble = self._wobble or _no_deviation
             self._is_steady = self._takes_trains = False
-
-    def _newest_arrival(self, now: float) -> float:
-        """When the last packet arrives at the latest that is still under way [s]."""
-        if self._wobble is not None:
-            return self._last_arrival
-        waiting = self._serialiser.backlog_bytes(now)
-        rate = self.rate_bps
-        return now + self._base + (8.0 * waiting / rate if rate else 0.0)
 
     def is_ideal(self) -> bool:
         """Whether it loses, spreads and reorders nothing by itself, and its rate is constant."""

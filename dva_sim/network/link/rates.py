@@ -28,6 +28,10 @@ class Serialiser(ABC):
     def depart(self, now: float, size: int) -> float:
         """When the last byte of a packet of `size` bytes [B] offered at `now` has left [s]."""
 
+    @abstractmethod
+    def last_departure(self) -> float:
+        """When the last byte that was taken has left, or will have [s]."""
+
     def offer(self, now: float, size: int, room: int) -> float | None:
         """The same where there is `room` for so many bytes [B]; None if the packet is too many."""
         if self.backlog_bytes(now) + size > room:
@@ -52,6 +56,10 @@ class ConstantRate(Serialiser):
     def backlog_bytes(self, now: float) -> float:
         """See `Serialiser`."""
         return max(0.0, self._free_at - now) / self._seconds_per_byte
+
+    def last_departure(self) -> float:
+        """See `Serialiser`."""
+        return self._free_at
 
     def depart(self, now: float, size: int) -> float:
         """See `Serialiser`."""
@@ -112,6 +120,10 @@ class TraceRate(Serialiser):
             self._backlog -= queued.popleft()[1]
         return float(self._backlog)
 
+    def last_departure(self) -> float:
+        """See `Serialiser`: at the opportunity that was used last."""
+        return self._time_of(self._index)
+
     def depart(self, now: float, size: int) -> float:
         """See `Serialiser`."""
         first = self._first_at(now)
@@ -144,6 +156,10 @@ class PacketQueue(Serialiser):
     def backlog_bytes(self, now: float) -> float:
         """See `Serialiser`."""
         return self._line.backlog_bytes(now)
+
+    def last_departure(self) -> float:
+        """See `Serialiser`."""
+        return self._line.last_departure()
 
     def depart(self, now: float, size: int) -> float:
         """See `Serialiser`."""

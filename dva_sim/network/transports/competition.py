@@ -114,6 +114,10 @@ class SharedLine(Serialiser):
         self._ends.append(end)
         return end
 
+    def last_departure(self) -> float:
+        """See `Serialiser`."""
+        return self._line.last_departure()
+
     def next_end(self, now: float) -> float:
         """When the packet under way has left [s]; `now` if there is none."""
         while self._ends and self._ends[0] <= now:
@@ -145,6 +149,10 @@ class Passing(Serialiser):
         start = self._free_at if self._free_at > now else self._line.next_end(now)
         self._line.depart(now, size)
         self._free_at = start + size * self._seconds_per_byte
+        return self._free_at
+
+    def last_departure(self) -> float:
+        """See `Serialiser`."""
         return self._free_at
 
 

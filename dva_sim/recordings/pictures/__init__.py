@@ -1,5 +1,5 @@
 """Pictures of runs: films, stills and strips from above, and what a robot's camera sees."""
 
-from dva_sim.recordings.pictures.requests import Wanted
+from dva_sim.recordings.pictures.requests import Wanted, joined
 
-__all__ = ["Wanted"]
+__all__ = ["Wanted", "joined"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
@@ -40,6 +41,19 @@ class Wanted:
     panels: int = 6
     camera: str | None = None
     inset: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        video: str | Path | None,
+        still: str | Path | None,
+        strip: str | Path | None,
+        at: float | str | Sequence[float] | None,
+        **others: Any,
+    ) -> Wanted:
+        """From options as programs and commands give them."""
+        film, moment, moments = (None if p is None else Path(p) for p in (video, still, strip))
+        return cls(film, moment, moments, None if at is None else joined(at), **others)
 
     def __post_init__(self) -> None:
         _check_path("video", self.video, MOVING)
@@ -124,6 +138,12 @@ class Wanted:
         if self.video is not None:
             film.write_film(Film(recordings, self.inset), self.video)
             yield f"Video: {self.video}"
+
+
+def joined(words: object) -> str:
+    """One word or number, or several, as on the command line."""
+    several = words if isinstance(words, list | tuple) else [words]
+    return ",".join(map(str, several))
 
 
 def _check_path(what: str, path: Path | None, endings: tuple[str, ...]) -> None:

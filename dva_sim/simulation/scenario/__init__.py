@@ -4,7 +4,9 @@ from dva_sim.simulation.scenario.contradictions import (
     TRIPS_OF_A_START,
     command_timeout_s,
     contradictions,
+    mean_processing_s,
     request_timeout_s,
+    start_needs_s,
     time_out_s,
 )
 from dva_sim.simulation.scenario.loading import FOLDER, build, check_policy, load, locate_files
@@ -35,10 +37,12 @@ __all__ = [
     "guard_profile",
     "load",
     "locate_files",
+    "mean_processing_s",
     "phone_profile",
     "population",
     "request_timeout_s",
     "robot_profiles",
     "site_of",
+    "start_needs_s",
     "time_out_s",
 ]

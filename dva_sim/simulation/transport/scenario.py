@@ -126,8 +126,9 @@ class SessionRecording(NamedTuple):
 def simulate_session(scenario: TransportScenario, seed: int) -> SessionRecording:
     """The network first, and then one drive over what it delivers."""
     contest = play(scenario, seed)
-    trial = task.play(scenario.task(), seed, recording_of(scenario, contest))[-1]
-    return SessionRecording(scenario, contest, trial)
+    trials = task.play(scenario.task(), seed, recording_of(scenario, contest))
+    failures = sum(trial["plugin_failures"] for trial in trials)  # while practising, too
+    return SessionRecording(scenario, contest, trials[-1] | {"plugin_failures": failures})
 
 
 def tables(recording: SessionRecording) -> dict[str, list[Row]]:

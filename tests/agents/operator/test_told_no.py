@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
-from dva_sim.agents.operator.refusals import ENOUGH, LATE_FOR, PASSES, Refusals
-from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.operator.refusals import ENOUGH, LATE_FOR, PASSES, SAYS_LATE_FOR, Refusals
+from dva_sim.agents.robot.controller import LEASE_S, Mode
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import id_of
@@ -55,8 +55,10 @@ def test_commands_of_which_all_come_late_end_it_after_the_stated_time(
 def test_word_that_all_come_late_counts_only_while_commands_are_sent(refusals: Refusals) -> None:
     assert not any(refusals.held(ME, m.STALE, float(now), sent=1) for now in range(60))
     assert not refusals.held(ME, None, 60.0, sent=2)
-    said = [bool(refusals.held(ME, m.STALE, 61.0 + n, sent=3 + n)) for n in range(11)]
-    assert said == [False] * 10 + [True]
+    said = [bool(refusals.held(ME, m.STALE, 61.0 + n, sent=3 + n)) for n in range(41)]
+    assert said == [False] * 40 + [True]
+    assert refusals.late
+    assert SAYS_LATE_FOR > LEASE_S
     assert refusals.codes == {m.STALE: 1}
 
 
@@ -127,10 +129,18 @@ def test_a_robot_to_which_every_command_comes_late_is_given_up_with_an_alert(
 ) -> None:
     dva, log = driving(pattern)
     dva.field.robots[ROBOT].refuses = code
-    ends(dva, log, within=LATE_FOR + 2.5)
-    assert log.refusal == code
-    dva.run_for(5.0)
-    assert dva.progress(1)[-1] == "failed"
+    if pattern not in ("pub-sub", "latest-wins"):
+        ends(dva, log, within=LATE_FOR + 2.5)
+        assert log.refusal == code
+        dva.run_for(5.0)
+        assert dva.progress(1)[-1] == "failed"
+        return
+    dva.run_for(LATE_FOR + 2.5)
+    recorder = dva.stage.recorder
+    assert recorder.counters["alerts: every command comes late"] == 1
+    assert "is told that every command comes late" in [m.what for m in recorder.timeline]
+    dva.run_until(lambda: "failed" in dva.progress(1), limit=SAYS_LATE_FOR)
+    assert "failed" in dva.progress(1)  # sooner by the person, who sees that it stands
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)

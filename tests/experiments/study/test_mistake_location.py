@@ -91,7 +91,7 @@ def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, 
     path = tmp_path / "one.yaml"
     path.write_text("description: one robot\nhorizon_s: 60\n")
     with pytest.raises(ConfigError) as caught, mistakes_of(str(path), ["horizon_s=5", setting], 1):
-        played(EpisodeRequest(str(path), changes=["horizon_s=5", setting]))
+        played(EpisodeRequest(str(path), set=["horizon_s=5", setting]))
     assert str(caught.value).startswith(f"--set {setting}: ")
     assert told in str(caught.value)
 

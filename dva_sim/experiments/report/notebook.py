@@ -1,0 +1,106 @@
+"""What functions of `dva_sim` return of runs and studies, and how a notebook shows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dva_sim.experiments.results.results import Frame, frame_of, plain
+from dva_sim.experiments.results.results import Results as ResultsData
+from dva_sim.kernel.suggestions import listed
+from dva_sim.simulation.full import Recording
+from dva_sim.simulation.full.measures import track_rows
+from dva_sim.simulation.models import AnyScenario, Tables, model_for
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.analysis.answer import Answer
+    from dva_sim.experiments.report.summary import Reading
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One run of one scenario.
+
+    Attributes:
+        scenario: As it was run.
+        seed: Of its luck.
+        tables: Its rows as columns, by table: `runs`, `events`, ...
+    """
+
+    scenario: AnyScenario
+    seed: int
+    tables: dict[str, Frame]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What in the scenario does not go together, each in a sentence."""
+        return model_for(self.scenario).contradictions(self.scenario)
+
+    @property
+    def measures(self) -> dict[str, Any]:
+        """The one row of the table of runs."""
+        return {name: values.tolist()[0] for name, values in self.tables["runs"].items()}
+
+    def __repr__(self) -> str:
+        """What came out of it, and what to ask it for."""
+        told = {name: plain(value) for name, value in self.measures.items()}
+        some = listed(f"{name} {value}" for name, value in told.items() if value)
+        tables = ", ".join(f"{name} ({table.rows})" for name, table in self.tables.items())
+        head = f"Episode of a {self.scenario.model} scenario, seed {self.seed}"
+        return "\n".join((head, f"measures: {some}", f"tables: {tables}"))
+
+    def _repr_html_(self) -> str:
+        meaning = {c.name: c.meaning for c in model_for(self.scenario).columns["runs"]}
+        rows = [
+            f"<tr><td>{escape(name)}</td><td>{escape(plain(value))}</td>"
+            f"<td>{escape(meaning.get(name, ''))}</td></tr>"
+            for name, value in self.measures.items()
+        ]
+        return f"<table>{''.join(rows)}</table>"
+
+
+def episode_of(scenario: AnyScenario, seed: int, tables: Tables, kept: object = None) -> Episode:
+    """A run by its tables; if what is kept of it is a recording, everybody's track is one more."""
+    tracks = {"tracks": track_rows(kept)} if isinstance(kept, Recording) else {}
+    made = {name: frame_of(rows) for name, rows in (tables | tracks).items()}
+    return Episode(scenario, seed, made)
+
+
+class Results(ResultsData):
+    """What a study left behind, and what it says."""
+
+    _offers = "answer, failures, machine, report()"
+
+    @cached_property
+    def reading(self) -> Reading:
+        """What the runs say, in words and tables."""
+        from dva_sim.experiments.report.summary import Reading  # late: start-up
+
+        return Reading(self)
+
+    @property
+    def answer(self) -> Answer:
+        """The answer to the question in words, with its interval, and what must be known of it."""
+        return self.reading.answer
+
+    def report(self) -> Path:
+        """Make `report.html` and `figures/` in the folder.
+
+        Raises:
+            DvaSimError: the disk is full or refuses to be written.
+        """
+        from dva_sim.experiments.report.report import write_report  # late: start-up
+
+        return write_report(self.folder)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: question, answer, and how many runs stand behind it."""
+        depends = (f"{about}: {words}" for about, words in self.answer.depends.items())
+        notes = "".join(f"<p>{escape(note)}</p>" for note in (*depends, *self.answer.notes))
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        runs = f"<p>{self.runs.rows} runs{failed}, in {escape(str(self.folder))}</p>"
+        lead = f"<p><b>{escape(self.answer.lead)}</b></p>"
+        return f"<h3>{escape(self.question)}</h3>{lead}{notes}{runs}"

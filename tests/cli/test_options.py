@@ -1,0 +1,113 @@
+"""Options of commands are those of the functions of their names, declared once."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+import dva_sim
+from dva_sim.cli import app
+from dva_sim.cli.options import Quiet, takes
+from dva_sim.cli.program import CommandWithExamples
+
+COMMANDS = typer.main.get_command(app).commands
+TWINS = sorted(set(COMMANDS) & set(dva_sim.__all__))
+
+# What a terminal has beside a function, and what only a program has.
+ADDED = {
+    "compare": {"measure", "by", "fail_if", "as_json"},
+    "episode": {"quiet", "verbose"},
+    "replay": {"quiet", "verbose"},
+    "report": {"quiet", "verbose"},
+    "run": {"dry_run", "quiet", "verbose"},
+    "show": {"as_json"},
+    "tune": {"quiet", "verbose"},
+}
+FOR_PROGRAMS = {"run": {"progress", "report"}, "tune": {"progress"}}
+
+
+def test_each_function_but_two_has_a_command():
+    functions = {name for name in dva_sim.__all__ if name.islower()}
+    assert functions - {*TWINS} == {"dry_run", "load"}
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_a_command_takes_what_its_function_takes_with_its_defaults_and_words(name):
+    function = getattr(dva_sim, name)
+    asked = inspect.signature(function).parameters
+    options = {option.name: option for option in COMMANDS[name].params}
+    assert set(options) - set(asked) == ADDED.get(name, set())
+    assert set(asked) - set(options) == FOR_PROGRAMS.get(name, set())
+    told = " ".join(inspect.getdoc(function).replace("`", "").split())
+    for each in asked.keys() & options.keys():
+        needed = asked[each].default is inspect.Parameter.empty
+        assert options[each].required == needed
+        assert options[each].default == (None if needed else asked[each].default)
+        words = options[each].help.removesuffix("; may be given again.").removesuffix(".")
+        assert words
+        assert f" {each}: {words}" in told
+
+
+def test_each_option_of_each_command_has_words():
+    for command in (*COMMANDS.values(), *COMMANDS["site"].commands.values()):
+        assert [option.name for option in command.params if not option.help] == []
+
+
+def planted(
+    study: str | Path,
+    *,
+    loud: bool = False,
+    twice_s: int = 2,
+    mark: str | None = None,
+    kept_in: str | Path | None = None,
+    weight: float | None = None,
+    set: Any = (),
+    secret: Any = None,
+) -> None:
+    """Do something.
+
+    Args:
+        study: A study by name or path.
+        loud: Say it in a loud voice, which
+            all can hear. In a notebook it blinks.
+        twice_s: How often.
+        mark: With a mark of `X.csv`.
+        kept_in: Where it goes.
+        weight: How much it is worth.
+        set: Change a key. Or several.
+        secret: Is for programs.
+    """
+
+
+def test_a_new_option_of_a_function_is_one_of_its_command(capsys):
+    seen = []
+
+    @takes(planted, but=("secret",))
+    def command(study: str, quiet: Quiet = False, **asked: Any) -> None:
+        seen.append((study, quiet, asked))
+
+    program = typer.Typer(rich_markup_mode=None, add_completion=False)
+    program.command(cls=CommandWithExamples)(command)
+    program(["--help"], standalone_mode=False)
+    told = {" ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
+    assert {
+        "STUDY A study by name or path.",
+        "--loud Say it in a loud voice, which all can hear.",
+        "--twice-s N How often. [default: 2]",
+        "--mark NAME With a mark of X.csv.",
+        "--kept-in FILE Where it goes.",
+        "--weight NUMBER How much it is worth.",
+        "--set KEY=VALUE Change a key; may be given again.",
+        "-q, --quiet Print mistakes alone.",
+    } <= told
+    assert not any("secret" in line for line in told)
+    words = ["mine", "--loud", "--twice-s", "3", "--weight", "0.5", "--set", "a=1", "--set", "b=2"]
+    program(words, standalone_mode=False)
+    given = {"loud": True, "twice_s": 3, "weight": 0.5, "set": ["a=1", "b=2"]}
+    assert seen == [("mine", False, given | {"mark": None, "kept_in": None})]
+    with pytest.raises(typer.BadParameter, match="'-1' should be a whole number of at least 0"):
+        program(["mine", "--twice-s", "-1"], standalone_mode=False)

@@ -1,0 +1,204 @@
+"""A person takes robots, drives them, and is stopped by all that should stop a drive."""
+
+import pytest
+from console_page import Page
+
+from dva_sim.agents.robot.controller import Mode
+
+
+@pytest.fixture
+def page(monkeypatch):
+    return Page(monkeypatch)
+
+
+@pytest.fixture
+def driving(page):
+    assert page.do("take", robots=[0, 1])[0]
+    assert page.do("start")[0]
+    page.want(0.5)
+    page.let(3.0)
+    return page
+
+
+def test_two_robots_are_driven_by_the_same_input(driving):
+    for number in (0, 1):
+        robot = driving.robot(number)
+        assert robot.controller.mode is Mode.TELEOPERATION
+        assert robot.body.speed == pytest.approx(0.25, abs=0.03)
+    assert driving.seat()["phase"] == "driving"
+
+
+def test_input_turns_left_for_positive_values_and_is_a_share_of_the_robots_limits(page):
+    assert page.do("take", robots=["robot-1"])[0]
+    assert page.do("start")[0]
+    page.want(0.0, 0.5)
+    page.let(2.0)
+    assert page.robot().body.turn_rate == pytest.approx(0.262, abs=0.03)
+    assert page.drive()["wanted"] == [0.0, 0.262]
+    assert page.drive()["command"] == pytest.approx([0.0, 0.262], abs=0.002)
+
+
+def test_what_was_asked_is_in_the_set_point_soon_and_that_is_told(driving):
+    driving.want(0.8)
+    driving.let(1.0)
+    drive = driving.drive()
+    assert 0 < drive["loop_ms"] < 60
+    assert drive["input"]["n"] > 0
+    assert driving.robot().set_point.speed == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(
+    ("end", "why"),
+    [
+        (lambda page: page.do("stop"), "stopped"),
+        (lambda page: page.do("emergency", robots="all"), "emergency"),
+        (lambda page: page.do("emergency", robots=[0, 1], client="another"), "emergency"),
+        (lambda page: page.let_go(), "stopped"),
+        (lambda page: page.actions.take({"client": "c1", "do": "gone"}), "stopped"),
+        (lambda page: page.do("pace", paused=True), "stopped"),
+        (lambda page: page.world.clock.on_late(0.3), "stopped"),
+        (lambda page: page.do("release"), "gave up"),
+    ],
+)
+def test_what_ends_a_drive_ends_it_for_good(driving, end, why):
+    logs = [log for log in driving.world.recorder.drives if log.ended is None]
+    end(driving)
+    driving.let(2.5)
+    driving.want(1.0)
+    driving.let(2.0)
+    for number in (0, 1):
+        robot = driving.robot(number)
+        assert robot.controller.mode is Mode.IDLE
+        assert robot.body.speed == pytest.approx(0.0, abs=1e-3)
+    assert [log.outcome for log in logs] == [why, why]
+
+
+def test_who_stops_may_start_again(driving):
+    assert driving.do("stop")[0]
+    driving.let(2.0)
+    assert driving.do("start")[0]
+    driving.let(2.0)
+    assert driving.robot().body.speed > 0.2
+
+
+def test_while_held_by_lag_nobody_starts_and_the_page_says_why(driving):
+    driving.world.clock.on_late(0.3)
+    driving.let(0.5)
+    assert driving.do("start") == (False, "held: this machine cannot keep up with real time")
+    assert driving.told("rows")[-1]["clock"]["held_by_lag"]
+    assert "behind real time" in driving.seat()["alert"]
+    driving.let(3.0)
+    assert not driving.told("rows")[-1]["clock"]["held_by_lag"]
+    assert driving.robot().controller.mode is Mode.IDLE
+    assert driving.do("start")[0]
+
+
+def test_a_robot_has_one_holder_and_the_second_is_told_who(page):
+    assert page.do("take", robots=[0])[0]
+    page.let(4.0)
+    done, text = page.do("take", robots=[0], client="c2")
+    assert not done
+    assert "console-1" in text
+    assert page.do("take", robots=[1], client="c2")[0]
+    page.let(1.0)
+    holders = {row["i"]: row["holder_label"] for row in page.told("rows")[-1]["robots"]}
+    assert holders == {0: "console-1", 1: "console-2"}
+
+
+def test_who_gets_one_of_two_robots_keeps_none(page):
+    assert page.do("take", robots=[0])[0]
+    assert not page.do("take", robots=[0, 1], client="c2")[0]
+    page.let(1.0)
+    assert page.do("take", robots=[1], client="c3")[0]
+
+
+def test_an_action_said_twice_is_done_once_and_answered_twice(page):
+    line = {"id": "once", "client": "c1", "do": "take", "robots": [0]}
+    page.actions.take(line)
+    page.let(2.0)
+    page.actions.take(line)
+    answers = [told for told in page.told("done") if told["id"] == "once"]
+    assert len(answers) == 2
+    assert answers[0]["text"] == answers[1]["text"] == "robot-1 is yours"
+
+
+@pytest.mark.parametrize(
+    ("what", "about"),
+    [
+        ("take", {"robots": []}),
+        ("take", {"robots": [99]}),
+        ("take", {"robots": [True]}),
+        ("take", {"robots": "robot-1"}),
+        ("start", {}),
+        ("stop", {}),
+        ("confirm", {}),
+        ("decline", {}),
+        ("dance", {}),
+        ("pace", {"factor": 0.5}),
+        ("pace", {"factor": "fast"}),
+        ("pace", {"factor": float("nan")}),
+        ("pace", {"paused": 1}),
+        ("link", {"delay_s": -1}),
+        ("link", {"loss": 0.9}),
+        ("link", {"delay_s": True}),
+        ("pattern", {"robot": 0, "name": "mine.py:Mine"}),
+        ("emergency", {"robots": ["robot-9"]}),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_a_line(page, what, about):
+    done, text = page.do(what, **about)
+    assert not done
+    assert text
+    assert "\n" not in text
+
+
+def test_another_pattern_needs_a_standstill_first_and_then_carries_the_commands(driving):
+    done, text = driving.do("pattern", robot=0, name="req-rep")
+    assert done, text
+    assert driving.robot(0).controller.mode is Mode.IDLE
+    assert driving.robot(1).controller.mode is Mode.TELEOPERATION
+    driving.let(2.0)
+    assert driving.do("stop")[0]
+    driving.let(2.0)
+    assert driving.do("start")[0]
+    driving.let(2.0)
+    one, other = driving.seat()["drives"]
+    assert (one["pattern"], other["pattern"]) == ("req-rep", "latest-wins")
+    assert one["round_trip_ms"] < 50
+    assert other["round_trip_ms"] is None
+    assert driving.robot(0).body.speed > 0.2
+
+
+def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
+    page.let(30.0)
+    order = page.told("rows")[-1]["order"]
+    assert order["kind"] == "fire"
+    assert page.do("take", robots=[order["robot"]])[0]
+    assert page.seat()["order"] == order
+    assert page.do("start")[0]
+    page.want(0.2)
+    page.let(2.0)
+    done, text = page.do("confirm")
+    assert done, text
+    page.let(0.2)
+    event = page.told("events")[-1]["events"][0]
+    assert event["state"] == "confirmed"
+    assert page.seat()["order"] is None
+    page.do("stop")
+    assert page.world.recorder.drives[-1].outcome == "confirmed"
+
+
+def test_an_order_to_an_empty_seat_is_declined_after_a_while_and_others_go(page):
+    page.let(120.0)
+    assert any("declines event 1" in line["what"] for line in page.told("story"))
+    assert page.told("events")[-1]["events"][0]["assigned"] == ["guard-2"]
+
+
+def test_no_rule_of_safety_is_broken_by_all_that(driving):
+    driving.do("link", delay_s=0.5)
+    driving.let(3.0)
+    driving.do("link", loss=0.3, jitter_s=0.1)
+    driving.let(5.0)
+    driving.do("emergency", robots="all")
+    driving.let(5.0)
+    assert not driving.world.recorder.violations

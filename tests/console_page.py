@@ -1,0 +1,85 @@
+"""A console's world without real time: pulses come by virtual time, so that nothing has to wait."""
+
+import time
+
+from dva_sim.console.actions import Actions
+from dva_sim.console.world import World
+from dva_sim.kernel.clock import US
+from dva_sim.network.realtime import PacedClock
+from dva_sim.simulation.scenario import build, load
+
+
+class VirtualPace(PacedClock):
+    """A paced clock whose real time is what a test says it is."""
+
+    def pulse(self, period, action):
+        def beat():
+            action()
+
+        self.every(period, beat)
+
+    def run(self, until):
+        while self.env.peek() <= round(until * US):
+            self.env.step()
+        self.env._now = max(self.env._now, round(until * US))
+
+    def _catch_up(self, end):
+        pass
+
+
+class Page:
+    """What a page would do, and what it is told."""
+
+    def __init__(self, monkeypatch, scenario="hands-on", seed=1, client="c1", **changes):
+        document = load(scenario) if isinstance(scenario, str) else scenario
+        changes = {key.replace("__", "."): value for key, value in changes.items()}
+        self.world = World(build(document, changes), "a test", seed, VirtualPace())
+        monkeypatch.setattr(time, "monotonic", lambda: self.world.clock.now)
+        self.lines, self.frames, self.client = [], [], client
+        self.world.tell = lambda line, key="": self.lines.append(line)
+        self.world.show = lambda line, key="": self.frames.append(line)
+        self.actions = Actions(self.world)
+        self.world.begin()
+        self.wanted, self._count = None, 0
+        self.world.clock.every(0.03, self._want)
+
+    def do(self, what, within=30.0, client=None, **about):
+        """An action, and its answer once it comes."""
+        self._count += 1
+        number = f"action {self._count}"
+        self.actions.take({"id": number, "client": client or self.client, "do": what, **about})
+        end = self.world.clock.now + within
+        while self.world.clock.now < end:
+            for line in self.told("done"):
+                if line["id"] == number:
+                    return line["ok"], line["text"]
+            self.let(0.01)
+        raise AssertionError(f"{what}: no answer within {within} s")
+
+    def want(self, speed, turn=0.0):
+        """Hold on, and want this from now on."""
+        self.wanted = {"speed": speed, "turn": turn, "held": True}
+
+    def let_go(self):
+        self.wanted = None
+
+    def let(self, seconds):
+        self.world.clock.run(self.world.clock.now + seconds)
+
+    def told(self, kind):
+        return [line for line in self.lines if line["k"] == kind]
+
+    def robot(self, number=0):
+        return list(self.world.run.field.robots.values())[number]
+
+    def seat(self):
+        return [line for line in self.told("seat") if line["seat"] == self.client][-1]
+
+    def drive(self, number=0):
+        return self.seat()["drives"][number]
+
+    def _want(self):
+        if self.wanted is not None:
+            self._count += 1
+            line = {"client": self.client, "do": "input", "n": self._count, **self.wanted}
+            self.actions.take(line)
