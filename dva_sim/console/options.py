@@ -48,7 +48,7 @@ class ConsoleOptions:
         document, changes = load(self.scenario), parse_changes(self.changes)
         model = document.data.get("model", "full")
         if model != "full":
-            raise ConfigError(f"{self.scenario!r} is a {model} scenario: nobody moves in it")
+            raise ConfigError(f"{self.scenario!r} has the model {model!r}, in which nobody moves")
         try:
             scenario = build(document, changes)
         except ConfigError as error:

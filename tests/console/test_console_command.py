@@ -1,0 +1,187 @@
+"""`dva-sim console` as users start it: its processes, its address, its end."""
+
+import json
+import os
+import re
+import signal
+import urllib.request
+from contextlib import ExitStack, closing, contextmanager
+from functools import partial
+from http.cookiejar import CookieJar
+
+import pytest
+from programs import Programs, wait_until
+from websockets.sync.client import connect
+
+pytestmark = pytest.mark.system
+
+QUIET = ("--no-open", "--port", "0")
+
+
+@pytest.fixture
+def programs(tmp_path):
+    started = Programs(tmp_path)
+    yield started
+    started.end_all()
+
+
+@pytest.fixture
+def console(programs):
+    return running(programs)
+
+
+def running(programs, *words):
+    program = programs.start("console", *QUIET, *words)
+    program.wait_to_say("Console: http://")
+    return program
+
+
+def address_of(program):
+    return re.search(r"^Console: (http://127\.0\.0\.1:\d+/\S*)$", program.said, re.MULTILINE)[1]
+
+
+class Client:
+    """A browser's two sockets."""
+
+    def __init__(self, address):
+        jar = CookieJar()
+        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar))
+        base = address.split("?")[0].rstrip("/")
+        with closing(opener.open(address)):
+            cookie = "; ".join(f"{c.name}={c.value}" for c in jar)
+        headers = {"Cookie": cookie, "Origin": base}
+        web = base.replace("http", "ws")
+        self._open = ExitStack()
+        reach = partial(connect, additional_headers=headers, max_size=None)
+        self._state = self._open.enter_context(reach(f"{web}/ws/state"))
+        you = json.loads(self._state.recv())
+        self.id = you["client"]
+        self._drive = self._open.enter_context(reach(f"{web}/ws/drive?client={self.id}"))
+        self._count, self.seat = 0, None
+
+    def do(self, what, **about):
+        self._count += 1
+        number = f"{self.id}-{self._count}"
+        self._drive.send(json.dumps({"id": number, "do": what, **about}))
+        while True:
+            line = self._hear(60.0)
+            if line.get("k") == "done" and line["id"] == number:
+                return line["ok"], line["text"]
+
+    def want(self, speed, turn=0.0):
+        self._count += 1
+        told = {"do": "input", "n": self._count, "speed": speed, "turn": turn, "held": True}
+        self._drive.send(json.dumps(told))
+        self._hear(0.02)
+
+    def _hear(self, wait):
+        try:
+            line = json.loads(self._drive.recv(timeout=wait))
+        except TimeoutError:
+            return {}
+        if line.get("k") == "seat":
+            self.seat = line
+        return line
+
+    def close(self):
+        self._open.close()
+
+
+@contextmanager
+def client(address):
+    with closing(Client(address)) as one:
+        yield one
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_asked_to_end_it_ends_all_its_processes_in_good_order(programs, console, number):
+    assert len(programs.processes()) == 3
+    console.send(number)
+    assert console.ends() == 0
+    assert console.complained == []
+    programs.wait_for_none()
+
+
+def test_a_web_process_that_is_killed_ends_it_in_one_line(programs, console):
+    web = next(pid for pid, words in programs.processes().items() if "console.web" in words)
+    os.kill(web, signal.SIGKILL)
+    assert console.ends() == 3
+    assert console.complained == ["error: the web process has ended: killed by signal 9"]
+    programs.wait_for_none()
+
+
+def test_without_the_process_that_draws_all_else_goes_on(programs, console):
+    pictures = next(p for p, words in programs.processes().items() if "console.pictures" in words)
+    os.kill(pictures, signal.SIGKILL)
+    wait_until(lambda: pictures not in programs.processes(), "it ends")
+    with client(address_of(console)) as page:
+        assert page.do("take", robots=[0]) == (True, "robot-1 is yours")
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+
+
+def test_a_world_that_is_killed_takes_the_others_with_it(programs, console):
+    console.process.kill()
+    console.process.wait()
+    programs.wait_for_none()
+
+
+def test_a_port_that_is_taken_is_told_in_a_line(programs, console):
+    port = address_of(console).split(":")[2].split("/")[0]
+    second = programs.start("console", "--no-open", "--port", port)
+    assert second.ends() == 3
+    assert len(second.complained) == 1
+    assert port in second.complained[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("no-such-place",), "no-such-place"),
+        (("small-shift",), "in which nobody moves"),
+        (("--set", "link.delay_s=-1"), "--set link.delay_s=-1"),
+        (("--set", "robot.count=99"), "robot.count"),
+        (("--record", "run.avi"), "should end in .mcap"),
+        (("--port", "70000"), "--port"),
+    ],
+)
+def test_a_mistake_is_told_before_anything_starts(programs, words, told):
+    program = programs.start("console", "--no-open", *words)
+    assert program.ends() == 2
+    assert len(program.complained) == 1
+    assert told in program.complained[0]
+    assert program.said == ""
+
+
+def test_what_was_driven_and_recorded_holds_every_rule(programs, tmp_path):
+    console = running(programs, "--record", tmp_path / "run.mcap")
+    with client(address_of(console)) as page:
+        assert page.do("link", delay_s=0.1)[0]
+        assert page.do("take", robots=[0, 1])[0]
+        assert page.do("start")[0]
+        for _ in range(100):
+            page.want(0.5, 0.1)
+        assert page.do("stop")[0]
+        assert page.do("emergency", robots="all")[0]
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    assert "run.mcap written" in console.said
+    check = programs.start("check", tmp_path / "run.mcap")
+    assert check.ends() == 0, check.said + "".join(check.complained)
+    replay = programs.start("replay", tmp_path / "run.mcap")
+    assert replay.ends() == 0
+    assert "drives robot-1" in replay.said
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_without_a_recording_nothing_is_written(programs, console, tmp_path):
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    assert {path.suffix for path in tmp_path.iterdir()} <= {".out", ".errors"}
+
+
+def test_without_a_token_the_address_holds_none_and_lets_everybody_in(programs):
+    address = address_of(running(programs, "--no-token"))
+    assert "token" not in address
+    with client(address) as page:
+        assert page.do("take", robots=[0])[0]
