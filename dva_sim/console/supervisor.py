@@ -23,6 +23,7 @@ WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
 LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
 FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
+MOST_RESTARTS = 5  # of the process that draws
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
 Say = Callable[[str], object]
@@ -39,7 +40,8 @@ class Supervisor:
     def __init__(self, options: ConsoleOptions, say: Say) -> None:
         self._options, self._say = options, say
         self._children: list[Child] = []
-        self._failed = ""
+        self._to_web: socket.socket | None = None
+        self._failed, self._restarts = "", 0
 
     def run(self) -> None:
         """Run until Ctrl-C, SIGTERM, or the end of the web process.
@@ -80,7 +82,7 @@ class Supervisor:
             serving = web.first_line()
             world.serve_cameras(str(serving["base"]))
             actions = Actions(world)
-            world.tell, world.show = web.pipe.put, pictures.pipe.put
+            world.tell = web.pipe.put
             world.dropped = lambda: web.pipe.outbox.dropped
             self._listen(world, web, actions)
             self._draw(world, pictures)
@@ -95,17 +97,22 @@ class Supervisor:
 
     def _start(self) -> tuple[Child, Child]:
         options = self._options
-        ours, theirs = socket.socketpair()
+        ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += [] if options.token else ["--no-token"]
         web = Child("web process", WEB, words, [ours])
         self._children.append(web)
-        pictures = Child("pictures process", PICTURES, ["--web-fd", str(theirs.fileno())], [theirs])
-        self._children.append(pictures)
         ours.close()
-        theirs.close()
-        return web, pictures
+        return web, self._start_pictures()
+
+    def _start_pictures(self) -> Child:
+        """Our copy of its end stays open, so that another one can take its place."""
+        end = self._to_web
+        assert end is not None
+        pictures = Child("pictures process", PICTURES, ["--web-fd", str(end.fileno())], [end])
+        self._children.append(pictures)
+        return pictures
 
     def _listen(self, world: World, web: Child, actions: Actions) -> None:
         def hear() -> None:
@@ -119,13 +126,22 @@ class Supervisor:
         world.clock.watch(web.pipe.fileno(), hear)
 
     def _draw(self, world: World, pictures: Child) -> None:
-        """Without pictures all else goes on."""
+        """Without pictures all else goes on, and another process draws from then on."""
+        world.show = pictures.pipe.put
 
         def hear() -> None:
             pictures.pipe.lines()
-            if not pictures.pipe.is_open:
-                world.clock.unwatch(pictures.pipe.fileno())
-                world.recorder.tell(world.clock.now, "console", pictures.why(), "link")
+            if pictures.pipe.is_open:
+                return
+            world.clock.unwatch(pictures.pipe.fileno())
+            world.recorder.tell(world.clock.now, "console", pictures.why(), "link")
+            self._children.remove(pictures)
+            pictures.end()
+            pictures.make_sure(0.0)
+            if self._restarts < MOST_RESTARTS:
+                self._restarts += 1
+                self._draw(world, self._start_pictures())
+                world.show_scene()
 
         world.clock.watch(pictures.pipe.fileno(), hear)
 
@@ -143,6 +159,8 @@ class Supervisor:
         web.pipe.put({"k": "bye", "t": world.feed.now_ms, "why": "the console was ended"})
 
     def _end_all(self) -> None:
+        if self._to_web is not None:
+            self._to_web.close()
         for child in self._children:
             child.end()
         deadline = time.monotonic() + END_WITHIN

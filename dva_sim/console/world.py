@@ -104,19 +104,19 @@ class World:
         scene = scene_of(self.run, self.feed.things, self.name, self.seed)
         scene["link"] = self.link_line()
         self.tell(scene)
-        self.show(
-            {
-                "k": "scene",
-                "scenario": self.scenario.model_dump(mode="json"),
-                "seed": self.seed,
-                "things": self.feed.things,
-            }
-        )
+        self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
         self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def show_scene(self) -> None:
+        """Tell whoever draws, from the beginning, what there is to be seen."""
+        scenario = self.scenario.model_dump(mode="json")
+        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+        for number, when in self.run.field.contained.items():
+            self.show({"k": "contain", "t": round(1000 * when), "n": number})
 
     def person(self, number: int) -> PersonAgent:
         """The person of a seat, by its number from 0; new ones register first."""
@@ -125,6 +125,8 @@ class World:
             person = PersonAgent(device, self._console)
             person.on_robot = self._watch_robot
             device.register()
+            for robot in self.run.field.robots:
+                device.connect(robot)  # an emergency does not wait for a connection
             self.feed.add(device.id_tag, device.label, "operator")
             self.persons.append(person)
         return self.persons[number]
