@@ -29,7 +29,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 SLOW = 20  # clients
-PAIRS, BLOCK_S, SETTLE_S = 12, 6.0, 1.0
+PAIRS, SAMPLES, SETTLE_S = 12, 100, 1.0
 PERIOD_S = 0.02  # of inputs
 WORDS = ("console", "--no-open", "--port", "0")
 MOST = 5.0  # the difference of the 99th percentiles should be less [ms]
@@ -173,8 +173,8 @@ def block(hand: Hand, place: str, token: str, slow: bool) -> float:
     with sleepers(place, token) if slow else nullcontext():
         hand.turn(SETTLE_S)
         hand.delays.clear()
-        hand.turn(BLOCK_S)
-        assert len(hand.delays) > BLOCK_S * 5
+        while len(hand.delays) < SAMPLES:  # a machine that lags holds all robots for a while
+            hand.turn(1.0)
         return float(np.percentile(hand.delays, 99))
 
 
@@ -194,7 +194,7 @@ def test_slow_clients_cost_a_driver_nothing(tmp_path: Path) -> None:
     gaps = p99[:, 1] - p99[:, 0]
     half = stats.t.ppf(0.975, PAIRS - 1) * gaps.std(ddof=1) / np.sqrt(PAIRS)
     print(
-        f"\ninput to set point, p99 of blocks of {BLOCK_S:g} s: {p99[:, 0].mean():.1f} ms alone, "
+        f"\ninput to set point, p99 of {SAMPLES} samples: {p99[:, 0].mean():.1f} ms alone, "
         f"{p99[:, 1].mean():.1f} ms beside {SLOW} slow clients; paired difference "
         f"{gaps.mean():+.1f} ms, 95 % interval "
         f"{gaps.mean() - half:+.1f} to {gaps.mean() + half:+.1f} ms"
