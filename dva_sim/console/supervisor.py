@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import sys
@@ -88,6 +89,7 @@ class Supervisor:
             self._draw(world, pictures)
             world.begin()
             world.clock.pulse(FLUSH, self._flush)
+            gc.freeze()  # what stays for the whole run is not looked through again and again
             self._say(f"Console: {serving['drive']}")
             self._open_browser(str(serving["drive"]))
             if not ending.is_asked:
