@@ -9,7 +9,7 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo published test test-all test-contract test-system test-soak check same-bytes bench clean
+.PHONY: help setup demo published test test-all test-contract test-system test-browser test-soak check same-bytes bench clean
 
 # Two processes share the tests. Compiled files are kept whatever a shell says: without them each
 # run compiles all tests again, for half a minute.
@@ -28,7 +28,7 @@ published: $(RUNTIME)  ## the main study at its published size, and its report: 
 
 test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."
-	@$(PYTEST) -m "not system and not soak"
+	@$(PYTEST) -m "not system and not soak and not browser"
 
 test-all: $(DEV)  ## all tests
 	@echo "Running all tests ..."
@@ -39,6 +39,9 @@ test-contract: $(DEV)  ## what every transport promises, in virtual time and ove
 
 test-system: $(DEV)  ## programs as users start them, with real processes, sockets and signals
 	@$(PYTEST) -m system
+
+test-browser: $(DEV)  ## the console's pages in the system's Chromium
+	@$(PYTEST) -m browser
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"

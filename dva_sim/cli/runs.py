@@ -154,7 +154,7 @@ def console(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run a scenario in real time on a page in the browser, and drive its robots.
+    """Drive a scenario's robots in real time, on a page in the browser.
 
     Examples:
         dva-sim console  # two robots, two guards, a fire and a leak

@@ -21,7 +21,7 @@ from typing import Any
 from dva_sim.console.drawing import Eyes
 from dva_sim.console.frames import ALIVE, Picture, pack
 
-NICENESS = 5  # the run goes first
+NICENESS = 3  # the run goes first
 ALIVE_S = 1.0  # so often it says that it lives [s]
 IDLE_S = 0.25  # it looks up at least so often [s]
 AT_ONCE = 1 << 18  # bytes that are read
@@ -32,7 +32,7 @@ MOST_LINE = 1 << 20  # bytes
 Line = dict[str, Any]
 
 
-class End:
+class PaintersEnd:
     """One end of a socket pair, which never makes its reader or writer wait.
 
     Attributes:
@@ -96,6 +96,11 @@ class Painter:
         self._watched: frozenset[int] = frozenset()
         self.drawn = self.dropped = 0
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether the site is built, which takes seconds."""
+        return self._eyes is not None
+
     def hear(self, line: Line) -> None:
         """Take a line, whoever says it."""
         kind = line.get("k")
@@ -133,7 +138,7 @@ class Painter:
         return Picture(robot, frame["number"], captured, arrived, jpeg)
 
 
-def run(world: End, web: End) -> Painter:
+def run(world: PaintersEnd, web: PaintersEnd) -> Painter:
     """Draw until one of both has ended."""
     painter, alive = Painter(), 0.0
     while world.is_open and web.is_open:
@@ -143,7 +148,11 @@ def run(world: End, web: End) -> Painter:
             for line in end.lines():
                 painter.hear(line)
         now = time.monotonic()
-        if now - alive >= ALIVE_S and web.put(pack(Picture(ALIVE, painter.drawn, 0, 0, b""))):
+        if (
+            painter.is_ready
+            and now - alive >= ALIVE_S
+            and web.put(pack(Picture(ALIVE, painter.drawn, 0, 0, b"")))
+        ):
             alive = now
         picture = painter.draw(now) if web.flush() else None
         if picture is not None and not web.put(pack(picture)):
@@ -160,7 +169,7 @@ def main(given: Sequence[str] | None = None) -> int:
     # Ctrl-C reaches all processes of a terminal; the simulation says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
-    run(End(options.fd), End(options.web_fd))
+    run(PaintersEnd(options.fd), PaintersEnd(options.web_fd))
     return 0
 
 

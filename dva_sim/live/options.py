@@ -13,6 +13,7 @@ from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.recordings.writing import PART, SUFFIX, check_target, try_to_write
+from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")
@@ -94,8 +95,6 @@ class LiveOptions:
             ConfigError: see `read`; or the site has no place for the team, or what is recorded
                 cannot be put where it is wanted.
         """
-        from dva_sim.simulation.full import rehearse  # late: start-up
-
         scenario, document = self.read(), load(self.scenario)
 
         def make(changes: Mapping[str, Any]) -> None:

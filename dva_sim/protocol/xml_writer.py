@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from dva_sim.protocol import limits
 from dva_sim.protocol import messages as m
@@ -17,6 +17,7 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.limits import bounds, choices, length, most
 
 DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
+_T = TypeVar("_T")
 
 
 def _bad(reason: str) -> ProtocolError:
@@ -44,6 +45,10 @@ def _integer(name: str, kind: str) -> Callable[[int], str]:
         raise _bad(f"{name} must be within {low} and {high}, not {value!r}")
 
     return write
+
+
+def _optional(element: str, write: Callable[[_T], str], value: _T | None) -> str:
+    return "" if value is None else f"<{element}>{write(value)}</{element}>"
 
 
 def _escape(text: str) -> str:
@@ -133,8 +138,7 @@ def _write_registration(body: m.Registration | m.Device) -> str:
 
 
 def _write_set_teleop(body: m.SetTeleOp) -> str:
-    tick = body.seen_tick
-    seen = "" if tick is None else f"<SeenTick>{_tick(tick)}</SeenTick>"
+    seen = _optional("SeenTick", _tick, body.seen_tick)
     return (
         f"<TeleOp><SetTeleOp><Speed>{_speed(body.speed)}</Speed>"
         f"<TurnRate>{_turn_rate(body.turn_rate)}</TurnRate>{seen}</SetTeleOp></TeleOp>"
@@ -151,10 +155,10 @@ def _write_status(body: m.RobotStatus) -> str:
 
 
 def _write_robot_holder(body: m.RobotHolder) -> str:
-    holder = "" if body.holder is None else f"<HolderID>{_device_id(body.holder)}</HolderID>"
-    label = "" if body.label is None else f"<DeviceLabel>{_name(body.label)}</DeviceLabel>"
+    holder = _optional("HolderID", _device_id, body.holder)
+    label = _optional("DeviceLabel", _name, body.label)
     held = f"<HeldFor>{_duration(body.held_for)}</HeldFor>"
-    code = "" if body.code is None else f"<Code>{_code(body.code)}</Code>"
+    code = _optional("Code", _code, body.code)
     return f"<RobotHolder>{holder}{label}{held}{code}</RobotHolder>"
 
 
@@ -166,7 +170,7 @@ def _write_person_status(body: m.PersonStatus) -> str:
 
 
 def _write_get_sensor_info(body: m.GetSensorInfo) -> str:
-    device = "" if body.device is None else f"<DeviceID>{_device_id(body.device)}</DeviceID>"
+    device = _optional("DeviceID", _device_id, body.device)
     return f"<Sensor><GetSensorInfo>{device}</GetSensorInfo></Sensor>"
 
 
@@ -224,7 +228,7 @@ def _write_dev_sub(body: m.DevSub) -> str:
 
 
 def _write_permission_request(body: m.PermissionRequest) -> str:
-    takeover = "" if body.takeover is None else f"<Takeover>{_takeover(body.takeover)}</Takeover>"
+    takeover = _optional("Takeover", _takeover, body.takeover)
     return (
         f"<Access><PermissionRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
         f"<Level>{_level(body.level)}</Level>{_write_sensor_names(body.sensors)}"
@@ -240,7 +244,7 @@ def _write_sensor_names(names: tuple[str, ...]) -> str:
 
 def _write_granted(body: m.PermissionGrant | m.Permission) -> str:
     """What a grant and the reply about it have in common."""
-    address = "" if body.address is None else f"<IpAddr>{_address(body.address)}</IpAddr>"
+    address = _optional("IpAddr", _address, body.address)
     return (
         f"<Level>{_level(body.level)}</Level><Session>{_session(body.session)}</Session>"
         f"{address}{_write_sensor_names(body.sensors)}"
@@ -276,7 +280,7 @@ def _write_get_grant(body: m.GetGrant) -> str:
 
 
 def _write_event_report(body: m.EventReport) -> str:
-    number = "" if body.event_id is None else f"<EventID>{_event_id(body.event_id)}</EventID>"
+    number = _optional("EventID", _event_id, body.event_id)
     return (
         f"<Event><EventReport>{number}<Kind>{_kind(body.kind)}</Kind>"
         f"{_write_position(body.position)}<Severity>{_unit(body.severity)}</Severity>"
@@ -286,7 +290,7 @@ def _write_event_report(body: m.EventReport) -> str:
 
 
 def _write_order(body: m.Order) -> str:
-    device = "" if body.device is None else f"<DeviceID>{_device_id(body.device)}</DeviceID>"
+    device = _optional("DeviceID", _device_id, body.device)
     # Left out where it is the usual one, so that a receiver of version 1.1 understands it.
     task = "" if body.task == "confirm" else f"<Task>{_task(body.task)}</Task>"
     return (
@@ -368,8 +372,7 @@ def _write_sensor_list(content: m.SensorList) -> str:
 
 
 def _write_device_sensors(device: m.DeviceSensors) -> str:
-    url = device.camera_url
-    camera = "" if url is None else f"<CameraUrl>{_url(url)}</CameraUrl>"
+    camera = _optional("CameraUrl", _url, device.camera_url)
     return (
         f"<Device><DeviceID>{_device_id(device.device)}</DeviceID>"
         f"{camera}{_write_sensors(device.sensors)}</Device>"

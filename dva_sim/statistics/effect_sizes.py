@@ -56,12 +56,15 @@ def effect_size(
     first, second = paired_means(a, b, person)
     n = len(first)
     if n < _FEWEST:
-        nothing = Interval(math.nan, math.nan, math.nan, n)
-        return EffectSize(nothing, nothing)
+        return EffectSize(_nothing(n), _nothing(n))
     sizes = _beside_differences, _beside_persons
     found = _studentised(sizes, first, second, resamples)
     paired, average = (_times(each, _hedges(n)) for each in found)
     return EffectSize(paired, average)
+
+
+def _nothing(n: int) -> Interval:
+    return Interval(math.nan, math.nan, math.nan, n)
 
 
 def _beside_differences(pairs: Pairs) -> Floats:
@@ -126,11 +129,7 @@ def variance_reduction(
 ) -> VarianceReduction:
     """The correlation and the ratio of variances that pairing achieved, with their intervals.
 
-    Args:
-        a: One treatment `(n,)`, nan where missing.
-        b: The other `(n,)`, row by row the same person and trial.
-        person: Whose run it was `(n,)`.
-        resamples: How many times persons are drawn.
+    It takes what `effect_size` takes.
 
     References:
         Fisher, Metron 1 (1921) 3-32 (the scale of correlations).
@@ -138,8 +137,7 @@ def variance_reduction(
     first, second = paired_means(a, b, person)
     n = len(first)
     if n < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
-        nothing = Interval(math.nan, math.nan, math.nan, n)
-        return VarianceReduction(nothing, nothing)
+        return VarianceReduction(_nothing(n), _nothing(n))
     scaled = _on_fishers_scale(_correlation), _on_fishers_scale(_shared)
     found = _studentised(scaled, first, second, resamples)
     correlation, shared = (_back(each) for each in found)

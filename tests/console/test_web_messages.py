@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from dva_sim.console.web.actions import ACTIONS, Bucket, Refused, asked_of, id_of, read
+from dva_sim.console.web.actions import ACTIONS, BadMessage, Bucket, asked_of, id_of, read
 from dva_sim.console.web.outbox import MOST, OutgoingLines
 from dva_sim.console.web.pipes import Lines
 
@@ -50,7 +50,7 @@ def test_an_emergency_is_for_all_unless_it_says_otherwise():
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_line(name, given, word):
-    with pytest.raises(Refused, match=word) as error:
+    with pytest.raises(BadMessage, match=word) as error:
         asked_of(name, given, LABELS)
     assert "\n" not in str(error.value)
 
@@ -67,7 +67,7 @@ def test_what_makes_no_sense_is_refused_in_one_line(name, given, word):
     ],
 )
 def test_input_beyond_its_limits_never_reaches_the_simulation(given):
-    with pytest.raises(Refused):
+    with pytest.raises(BadMessage):
         asked_of("input", given, LABELS, silent=True)
 
 
@@ -75,14 +75,14 @@ def test_input_beyond_its_limits_never_reaches_the_simulation(given):
     "text", ["", "{", "[1]", "1", "null", '{"a": NaN}', '{"a": Infinity}', "[" * 9000, b"\xff\xfe"]
 )
 def test_what_is_no_json_object_is_refused(text):
-    with pytest.raises(Refused):
+    with pytest.raises(BadMessage):
         read(text)
 
 
 def test_ids_are_short_words():
     assert id_of("a-1.b:c_D") == "a-1.b:c_D"
     for value in (None, "", "a b", "x" * 65, 7, "a\n"):
-        with pytest.raises(Refused):
+        with pytest.raises(BadMessage):
             id_of(value)
 
 

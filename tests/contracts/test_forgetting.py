@@ -66,16 +66,21 @@ class Site:
         return self.entries[id_tag].silent
 
 
-def registration(device: AgentDevice) -> m.Registration:
-    return m.Registration(device.label, device.device_type, device.address)
+def site_with(
+    id_tag: str, world: World, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Site, AgentDevice]:
+    """A site whose DVA knows one device."""
+    site = Site(world, monkeypatch)
+    device = site.device(id_tag)
+    device.ask(DVA, m.Registration(device.label, device.device_type, device.address))
+    world.run_until(lambda: id_tag in site.entries)
+    return site, device
 
 
 def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = Site(world, monkeypatch)
-    phone = site.device(PHONE)
-    phone.ask(DVA, registration(phone))
+    site, phone = site_with(PHONE, world, monkeypatch)
     site.beating.add(PHONE)
     site.hears(PHONE)
     site.beating.clear()
@@ -95,10 +100,7 @@ def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
 def test_who_is_forgotten_learns_that_and_registers_again(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = Site(world, monkeypatch)
-    phone = site.device(PHONE)
-    phone.ask(DVA, registration(phone))
-    world.run_until(lambda: PHONE in site.entries)
+    site, phone = site_with(PHONE, world, monkeypatch)
     site.be_quick()
     world.run_until(lambda: PHONE not in site.entries)
     site.be_patient()
@@ -113,10 +115,7 @@ def test_who_is_forgotten_learns_that_and_registers_again(
 def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = Site(world, monkeypatch)
-    robot = site.device(ROBOT)
-    robot.ask(DVA, registration(robot))
-    world.run_until(lambda: ROBOT in site.entries)
+    site, _ = site_with(ROBOT, world, monkeypatch)
     world.leave(ROBOT)
     failed: list[bool] = []
     site.dva.device.ask(ROBOT, m.GetSensorInfo(), on_failure=lambda: failed.append(True))

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from command_line import call
 
+import dva_sim
 from dva_sim.core.dva import Dva
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
@@ -332,4 +333,6 @@ def test_what_holds_no_lines_ends_in_one_line(tmp_path: Path, data: bytes) -> No
     part.write_bytes(data)
     with pytest.raises(ConfigError, match="holds no lines of a live run"):
         finish(part, tmp_path / "run.mcap")
+    with pytest.raises(ConfigError, match="holds no lines of a live run"):
+        dva_sim.replay(part)
     assert part.exists()

@@ -28,6 +28,7 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Emergency, Message, SetTeleOp
 
 LIMIT = 1000  # ZeroMQ's default high-water mark, in messages
+OTHERS = 64  # messages that may wait of all but the holder: each look at them has its price
 EACH = 8  # messages that may wait of a connection that is not the holder's
 REST = 4.0  # how long strangers rest after a message of theirs, in times of its processing
 AFTER_HOLDER = 1.0  # and for so long they wait for a message of its holder, to come behind it [s]
@@ -84,7 +85,7 @@ class FairQueue:
     where there is no room at all, the newest of the longest line makes some, strangers first.
 
     Args:
-        limit: How many messages of the holder may wait, and how many of all others.
+        limit: How many messages of the holder may wait; of others no more than `OTHERS`.
         standing: Of a message, by now: a grant that comes meanwhile counts.
     """
 
@@ -113,9 +114,10 @@ class FairQueue:
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
         if standing is not Standing.HOLDER and sum(mine) >= EACH:
             return letter
-        if self._length >= self._limit:
+        places = self._limit if standing is Standing.HOLDER else min(self._limit, OTHERS)
+        if self._length >= places:
             beside = self._beside(standing is Standing.HOLDER)
-            if sum(map(len, beside.values())) >= self._limit:
+            if sum(map(len, beside.values())) >= places:
                 worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
                 if (standing, mine[letter.moves] + 1) >= self._rank(line):
                     return letter
@@ -174,7 +176,7 @@ class CommandQueue:
         handle: Takes each letter when its processing is done.
         latest_wins: Keep only the newest waiting command, as a subscriber that drains its
             socket before it works does.
-        limit: How many messages of the holder may wait, of all others, and emergencies.
+        limit: How many messages of the holder may wait, and how many emergencies.
         read: Reads what arrives, before it waits: what is None was refused, and takes no time.
             Without it all is taken as bytes, and only emergencies are read.
         standing: Of a message, by now.

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from dva_sim.console.web.access import Entrance, Tokens, rules
 from dva_sim.console.web.app import make_app
-from dva_sim.console.web.camera import Cameras
+from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.server import listen, make_server, serve
 from dva_sim.console.web.simulation import Simulation
@@ -52,7 +52,7 @@ async def run(options: argparse.Namespace) -> None:
     access = rules(options.host, port, options.name, tokens)
     simulation = Simulation()
     hub = Hub(simulation)
-    cameras = Cameras(simulation, hub.clients.watched)
+    cameras = CameraStreams(simulation, hub.clients.watched)
     hub.watching = cameras.tell
     ended = simulation.ended
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
@@ -68,7 +68,7 @@ async def run(options: argparse.Namespace) -> None:
     simulation.close()
 
 
-async def _close_when(ended: asyncio.Event, hub: Hub, cameras: Cameras) -> None:
+async def _close_when(ended: asyncio.Event, hub: Hub, cameras: CameraStreams) -> None:
     await ended.wait()
     cameras.close()
     await hub.close(hub.simulation.why or "the console was ended")
@@ -83,7 +83,8 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """What the simulation is told first: where this console is, and its secrets."""
-    shown = "127.0.0.1" if access.any_address and ":" not in host else host
+    local = "::1" if ":" in host else "127.0.0.1"
+    shown = local if access.any_address else host.strip("[]")
     base = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/"
     drive, look = (
         f"{base}?token={t}" if t else base for t in (access.tokens.drive, access.tokens.look)

@@ -17,7 +17,7 @@ Labels = Mapping[str, int]
 Check = Callable[[Any, Labels], Any]
 
 
-class Refused(ValueError):
+class BadMessage(ValueError):
     """What was asked for makes no sense; the message is one line for whoever asked."""
 
 
@@ -25,14 +25,14 @@ def read(text: str | bytes) -> dict[str, Any]:
     """A JSON object out of a message.
 
     Raises:
-        Refused: it is something else.
+        BadMessage: it is something else.
     """
     try:
         data = json.loads(text, parse_constant=_no_number)
     except (ValueError, RecursionError):
-        raise Refused("is not JSON") from None
+        raise BadMessage("is not JSON") from None
     if not isinstance(data, dict):
-        raise Refused("is not a JSON object")
+        raise BadMessage("is not a JSON object")
     return data
 
 
@@ -45,9 +45,9 @@ def number(low: float, high: float) -> Check:
 
     def check(value: Any, _: Labels) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise Refused(f"should be a number from {low:g} to {high:g}")
+            raise BadMessage(f"should be a number from {low:g} to {high:g}")
         if not low <= value <= high or not math.isfinite(value):
-            raise Refused(f"should be a number from {low:g} to {high:g}")
+            raise BadMessage(f"should be a number from {low:g} to {high:g}")
         return value
 
     return check
@@ -58,7 +58,7 @@ def whole(low: int, high: int) -> Check:
 
     def check(value: Any, _: Labels) -> int:
         if type(value) is not int or not low <= value <= high:
-            raise Refused(f"should be a whole number from {low} to {high}")
+            raise BadMessage(f"should be a whole number from {low} to {high}")
         return value
 
     return check
@@ -67,14 +67,14 @@ def whole(low: int, high: int) -> Check:
 def flag(value: Any, _: Labels) -> bool:
     """Yes or no."""
     if not isinstance(value, bool):
-        raise Refused("should be true or false")
+        raise BadMessage("should be true or false")
     return value
 
 
 def word(value: Any, _: Labels) -> str:
     """A name."""
     if not isinstance(value, str) or not _NAME.fullmatch(value):
-        raise Refused("should be a name")
+        raise BadMessage("should be a name")
     return value
 
 
@@ -84,13 +84,13 @@ def robot(value: Any, labels: Labels) -> int:
         return labels[value]
     if type(value) is int and value in labels.values():
         return value
-    raise Refused("should be a robot of this run")
+    raise BadMessage("should be a robot of this run")
 
 
 def robots(value: Any, labels: Labels) -> list[int]:
     """Some robots."""
     if not isinstance(value, list) or len(value) > MOST_ROBOTS:
-        raise Refused("should be a list of robots")
+        raise BadMessage("should be a list of robots")
     return list(dict.fromkeys(robot(one, labels) for one in value))
 
 
@@ -146,25 +146,25 @@ def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dic
         silent: Whether those without an answer may be asked for, too.
 
     Raises:
-        Refused: no such action, or an argument that makes no sense.
+        BadMessage: no such action, or an argument that makes no sense.
     """
     known = ACTIONS | SILENT if silent else ACTIONS
     if not isinstance(name, str) or name not in known:
-        raise Refused(f"no such action; there are: {', '.join(known)}")
+        raise BadMessage(f"no such action; there are: {', '.join(known)}")
     if not isinstance(given, dict):
-        raise Refused(f"{name}: arguments should be an object")
+        raise BadMessage(f"{name}: arguments should be an object")
     checks, needed = known[name]
     for key in needed:
         if key not in given:
-            raise Refused(f"{name}: {key} is missing")
+            raise BadMessage(f"{name}: {key} is missing")
     asked = {"do": name}
     for key, value in given.items():
         if key not in checks:
-            raise Refused(f"{name}: no such argument; there are: {', '.join(checks) or 'none'}")
+            raise BadMessage(f"{name}: no such argument; there are: {', '.join(checks) or 'none'}")
         try:
             asked[key] = checks[key](value, labels)
-        except Refused as error:
-            raise Refused(f"{name}: {key} {error}") from None
+        except BadMessage as error:
+            raise BadMessage(f"{name}: {key} {error}") from None
     if name == "emergency":
         asked.setdefault("robots", "all")
     return asked
@@ -174,10 +174,10 @@ def id_of(value: Any) -> str:
     """The id by which a repeated request is known.
 
     Raises:
-        Refused: it is none.
+        BadMessage: it is none.
     """
     if not isinstance(value, str) or not _ID.fullmatch(value):
-        raise Refused("id should be 1 to 64 letters, digits, dots, colons or hyphens")
+        raise BadMessage("id should be 1 to 64 letters, digits, dots, colons or hyphens")
     return value
 
 

@@ -19,7 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Asked, Entrance, Role
-from dva_sim.console.web.camera import Cameras, headers_of
+from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.rest import NOT_KEPT, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
@@ -135,7 +135,9 @@ class Pages:
         files: Of the page.
     """
 
-    def __init__(self, access: Entrance, hub: Hub, cameras: Cameras, files: StaticFiles) -> None:
+    def __init__(
+        self, access: Entrance, hub: Hub, cameras: CameraStreams, files: StaticFiles
+    ) -> None:
         self._access, self._simulation, self._cameras = access, hub.simulation, cameras
         self._files = files
 
@@ -216,7 +218,7 @@ def _for_drivers(endpoint: Any) -> Any:
     return guarded
 
 
-def make_app(access: Entrance, hub: Hub, cameras: Cameras, files: StaticFiles) -> ASGIApp:
+def make_app(access: Entrance, hub: Hub, cameras: CameraStreams, files: StaticFiles) -> ASGIApp:
     """The whole application."""
     pages, rest = Pages(access, hub, cameras, files), Rest(hub)
 

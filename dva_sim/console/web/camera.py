@@ -18,14 +18,14 @@ from dva_sim.console.web.simulation import Simulation
 BOUNDARY = "dva-sim-frame"
 LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
 SILENCE = 3.0  # of who draws, after which there is no picture [s]
-STARTING = 20.0  # before the first word [s]
+STARTING = 60.0  # before the first word, which comes when the site is built [s]
 REPEATED = 1.0  # so often is said again who is watched [s]
 ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
 FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
 MOST_VIEWERS = 64
 
 
-class Cameras:
+class CameraStreams:
     """The newest picture of each robot that is looked at.
 
     Args:

@@ -15,7 +15,7 @@ from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import Bucket, Refused, asked_of, id_of, read, robots
+from dva_sim.console.web.actions import BadMessage, Bucket, asked_of, id_of, read, robots
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say, wire_of
@@ -60,18 +60,16 @@ class Hub:
             await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
             return
         client = self.clients.join(role, ws.query_params.get("client", ""))
-        visit = client.visit
-        await ws.accept()
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
         def hear(text: str) -> None:
             self._hear_looker(client, text)
 
-        def following() -> str | None:
-            return client.feed.next() if client.visit == visit else None
-
-        await self._serve(ws, client.wake, following, hear, Bucket(LOOKS_RATE, LOOKS_BURST))
-        if client.visit == visit:
+        try:
+            await ws.accept()
+            bucket = Bucket(LOOKS_RATE, LOOKS_BURST)
+            await self._serve(ws, client.wake, client.feed.next, hear, bucket)
+        finally:
             self._leave(client)
 
     def _hear_looker(self, client: Client, text: str) -> None:
@@ -86,7 +84,7 @@ class Hub:
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
             self.watching()
         else:
-            raise Refused("no such message; there are: ping, resync, watch")
+            raise BadMessage("no such message; there are: ping, resync, watch")
         client.wake.set()
 
     def _leave(self, client: Client) -> None:
@@ -120,13 +118,14 @@ class Hub:
         driver = client.driver = Driver()
         if known := self.simulation.state.seats.get(client.name):
             driver.seat("{" + known.body)
-        await ws.accept()
 
         def hear(text: str) -> None:
             self._hear_driver(client, driver, text)
 
         try:
-            await self._serve(ws, driver.wake, driver.next, hear, Bucket(DRIVES_RATE, DRIVES_BURST))
+            await ws.accept()
+            bucket = Bucket(DRIVES_RATE, DRIVES_BURST)
+            await self._serve(ws, driver.wake, driver.next, hear, bucket)
         finally:
             if client.driver is driver:
                 client.driver = None
@@ -152,7 +151,7 @@ class Hub:
                 return
             asked["id"] = id_of(key)
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
-        except Refused as error:
+        except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
             driver.answer(encode(line | {"text": str(error)}))
 
@@ -192,11 +191,11 @@ class Hub:
         while (text := await heard(ws)) is not None:
             try:
                 if isinstance(text, bytes):
-                    raise Refused("is not text")
+                    raise BadMessage("is not text")
                 if not bucket.takes(time.monotonic()):
-                    raise Refused("too many messages")
+                    raise BadMessage("too many messages")
                 hear(text)
-            except Refused as error:
+            except BadMessage as error:
                 wire_of(ws).drop(REFUSED, str(error)[:100])
                 return
 

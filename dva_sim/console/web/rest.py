@@ -9,7 +9,7 @@ from typing import Any
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
-from dva_sim.console.web.actions import MOST_BYTES, Refused, asked_of, id_of, read
+from dva_sim.console.web.actions import MOST_BYTES, BadMessage, asked_of, id_of, read
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.state import RunState
 from dva_sim.worlds.geo import GeoFrame
@@ -120,7 +120,7 @@ class Rest:
                 return self._gone(said)
             asked = asked_of(said.get("action"), said.get("arguments", {}), self._simulation.labels)
             return await self._do(asked, said)
-        except Refused as error:
+        except BadMessage as error:
             return problem(400, str(error))
 
     async def emergency(self, request: Request) -> Response:
@@ -130,7 +130,7 @@ class Rest:
             said.setdefault("id", secrets.token_hex(8))
             given = {"robots": said.get("robots", "all")}
             return await self._do(asked_of("emergency", given, self._simulation.labels), said)
-        except Refused as error:
+        except BadMessage as error:
             return problem(400, str(error))
 
     def _gone(self, said: dict[str, Any]) -> Response:
@@ -142,11 +142,11 @@ class Rest:
         """Who asks: a page that is open, or a program.
 
         Raises:
-            Refused: no such page.
+            BadMessage: no such page.
         """
         name = said.get("client", PROGRAM)
         if name != PROGRAM and (not isinstance(name, str) or self._hub.clients.find(name) is None):
-            raise Refused("client: no page of that name is open")
+            raise BadMessage("client: no page of that name is open")
         return str(name)
 
     async def _do(self, asked: dict[str, Any], said: dict[str, Any]) -> Response:
@@ -162,7 +162,7 @@ async def body_of_request(request: Request) -> dict[str, Any]:
     """The JSON object in a body that is not too long.
 
     Raises:
-        Refused: it is something else.
+        BadMessage: it is something else.
     """
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/json":
@@ -180,8 +180,8 @@ async def body_of_request(request: Request) -> dict[str, Any]:
         raise TooStrange(400, "the body is not whole") from None
     try:
         return read(bytes(data))
-    except Refused as error:
-        raise Refused(f"the body {error}") from None
+    except BadMessage as error:
+        raise BadMessage(f"the body {error}") from None
 
 
 class TooStrange(Exception):

@@ -20,6 +20,7 @@ MOST_CONNECTIONS = 400
 SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
 SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
 PING = 10.0  # [s]
+MOST_COMPLAINTS = 5
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -59,7 +60,7 @@ class Server(uvicorn.Server):
 def make_server(app: ASGIApp) -> Server:
     """The server of an application."""
     logger = logging.getLogger("uvicorn.error")
-    logger.handlers, logger.propagate = [_OneLine()], False
+    logger.handlers, logger.propagate = [_Complaints()], False
     logger.setLevel(logging.WARNING)
     config = uvicorn.Config(
         app,
@@ -83,21 +84,21 @@ def make_server(app: ASGIApp) -> Server:
     return Server(config)
 
 
-class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]
-    """A mistake of ours in full; what a client sent, and what a server says at its end, not."""
+class _Complaints(logging.StreamHandler):  # type: ignore[type-arg]
+    """A mistake of ours in full, the first times; what clients sent, and how they ended, not."""
 
-    NOISE = (
-        "Invalid",
-        "Cancel",
-        "Exceeded",
-        "Unsupported",
-        "No supported",
-        "ASGI callable returned",
-    )
+    NOISE = ("Invalid", "Cancel", "Exceeded", "Unsupported", "No supported", "ASGI callable")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._count = 0
 
     def emit(self, record: logging.LogRecord) -> None:
         cut_off = record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError)
-        if not cut_off and not record.getMessage().startswith(self.NOISE):
+        if cut_off or record.getMessage().startswith(self.NOISE):
+            return
+        self._count += 1
+        if self._count <= MOST_COMPLAINTS:  # nobody may read them
             super().emit(record)
 
 

@@ -20,6 +20,7 @@ from dva_sim.console.web.state import RunState
 
 PATIENCE = 5.0  # for an answer [s]
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
+MOST_COMPLAINTS = 20
 MOST_PENDING = 256  # questions without an answer
 
 Answer = dict[str, Any]
@@ -47,6 +48,7 @@ class Simulation:
         self._pipe = PipeEnd(self._take, self._end)
         self._heard = time.monotonic()
         self._pending: dict[str, list[Told]] = {}
+        self._complaints = 0
 
     async def open(self, number: int) -> None:
         """Use the pipe of that number."""

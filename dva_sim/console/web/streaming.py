@@ -8,7 +8,7 @@ from contextlib import aclosing, suppress
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from dva_sim.console.web.camera import BOUNDARY, Cameras
+from dva_sim.console.web.camera import BOUNDARY, CameraStreams
 
 STALLED = 20.0  # a viewer that takes nothing for so long is gone [s]
 
@@ -23,7 +23,7 @@ class PictureStream(Response):
 
     media_type = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
 
-    def __init__(self, cameras: Cameras, robot: int) -> None:
+    def __init__(self, cameras: CameraStreams, robot: int) -> None:
         super().__init__(headers={"Cache-Control": "no-store"})
         del self.headers["content-length"]
         self._cameras, self._robot = cameras, robot

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -81,17 +81,15 @@ def fake(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Wor
 
 
 @pytest.fixture
-def own_world(tmp_path: Path) -> Iterator[Callable[..., World]]:
-    """Worlds that nobody else looks at."""
-    managers: list[Any] = []
+def own_world(tmp_path: Path) -> Iterator[Callable[..., tuple[World, Callable[[], None]]]]:
+    """Worlds that nobody else looks at, and how each is ended."""
+    with ExitStack() as all_of_them:
 
-    def start(*command: str) -> World:
-        managers.append(running(tmp_path, list(command)))
-        return managers[-1].__enter__()
+        def start(*words: str) -> tuple[World, Callable[[], None]]:
+            one = all_of_them.enter_context(ExitStack())
+            return one.enter_context(running(tmp_path, [str(FAKE), *words])), one.close
 
-    yield start
-    for manager in managers:
-        manager.__exit__(None, None, None)
+        yield start
 
 
 @pytest.fixture(scope="session")

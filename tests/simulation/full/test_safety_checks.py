@@ -9,6 +9,7 @@ import pytest
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.drive import Teleoperation
+from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.robot.controller import Decision, Mode, RobotController, TimedSetPoint
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.dispatcher import Dispatcher
@@ -585,3 +586,28 @@ def test_an_event_that_is_confirmed_from_afar_breaks_s6(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(Teleoperation, "begin", lambda self: self.end("confirmed"))
     assert broken(played(**{"robot.way_m": 25, "dispatch.merge_distance_m": 0})) == {"S6"}
+
+
+# --- who only says so --------------------------------------------------------------------
+
+
+def test_a_guard_that_says_from_its_post_that_it_has_arrived_is_replaced_after_a_minute(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    honest = GuardAgent._depart
+
+    def lazy(self: GuardAgent, errand: Any) -> None:
+        if self.device.label != "guard-1" or errand.order is None:
+            honest(self, errand)
+            return
+        for state in ("departed", "arrived"):
+            self.device.progress(errand.order.event_id, state)
+
+    monkeypatch.setattr(GuardAgent, "_depart", lazy)
+    alone = {"robot.count": 0, "operator.count": 0, "guard.count": 2}
+    run = played(**alone, **{"dispatch.merge_distance_m": 0, "horizon_s": 150})
+    told = {moment.what: moment.time for moment in run.recorder.timeline}
+    assert told["is told that the order is over"] == pytest.approx(141.0, abs=2.0)
+    assert run.dva.desk.counters["said from afar to have arrived"] == 1
+    assert run.dva.events[1].responder == id_of("guard", 2)
+    assert broken(run) == set()

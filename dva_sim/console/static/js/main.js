@@ -1,5 +1,6 @@
 /** Where the page begins. */
 import { connect, keepDriveSocket } from './net/sockets.js';
+import { keepSampling } from './network/samples.js';
 import { showApp } from './shell/app.js';
 import { listenForKeys } from './shell/keys.js';
 
@@ -7,3 +8,4 @@ showApp(/** @type {HTMLElement} */ (document.getElementById('app')));
 listenForKeys();
 connect();
 keepDriveSocket();
+keepSampling();

@@ -31,7 +31,7 @@
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard
- * @typedef {Raster & {kind: string, full?: {value: number, unit: string}}} Field
+ * @typedef {Raster & {kind: string, full?: {value: number, unit: string} | string}} Field
  * @typedef {{hazards: Hazard[], fields: Field[]}} Hazards
  *
  * @typedef {{number: number, kind: string, x_m: number, y_m: number, room: string,

@@ -45,4 +45,5 @@ function Fullest() {
 }
 
 /** @param {import('../types.js').Field} field */
-const fullest = ({ kind, full }) => `${plain(kind)} ${full?.value} ${full?.unit}`;
+const fullest = ({ kind, full }) =>
+  `${plain(kind)} ${typeof full === 'object' ? `${full.value} ${full.unit}` : full}`;

@@ -1,17 +1,14 @@
 /** What moves or changes on the map: hazards, events, trails, robots, people. */
-import { events, hazards, robots, scene, selection, tracks } from '../store.js';
+import { events, hazards, modeOf, robots, scene, selection, tracks } from '../store.js';
 import { HAZARDS } from '../palette.js';
 import { colours } from '../shell/theme.js';
-import { ageText } from '../ui/words.js';
-import { worldNow } from '../net/world_time.js';
 import { drawBattery, drawName, drawPerson, drawRobot, isRoomy, modeColour, sizeOf } from './bodies.js';
 import { Sight } from './cone.js';
 import { Fields } from './fields.js';
-import { SEVERITIES, SOURCES, stateColour } from './marks.js';
+import { drawEvent, EVENT_PX, EVENT_UP_PX, label, ring } from './event_marks.js';
+import { SOURCES, stateColour } from './marks.js';
 import { isOpen, thingsOf } from './shown.js';
-import { modeOf } from '../store.js';
 
-const EVENT_PX = 18;
 const HIT_PX = 12;
 const EVERY_SECOND = 1000;
 
@@ -60,7 +57,7 @@ export class Live {
     this.drawOrders(pen);
     this.drawSources(pen);
     this.drawBodies(pen);
-    for (const event of events.peek()) this.drawEvent(pen, event);
+    for (const event of events.peek()) drawEvent(pen, event);
   }
 
   /**
@@ -184,35 +181,6 @@ export class Live {
   }
 
   /**
-   * @param {Pen} pen
-   * @param {import('../types.js').SiteEvent} event
-   */
-  drawEvent(pen, event) {
-    const { ctx, affine, colours: palette } = pen;
-    const [left, top] = affine.pixel(event.x_m, event.y_m);
-    const chosen = selection.peek();
-    const mine = chosen?.kind === 'event' && chosen.key === event.number;
-    if (mine) ring(pen, left, top - 22, 15);
-    ctx.globalAlpha = isOpen(event) ? 1 : 0.55;
-    const s = EVENT_PX * affine.dpr;
-    ctx.setTransform(s, 0, 0, s, left * affine.dpr, (top - 22) * affine.dpr);
-    const shape = SEVERITIES[event.severity] ?? SEVERITIES.low;
-    ctx.lineWidth = 3 / EVENT_PX;
-    ctx.strokeStyle = palette.halo;
-    ctx.stroke(shape);
-    ctx.fillStyle = palette[event.severity] ?? palette.card;
-    ctx.fill(shape);
-    ctx.lineWidth = 1.5 / EVENT_PX;
-    ctx.strokeStyle = palette.outline;
-    ctx.stroke(shape);
-    affine.toPixels(ctx);
-    number(ctx, palette[`on-${event.severity}`] ?? palette.ink, event.number, left, top - 22);
-    const age = isOpen(event) || mine ? ` ${ageText(worldNow() - event.since_ms)}` : '';
-    label(ctx, palette, `${event.state}${age}`, left + EVENT_PX / 2 + 4, top - 22, 'left');
-    ctx.globalAlpha = 1;
-  }
-
-  /**
    * What stands at a place of the map [px], the nearest within reach.
    * @param {number} left
    * @param {number} top
@@ -231,7 +199,7 @@ export class Live {
     }
     for (const event of events.peek()) {
       const [x, y] = affine.pixel(event.x_m, event.y_m);
-      const far = Math.hypot(x - left, y - 22 - top);
+      const far = Math.hypot(x - left, y - EVENT_UP_PX - top);
       offer(far, HIT_PX + EVENT_PX / 2, { kind: 'event', key: event.number });
     }
     return best;
@@ -254,53 +222,4 @@ function placed(affine, now) {
     bodies.push({ thing, left, top, heading: place.heading, size: sizeOf(thing, affine.scale) });
   }
   return bodies;
-}
-
-/**
- * @param {Pen} pen
- * @param {number} left
- * @param {number} top
- * @param {number} radius
- */
-function ring({ ctx, colours: palette }, left, top, radius) {
-  ctx.beginPath();
-  ctx.arc(left, top, radius, 0, 2 * Math.PI);
-  ctx.lineWidth = 2.5;
-  ctx.strokeStyle = palette.focus;
-  ctx.stroke();
-}
-
-/**
- * @param {CanvasRenderingContext2D} ctx
- * @param {string} colour
- * @param {number} value
- * @param {number} left
- * @param {number} top
- */
-function number(ctx, colour, value, left, top) {
-  ctx.font = '600 10px system-ui, sans-serif';
-  ctx.textAlign = 'center';
-  ctx.textBaseline = 'middle';
-  ctx.fillStyle = colour;
-  ctx.fillText(String(value), left, top + 1);
-}
-
-/**
- * @param {CanvasRenderingContext2D} ctx
- * @param {Record<string, string>} palette
- * @param {string} text
- * @param {number} left
- * @param {number} top
- * @param {CanvasTextAlign} align
- */
-function label(ctx, palette, text, left, top, align) {
-  ctx.font = '11px system-ui, sans-serif';
-  ctx.textAlign = align;
-  ctx.textBaseline = 'middle';
-  ctx.lineJoin = 'round';
-  ctx.lineWidth = 3;
-  ctx.strokeStyle = palette.halo;
-  ctx.strokeText(text, left, top);
-  ctx.fillStyle = palette.ink;
-  ctx.fillText(text, left, top);
 }

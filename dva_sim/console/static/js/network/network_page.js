@@ -1,30 +1,19 @@
 /** How late is it all? The link one chooses, and what becomes of each robot's commands. */
-import { html, useEffect, useMemo } from '../../vendor/preact.js';
+import { html } from '../../vendor/preact.js';
 import { driveOf, modeOf, robots, rowOf, rows } from '../store.js';
-import { worldNow } from '../net/world_time.js';
 import { Chart } from '../charts/chart.js';
-import { History } from '../charts/history.js';
 import { driven } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
 import { isNumber, msText } from '../ui/words.js';
 import { LinkPanel } from './link_panel.js';
 import { PatternSelect } from './pattern_select.js';
+import { KINDS, SPAN_S, read } from './samples.js';
 
-const SPAN_S = 60;
-const SAMPLE_MS = 500;
 const MOST_LINES = 4;
 const MOST_ROWS = 50;
 const DASHES = [undefined, [6, 3], [2, 3], [10, 3, 2, 3]];
 
 /** @typedef {import('../types.js').Thing} Thing */
-
-const KINDS = /** @type {{title: string, unit: string, least: number, read: (i: number) => number | null}[]} */ ([
-  { title: 'Command age', unit: 'ms', least: 100, read: (i) => driveOf(i)?.command_age_ms ?? null },
-  { title: 'Round trip', unit: 'ms', least: 100, read: (i) => driveOf(i)?.round_trip_ms ?? null },
-  { title: 'Commands applied', unit: 'per second', least: 10, read: (i) => rowOf(i)?.commands_hz ?? null },
-  { title: 'Commands waiting in the robot', unit: '', least: 5, read: (i) => rowOf(i)?.queue ?? null },
-  { title: 'Lost on the link', unit: 'so far', least: 5, read: (i) => rowOf(i)?.lost ?? null },
-]);
 
 /** The page. */
 export function NetworkPage() {
@@ -76,15 +65,7 @@ function Row({ robot }) {
 
 function Charts() {
   const shown = inOrder().slice(0, MOST_LINES);
-  const key = shown.map((robot) => robot.i).join();
-  const histories = useMemo(() => KINDS.map(() => new History(shown.length, SPAN_S + 10)), [key]);
-  useEffect(() => {
-    const timer = window.setInterval(() => {
-      const time = worldNow() / 1000;
-      KINDS.forEach((kind, n) => histories[n].add(time, shown.map((robot) => kind.read(robot.i))));
-    }, SAMPLE_MS);
-    return () => window.clearInterval(timer);
-  }, [histories]);
+  const numbers = shown.map((robot) => robot.i);
   void rows.value;
   const lines = shown.map((robot, n) => ({
     label: robot.label,
@@ -98,7 +79,7 @@ function Charts() {
     )}</p>
     ${KINDS.map(
       (kind, n) => html`<${Chart} title=${kind.title} unit=${kind.unit} lines=${lines} span=${SPAN_S}
-        least=${kind.least} sync="network" read=${() => histories[n].read()} />`,
+        least=${kind.least} sync="network" read=${() => read(n, numbers)} />`,
     )}
   </section>`;
 }

@@ -1,0 +1,260 @@
+"""A second book of the events, kept by what is said on the network: the DVA's is held against it.
+
+It notes who was sent where, who took that up, since when an event waits or is in the same hands,
+and what those who were sent have found; the fields of the DVA's events are not asked for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+from dva_sim.core.assignments import Rules
+from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventBook, State, apart
+from dva_sim.protocol import messages as m
+
+PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
+FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
+MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
+FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
+OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>"
+_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"
+"""What it wants to hear that reaches the DVA, and what it wants to read that the DVA sends."""
+Broken = tuple[str, str]
+
+
+class Seen(NamedTuple):
+    """How an event stood when it was last looked at; times in [s].
+
+    Attributes:
+        found: What somebody has found, or done, there.
+        hands: Who has it in hand, and for what; empty: nobody.
+        since: From when on those do.
+        waits: Since when it has waited for somebody who takes it up.
+    """
+
+    found: frozenset[str]
+    hands: tuple[str | None, ...]
+    since: float
+    waits: float
+
+
+@dataclass
+class Word:
+    """What was said about one event on the network.
+
+    Attributes:
+        ordered: Who was sent there, and what goes there for them: a robot, or they themselves.
+        taken: Who has taken that up.
+        loose: Who has it no longer, by its own word or the DVA's, or has started anew.
+        busy: Whether somebody has taken it up since it was last looked at.
+        anew: Whether somebody loose was sent there since then.
+        found: What those at the place have found, or done.
+    """
+
+    ordered: dict[str, str] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
+    loose: set[str] = field(default_factory=set)
+    busy: bool = False
+    anew: bool = False
+    found: set[str] = field(default_factory=set)
+
+
+class EventLedger:
+    """A second book of the events, by what is said on the network, beside what the DVA's shows.
+
+    Args:
+        book: The DVA's.
+        rules: How long an event may wait, or be in one pair of hands.
+        dva: Id of the DVA.
+        place_of: Where a device really is.
+        at_event: Who is so near may have seen what there is [m].
+    """
+
+    def __init__(
+        self,
+        book: EventBook,
+        rules: Rules,
+        dva: str,
+        place_of: Callable[[str], m.Position | None],
+        at_event: float,
+    ) -> None:
+        self._book, self._rules, self._dva = book, rules, dva
+        self._place_of, self._at_event = place_of, at_event
+        self._asked: dict[tuple[str, int], m.EventReport] = {}
+        self._orders: dict[tuple[str, int], int] = {}
+        self._words: dict[int, Word] = {}
+        self._felt: dict[str, float] = {}
+        self._seen: dict[int, Seen] = {}
+        self._open: set[int] = set()
+        self._now = 0.0
+
+    # --- what is said --------------------------------------------------------------------
+
+    def hears(self, source: str, message: m.Message | None, now: float) -> None:
+        """Something about events has reached the DVA; `source` has really sent it."""
+        if message is None or message.source != source:
+            return
+        match message.body:
+            case m.SensorValue():
+                self._felt[source] = now
+            case m.EventReport(event_id=None, finding="detected") as report:
+                self._asked[source, message.message_id] = report
+                _keep_newest(self._asked)
+            case m.EventReport(event_id=int(number), finding=finding):
+                self._finds(self._word(number), source, number, finding)
+            case m.OrderProgress(event_id=number, state=state):
+                if state != "declined":
+                    self._takes_up(number, source)
+                if state not in ("departed", "arrived"):
+                    self._word(number).loose.add(source)
+            case m.Registration():
+                for word in self._words.values():
+                    word.loose.add(source)
+
+    def waits_for(self, source: str, data: bytes) -> bool:
+        """Whether what is sent is worth reading: an order, or an answer that is waited for."""
+        if source == self._dva:
+            return any(what in data for what in _ORDERED) or _answers(self._asked, data)
+        return _answers(self._orders, data)
+
+    def told(self, source: str, message: m.Message | None) -> Iterator[Broken]:
+        """The DVA sends an order, or somebody answers."""
+        if message is None:
+            return
+        match message.body:
+            case m.Order(event_id=number, device=device):
+                self._sends(message, number, device or message.destination)
+            case m.TaskAward(event_id=number):
+                self._sends(message, number, message.destination)
+            case m.OrderProgress(event_id=number) if source == self._dva:
+                self._word(number).loose.add(message.destination)
+            case m.Reply() as reply if source == self._dva:
+                yield from self._answered(message.destination, reply)
+            case m.Reply(answers=answers, code=code):
+                ordered = self._orders.pop((source, answers), None)
+                if ordered is not None and code == m.OK:
+                    self._takes_up(ordered, source)
+
+    def _word(self, number: int) -> Word:
+        word = self._words.setdefault(number, Word())
+        _keep_newest(self._words)
+        return word
+
+    def _sends(self, message: m.Message, number: int, goes: str) -> None:
+        word, to = self._word(number), message.destination
+        word.ordered[to], word.anew = goes, word.anew or to in word.loose
+        word.taken.discard(to)
+        word.loose.discard(to)
+        self._orders[to, message.message_id] = number
+        _keep_newest(self._orders)
+
+    def _takes_up(self, number: int, device: str) -> None:
+        word = self._word(number)
+        if device in word.ordered:
+            word.busy = True
+            word.taken.add(device)
+
+    def _finds(self, word: Word, source: str, number: int, finding: str) -> None:
+        """It counts if who was sent there says so; what is confirmed, was looked at there."""
+        goes, event = word.ordered.get(source), self._book.get(number)
+        if goes is None or event is None:
+            return
+        self._takes_up(number, source)
+        if finding != "confirmed" or self._is_near(goes, event):
+            word.found.add(finding)
+
+    def _is_near(self, device: str, event: Event) -> bool:
+        place = self._place_of(device)
+        return place is not None and apart(place, event.position) <= self._at_event
+
+    def _answered(self, reporter: str, reply: m.Reply) -> Iterator[Broken]:
+        """The DVA has taken a report: then there is an event."""
+        report = self._asked.pop((reporter, reply.answers), None)
+        if report is None or reply.code != m.OK:
+            return
+        near, kind = max(self._book.merge_distance, SAME_SPOT), report.kind
+        known = (*self._book.open.values(), *self._book.closed.values())
+        same = (e for e in known if e.kind == kind)
+        if not any(apart(e.position, report.position) < near for e in same):
+            yield "S6", f"a {report.kind} was reported, and is in no book"
+
+    # --- what the book shows -------------------------------------------------------------
+
+    def check(self, now: float) -> Iterator[Broken]:
+        """What is wrong with the book now."""
+        book = self._book
+        if now < self._now:
+            yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
+        self._now = now
+        if sum(book.counts.values()) != book.total:
+            yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
+        if min(book.counts.values()) < 0:
+            yield "S6", "a count of events is below zero"
+        for state in (State.PENDING, State.ASSIGNED, State.ON_SCENE):
+            count = sum(e.state is state for e in book.open.values())
+            if count != book.counts[state]:
+                yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
+        for number in book.open.keys() & book.closed.keys():
+            yield "S6", f"event {number} is open and closed"
+        for number in self._open - book.open.keys() - book.closed.keys():
+            yield "S6", f"event {number} was open, and is in no book"
+        self._open = set(book.open)
+        every = (*book.open.values(), *book.closed.values())
+        seen, self._seen = self._seen, {}
+        for event in every:
+            yield from self._of_event(event, seen.get(event.number), now)
+
+    def _of_event(self, event: Event, old: Seen | None, now: float) -> Iterator[Broken]:
+        new, rules = self._look(event, old, now), self._rules
+        self._seen[event.number] = new
+        if event.waits_for is not None and now - new.waits > rules.escalate_after + PENDING_SLACK:
+            yield "S6", f"event {event.number} is {event.state} after {now - new.waits:.0f} s"
+        if new.hands and now - new.since > rules.order_limit + PENDING_SLACK:
+            held = now - new.since
+            yield "S6", f"event {event.number} is in one pair of hands for {held:.0f} s"
+        for finding in new.found - (old.found if old else frozenset()):
+            if not self._is_found(event, finding, now):
+                yield "S6", f"event {event.number} is {finding}, and nobody there has said so"
+        for steps in (STEPS, ACT_STEPS):
+            times = [event.times[step] for step in steps if step in event.times]
+            if times != sorted(times):
+                yield "S7", f"times of event {event.number} are out of order"
+
+    def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
+        """Waiting ends when somebody takes it up, and begins anew when it is confirmed."""
+        found = FOUND & (event.times.keys() | {event.state.value})
+        old = old or Seen(found - FOUND, (), now, now)
+        word, hands = self._word(event.number), _in_hand(event)
+        taken = bool(word.taken.intersection(hands))
+        confirmed = "confirmed" in found - old.found
+        waits = now if taken or word.busy or confirmed else old.waits
+        since = old.since if hands == old.hands and not word.anew else now
+        word.busy = word.anew = False
+        return Seen(found, hands, since, waits)
+
+    def _is_found(self, event: Event, finding: str, now: float) -> bool:
+        """Whether who was sent there has said so; or a robot nearby may just have felt it."""
+        if finding in self._word(event.number).found:
+            return True
+        lately = [robot for robot, when in self._felt.items() if now - when < FELT_LATELY]
+        return finding == "confirmed" and any(self._is_near(r, event) for r in lately)
+
+
+def _keep_newest(kept: dict[Any, Any]) -> None:
+    if len(kept) > MOST_KEPT:
+        del kept[next(iter(kept))]
+
+
+def _answers(asked: dict[Any, Any], data: bytes) -> bool:
+    return bool(asked) and b"<reply>" in data
+
+
+def _in_hand(event: Event) -> tuple[str | None, ...]:
+    """Who has an event in hand that is not settled; who stands by has not."""
+    if event.state in (State.ASSIGNED, State.ON_SCENE):
+        return "look", event.holder, event.responder
+    if event.open and event.state is State.CONFIRMED and event.actor is not None:
+        return "act", event.actor
+    return ()

@@ -1,0 +1,86 @@
+"""Somebody who drives by keys: turns, goes, waits; what they go by is where the robot is."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from patience import PATIENCE_S
+from playwright.sync_api import Page
+
+from dva_sim.worlds.planning import Planner
+from dva_sim.worlds.site import load_site
+
+TURN_RATE = math.radians(30)
+NEAR_M, AHEAD = 0.6, 0.12  # of a waypoint; of a heading that will do [rad]
+LOOK_S = 0.1
+
+
+class Driver:
+    """Drives one robot of a page that has been started.
+
+    Args:
+        page: The page for driving.
+        base: Address of the console.
+        robot: Label.
+        site: Name of the site.
+        delay: Of the link, one way: what is seen has happened long ago [s].
+    """
+
+    def __init__(self, page: Page, base: str, robot: str, site: str, delay: float) -> None:
+        self._page, self._base, self._robot, self._delay = page, base, robot, delay
+        self._planner = Planner(load_site(site), 0.45)
+        self._down: set[str] = set()
+
+    def state(self) -> dict[str, Any]:
+        """All that a script may ask for."""
+        found: dict[str, Any] = self._page.request.get(f"{self._base}api/state").json()
+        return found
+
+    def pose(self) -> tuple[float, float, float]:
+        """Where the robot is, and where it heads for."""
+        rows = self.state()["robots"]
+        row = next(row for row in rows if row["label"] == self._robot)
+        return row["x_m"], row["y_m"], row["heading_rad"]
+
+    def drive_to(self, x: float, y: float, near: float) -> None:
+        """Follow the planned way until the robot is near enough.
+
+        Raises:
+            TimeoutError: it never was.
+        """
+        end = time.monotonic() + PATIENCE_S
+        while math.dist(self.pose()[:2], (x, y)) > near:
+            if time.monotonic() > end:
+                raise TimeoutError(f"{self._robot} stands at {self.pose()}, not near {x}, {y}")
+            self._leg(x, y, near)
+        self._hold(set())
+
+    def _leg(self, x: float, y: float, near: float) -> None:
+        """Turn towards the next waypoint, then go straight on for a part of the way."""
+        here = self.pose()
+        way = self._planner.path(here[:2], (x, y))
+        points = [(x, y)] if way is None else [(float(a), float(b)) for a, b in way]
+        ahead = next((p for p in points if math.dist(p, here[:2]) > NEAR_M), points[-1])
+        off = math.atan2(ahead[1] - here[1], ahead[0] - here[0]) - here[2]
+        off = (off + math.pi) % (2 * math.pi) - math.pi
+        if abs(off) > AHEAD:
+            self._press({"ArrowLeft" if off > 0 else "ArrowRight"}, abs(off) / TURN_RATE)
+        else:
+            far = min(math.dist(ahead, here[:2]), math.dist((x, y), here[:2]) - 0.5 * near)
+            self._press({"ArrowUp"}, max(0.2, far / 0.5))
+
+    def _press(self, keys: set[str], seconds: float) -> None:
+        """Hold keys for a while, then see what has come of it."""
+        self._hold(keys)
+        self._page.wait_for_timeout(1000 * seconds)
+        self._hold(set())
+        self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
+
+    def _hold(self, keys: set[str]) -> None:
+        for key in self._down - keys:
+            self._page.keyboard.up(key)
+        for key in keys - self._down:
+            self._page.keyboard.down(key)
+        self._down = set(keys)

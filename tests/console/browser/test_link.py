@@ -1,0 +1,88 @@
+"""The link one chooses, the time factor, the bar above all; two browsers agree."""
+
+from __future__ import annotations
+
+import pytest
+from patience import becomes
+from playwright.sync_api import expect
+
+SMALL = ("--robots", "2", "--people", "3")
+
+
+@pytest.fixture
+def page(fake, visit):
+    return visit.open(fake(*SMALL).drive, "network")
+
+
+@pytest.mark.parametrize(
+    ("slider", "value", "shown"),
+    [
+        ("Delay", "500", "500 ms"),
+        ("Jitter", "40", "40 ms"),
+        ("Loss", "2.5", "2.5 %"),
+        ("Processing time", "300", "300 ms"),
+        ("Bandwidth", "40", "1 Mbit/s"),
+        ("Time factor", "3", "× 3"),
+    ],
+)
+def test_a_slider_changes_the_world_for_every_browser(
+    page, visits, fake, slider: str, value: str, shown: str
+) -> None:
+    other = visits().open(fake(*SMALL).drive, "network")
+    page.get_by_role("slider", name=slider).fill(value)
+
+    for each in (page, other):
+        knob = each.get_by_role("slider", name=slider)
+        expect(knob).to_have_attribute("aria-valuetext", shown)
+    page.reload()
+    expect(page.get_by_role("slider", name=slider)).to_have_attribute("aria-valuetext", shown)
+    page.get_by_role("slider", name=slider).fill("1" if slider == "Time factor" else "0")
+
+
+def test_the_status_link_tells_the_delay_and_that_it_is_modelled(page) -> None:
+    page.get_by_role("button", name="250 ms").click()
+
+    expect(page.get_by_role("status", name="Link")).to_contain_text("modelled 250 ms")
+    expect(page.get_by_role("button", name="250 ms")).to_have_attribute("aria-pressed", "true")
+
+
+def test_time_stands_still_while_it_is_paused(page) -> None:
+    page.get_by_role("button", name="Pause").click()
+    expect(page.locator(".time")).to_contain_text("paused")
+    shown = page.locator(".time .figure").inner_text()
+    page.wait_for_timeout(1500)
+    assert page.locator(".time .figure").inner_text() == shown
+
+    page.get_by_role("button", name="Go on").click()
+    assert becomes(lambda: page.locator(".time .figure").inner_text() != shown)
+
+
+def test_the_pattern_of_a_robot_changes(page) -> None:
+    select = page.get_by_label("Pattern of robot-2")
+    select.select_option("latest-wins")
+    page.reload()
+
+    expect(page.get_by_label("Pattern of robot-2")).to_have_value("latest-wins")
+    page.get_by_label("Pattern of robot-2").select_option("req-rep")
+
+
+def test_a_page_that_may_only_look_says_so_and_offers_nothing(fake, visits) -> None:
+    world = fake("--robots", "2", "--people", "4")  # with tokens
+    page = visits().open(world.look, "drive")
+
+    expect(page.get_by_text("This address may only look.")).to_be_visible()
+    for button in ("Take control", "Start", "Stop", "Release control"):
+        expect(page.get_by_role("button", name=button, exact=True)).to_be_disabled()
+    expect(page.get_by_role("slider", name="Delay")).to_be_disabled()
+
+
+def test_who_comes_second_is_told_who_drives(fake, visits) -> None:
+    world = fake("--robots", "2", "--people", "5")
+    first, second = visits().open(world.drive, "drive"), visits().open(world.drive, "drive")
+    first.get_by_role("button", name="Take control").click()
+    expect(first.get_by_role("button", name="Release control")).to_be_enabled()
+
+    second.get_by_role("button", name="Take control").click()
+    expect(second.locator(".warnings")).not_to_be_empty()
+    first.get_by_role("button", name="Release control").click()
+    expect(first.get_by_role("button", name="Take control")).to_be_enabled()

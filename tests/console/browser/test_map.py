@@ -1,0 +1,117 @@
+"""The map and its twin, the lists: one selection, everything that moves, crowds."""
+
+from __future__ import annotations
+
+import pytest
+from patience import becomes
+from playwright.sync_api import Page, expect
+
+SMALL = ("--robots", "3", "--people", "4")
+INK = """([x, y, w, h]) => { const c = document.querySelectorAll('.map-canvas')[1];
+  const d = c.getContext('2d').getImageData(x, y, w, h).data; let sum = 0;
+  for (let i = 3; i < d.length; i += 4) sum += d[i] > 0; return sum; }"""
+
+
+def test_robots_people_and_hazards_are_drawn_and_move(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    canvas = page.locator(".map-canvas").nth(1)
+
+    def picture() -> str:
+        return str(canvas.evaluate("c => c.toDataURL()"))
+
+    assert becomes(lambda: page.evaluate(INK, [0, 0, 800, 700]) > 500)
+    first = picture()
+    assert becomes(lambda: picture() != first)
+
+
+def test_list_and_map_share_one_selection(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    row = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-2")
+    row.click()
+
+    expect(row).to_have_attribute("aria-pressed", "true")
+    card = page.get_by_role("complementary", name="What is chosen")
+    expect(card.get_by_role("heading", name="robot-2")).to_be_visible()
+    card.get_by_role("button", name="Close").click()
+    expect(row).to_have_attribute("aria-pressed", "false")
+
+
+def test_a_robot_in_the_middle_is_hit_by_a_click(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    button = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1")
+    button.click()
+    page.get_by_role("button", name="Follow robot-1").click()  # now it is in the middle
+    page.wait_for_timeout(500)
+    box = page.locator(".map-ground").bounding_box()
+    assert box
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "false")
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+
+    expect(page.get_by_role("complementary", name="What is chosen")).to_be_visible()
+
+
+def test_keys_pan_and_zoom_the_map_and_fit_brings_all_back(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    bar = page.locator(".scale-bar")
+    fitted = bar.inner_text()
+    page.get_by_role("application").focus()
+    for _ in range(4):
+        page.keyboard.press("+")
+    assert becomes(lambda: bar.inner_text() != fitted)
+
+    page.get_by_role("button", name="Fit the whole site").click()
+    assert becomes(lambda: bar.inner_text() == fitted)
+
+
+def test_events_tell_state_age_and_who_is_sent(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    event = page.get_by_role("region", name="Events").get_by_role("button").first
+
+    expect(event).to_contain_text("Fire")
+    expect(event).to_contain_text("critical")
+    expect(event).to_contain_text("robot-1")
+    event.click()
+    expect(page.get_by_role("complementary")).to_contain_text("min ago")
+
+
+def test_the_legend_tells_what_the_fullest_tint_means(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    page.get_by_text("Legend").click()
+
+    expect(page.locator(".legend")).to_contain_text("robot: teleoperation")
+    expect(page.locator(".legend")).not_to_contain_text("undefined")
+
+
+@pytest.mark.parametrize("site", ["campus", "office-block"])
+def test_other_sites_are_drawn_too(fake, visit, site: str) -> None:
+    page = visit.open(fake("--robots", "3", "--people", "4", "--site", site).drive)
+
+    assert becomes(lambda: page.evaluate(INK.replace("[1]", "[0]"), [0, 0, 800, 700]) > 100_000)
+
+
+def crowd(page: Page) -> int:
+    """Frames in three seconds of watching."""
+    return int(
+        page.evaluate(
+            """() => new Promise(done => { let n = 0; const end = performance.now() + 3000;
+            const tick = now => { n += 1; now < end ? requestAnimationFrame(tick) : done(n); };
+            requestAnimationFrame(tick); })"""
+        )
+    )
+
+
+def test_200_robots_and_100_people_are_shown_and_listed(fake, visit) -> None:
+    page = visit.open(fake("--robots", "200", "--people", "100", "--site", "campus").drive)
+
+    expect(page.get_by_role("region", name="Robots").get_by_role("button")).to_have_count(200)
+    assert crowd(page) > 9  # what a machine that does much else still draws
+
+
+@pytest.mark.parametrize("page_name", ["map", "drive", "network"])
+def test_a_hostile_label_is_shown_as_text(fake, visit, page_name: str) -> None:
+    page = visit.open(fake("--robots", "3", "--people", "4", "--hostile").drive, page_name)
+    page.on("dialog", lambda dialog: pytest.fail(dialog.message))
+
+    expect(page.get_by_text("<script>alert(1)</script>").first).to_be_attached()
+    assert page.locator("script").count() == 1

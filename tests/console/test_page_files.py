@@ -1,0 +1,126 @@
+"""The files of the pages: what they are made of, how long they are, what they may not say."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+from patience import run
+
+from dva_sim.console import palette
+
+ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+STATIC = ROOT / "dva_sim" / "console" / "static"
+OWN = sorted((STATIC / "js").rglob("*.js"))
+VENDORED = {"shipped": STATIC / "vendor", "tests": HERE / "browser" / "vendor"}
+LIST = tomllib.loads((HERE / "vendor.toml").read_text())
+IMPORT = re.compile(r"^(?:import|export)\b[^;]*?from '([^']+)';|^import '([^']+)';", re.MULTILINE)
+
+
+def test_vendored_files_are_those_of_the_list() -> None:
+    found = {
+        f"{place}/{file.name}": hashlib.sha256(file.read_bytes()).hexdigest()
+        for place, folder in VENDORED.items()
+        for file in folder.iterdir()
+        if not file.name.endswith(".d.ts")
+    }
+
+    assert found == LIST["written"]
+
+
+def test_every_vendored_package_that_is_shipped_has_its_licence() -> None:
+    licences = (VENDORED["shipped"] / "LICENSES.txt").read_text()
+    for package in LIST["package"]:
+        title = f"{package['name']} {package['version']} ({package['licence']})"
+        assert (title in licences) != package.get("only_tests", False)
+
+
+def test_colours_are_those_that_the_palette_writes() -> None:
+    for name, text in palette.FILES.items():
+        assert (STATIC / name).read_text(encoding="utf-8") == text(), (
+            f"{name} is old: python -m dva_sim.console.palette"
+        )
+
+
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+@pytest.mark.parametrize(("front", "ground", "least"), palette.NEEDED)
+def test_what_is_to_be_read_stands_out(theme: int, front: str, ground: str, least: float) -> None:
+    colours = palette.palettes()[theme]
+
+    assert palette.contrast(colours[front], colours[ground]) >= least
+
+
+def test_contrast_is_that_of_the_standard() -> None:
+    assert palette.contrast("#ffffff", "#000000") == pytest.approx(21)
+    assert palette.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
+
+
+def test_colours_are_named_only_in_the_palette() -> None:
+    """Black and white over pictures aside, which are the same in both themes."""
+    allowed = {"#000", "#fff", "#8a0000"}
+    for file in [*OWN, *(STATIC / "css").iterdir()]:
+        if file.name != "palette.js":
+            found = set(re.findall(r"#[0-9a-f]{3}(?:[0-9a-f]{3})?\b", file.read_text()))
+            assert found <= allowed, file
+
+
+@pytest.mark.parametrize("file", OWN, ids=lambda file: str(file.relative_to(STATIC)))
+def test_a_module_of_the_pages_keeps_the_rules_of_the_house(file: Path) -> None:
+    text = file.read_text(encoding="utf-8")
+
+    assert len(text.splitlines()) <= 300
+    assert text.startswith(("/**", "//")), "says what it is for"
+    for word in (
+        "innerHTML",
+        "outerHTML",
+        "insertAdjacentHTML",
+        "dangerouslySet",
+        "document.write",
+    ):
+        assert word not in text
+    assert not re.search(r"https?://", text)
+
+
+def imports(file: Path) -> set[Path]:
+    """Own modules that a module imports."""
+    found = {a or b for a, b in IMPORT.findall(file.read_text())}
+    return {(file.parent / name).resolve() for name in found if "vendor" not in name}
+
+
+def test_no_module_of_the_pages_is_part_of_a_circle() -> None:
+    left = {file.resolve(): imports(file) for file in OWN}
+    assert all(path in left for paths in left.values() for path in paths)
+
+    while ends := [file for file, needs in left.items() if not needs & left.keys()]:
+        for file in ends:
+            del left[file]
+
+    assert not left
+
+
+def test_every_module_and_icon_of_the_pages_is_used() -> None:
+    used = {path for file in OWN for path in imports(file)} | {(STATIC / "js/main.js").resolve()}
+    types = (STATIC / "js" / "types.js").resolve()
+    assert {file.resolve() for file in OWN} - used <= {types}
+
+    sprite = (STATIC / "vendor" / "icons.svg").read_text()
+    names = set(re.findall(r'<symbol id="([^"]+)"', sprite))
+    texts = "".join(file.read_text() for file in OWN)
+    assert {name for name in names if f"'{name}'" in texts or f'"{name}"' in texts} == names
+
+
+def test_types_of_the_pages_hold() -> None:
+    """`npm install --prefix .venv typescript` brings what this needs."""
+    own = ROOT / ".venv" / "node_modules" / ".bin"
+    tsc = shutil.which("tsc", path=str(own)) or shutil.which("tsc")
+    if tsc is None:
+        pytest.skip("TypeScript is missing: npm install --prefix .venv typescript@7.0.2")
+    told = run([tsc, "-p", str(HERE / "typing")], capture_output=True, text=True)
+
+    assert told.stdout == ""
+    assert told.returncode == 0
