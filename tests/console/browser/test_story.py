@@ -48,6 +48,7 @@ def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(
     page.get_by_role("button", name="Confirm").click()
 
     assert becomes(lambda: "confirmed" in str(driver.state()["events"]))
+    page.close()  # it would complain that nobody is there any more
     console.send(signal.SIGINT)
     assert console.ends() == 0
     checked = programs.start("check", record)
