@@ -416,7 +416,9 @@ def test_a_page_that_comes_back_has_its_old_name(console):
     console.next_asked("gone")
     back = console.socket(f"/ws/state?client={page.client}", console.drive)
     assert json.loads(back.recv(PATIENCE_S))["client"] == page.client
-    back.close()
+    twin = console.socket(f"/ws/state?client={page.client}", console.drive)
+    assert json.loads(twin.recv(PATIENCE_S))["client"] != page.client  # a copy of an open page
+    twin.close(), back.close()
     other = console.socket(f"/ws/state?client={page.client}", console.look)
     assert json.loads(other.recv(PATIENCE_S))["client"] != page.client
     other.close()

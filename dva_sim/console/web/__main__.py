@@ -83,7 +83,8 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """What the simulation is told first: where this console is, and its secrets."""
-    shown = "127.0.0.1" if access.any_address and ":" not in host else host
+    local = "::1" if ":" in host else "127.0.0.1"
+    shown = local if access.any_address else host.strip("[]")
     base = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/"
     drive, look = (
         f"{base}?token={t}" if t else base for t in (access.tokens.drive, access.tokens.look)

@@ -60,7 +60,6 @@ class Client:
         watches: Robots whose pictures it says it looks at.
         driver: Its driving socket, if it has one.
         is_here: Whether its state socket is open.
-        visit: Counts its state sockets; an older one is not its own any more.
     """
 
     def __init__(self, name: str, role: Role, state: RunState) -> None:
@@ -69,7 +68,7 @@ class Client:
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
         self.driver: Driver | None = None
-        self.is_here, self.visit = True, 1
+        self.is_here = True
 
 
 class Clients:
@@ -93,12 +92,14 @@ class Clients:
         return len(self.here()) >= MOST_CLIENTS
 
     def join(self, role: Role, name: str = "") -> Client:
-        """Let a page in, under its old name if it was here a moment ago."""
+        """Let a page in, under its old name if it was here a moment ago and is not any more.
+
+        A copy of a page that is open has the same name, and gets another: they would drive the
+        same robots.
+        """
         known = self._all.get(name)
-        if known is not None and known.role is role:
-            known.is_here, known.visit = True, known.visit + 1
-            known.feed = PageFeed(self._state, known.name)
-            known.wake.set()
+        if known is not None and known.role is role and not known.is_here:
+            known.is_here, known.feed = True, PageFeed(self._state, known.name)
             return known
         self._count += 1
         client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state)

@@ -60,18 +60,16 @@ class Hub:
             await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
             return
         client = self.clients.join(role, ws.query_params.get("client", ""))
-        visit = client.visit
-        await ws.accept()
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
         def hear(text: str) -> None:
             self._hear_looker(client, text)
 
-        def following() -> str | None:
-            return client.feed.next() if client.visit == visit else None
-
-        await self._serve(ws, client.wake, following, hear, Bucket(LOOKS_RATE, LOOKS_BURST))
-        if client.visit == visit:
+        try:
+            await ws.accept()
+            bucket = Bucket(LOOKS_RATE, LOOKS_BURST)
+            await self._serve(ws, client.wake, client.feed.next, hear, bucket)
+        finally:
             self._leave(client)
 
     def _hear_looker(self, client: Client, text: str) -> None:
@@ -120,13 +118,14 @@ class Hub:
         driver = client.driver = Driver()
         if known := self.simulation.state.seats.get(client.name):
             driver.seat("{" + known.body)
-        await ws.accept()
 
         def hear(text: str) -> None:
             self._hear_driver(client, driver, text)
 
         try:
-            await self._serve(ws, driver.wake, driver.next, hear, Bucket(DRIVES_RATE, DRIVES_BURST))
+            await ws.accept()
+            bucket = Bucket(DRIVES_RATE, DRIVES_BURST)
+            await self._serve(ws, driver.wake, driver.next, hear, bucket)
         finally:
             if client.driver is driver:
                 client.driver = None
