@@ -4,7 +4,6 @@ import { HAZARDS } from '../palette.js';
 import { colours } from '../shell/theme.js';
 import { drawBattery, drawName, drawPerson, drawRobot, isRoomy, modeColour, sizeOf } from './bodies.js';
 import { Sight } from './cone.js';
-import { Fields } from './fields.js';
 import { drawEvent, EVENT_PX, EVENT_UP_PX, label, ring } from './event_marks.js';
 import { SOURCES, stateColour } from './marks.js';
 import { isOpen, thingsOf } from './shown.js';
@@ -23,7 +22,6 @@ export class Live {
   constructor(cones, goals) {
     this.cones = cones;
     this.goals = goals;
-    this.fields = new Fields();
     this.sight = new Sight(scene.peek()?.site.walls_m ?? []);
     /** @type {Body[]} */
     this.bodies = [];
@@ -37,10 +35,6 @@ export class Live {
     return ticks || tracks.isMoving(now);
   }
 
-  update() {
-    this.fields.update(hazards.peek().fields, colours.peek());
-  }
-
   /**
    * @param {CanvasRenderingContext2D} ctx
    * @param {import('./view.js').Affine} affine
@@ -49,7 +43,6 @@ export class Live {
   draw(ctx, affine, now) {
     this.second = Math.floor(now / EVERY_SECOND);
     const pen = { ctx, affine, colours: colours.peek() };
-    this.fields.draw(ctx, affine);
     this.bodies = placed(affine, now);
     this.drawCones(pen, now);
     this.drawTrails(pen);
