@@ -72,10 +72,18 @@ class Driver:
 
     def _press(self, keys: set[str], seconds: float) -> None:
         """Hold keys for a while, then see what has come of it."""
+        self._start_again()
         self._hold(keys)
         self._page.wait_for_timeout(1000 * seconds)
         self._hold(set())
         self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
+
+    def _start_again(self) -> None:
+        """On a machine that does much else, robots are held now and then."""
+        mode = self._page.get_by_role("status", name="Mode")
+        if mode.inner_text() != "Teleoperation":
+            self._page.get_by_role("button", name="Start", exact=True).click()
+            self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
 
     def _hold(self, keys: set[str]) -> None:
         for key in self._down - keys:

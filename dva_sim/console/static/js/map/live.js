@@ -17,7 +17,7 @@ const EVERY_SECOND = 1000;
 export class Live {
   /**
    * @param {() => number[]} cones robots whose cone of sight is drawn
-   * @param {() => import('../types.js').TourPlan | null} goals
+   * @param {() => import('../types.js').Goal[]} goals
    */
   constructor(cones, goals) {
     this.cones = cones;
@@ -93,12 +93,11 @@ export class Live {
 
   /** @param {Pen} pen */
   drawGoals({ ctx, affine, colours: palette }) {
-    const tour = this.goals();
-    if (!tour) return;
-    tour.goals_m.forEach(([x, y], n) => {
+    for (const { x, y, radius, name } of this.goals()) {
       const [left, top] = affine.pixel(x, y);
+      const size = Math.max(10, radius * affine.scale);
       ctx.beginPath();
-      ctx.arc(left, top, Math.max(10, tour.radius_m * affine.scale), 0, 2 * Math.PI);
+      ctx.arc(left, top, size, 0, 2 * Math.PI);
       ctx.fillStyle = `${palette.focus}33`;
       ctx.fill();
       ctx.setLineDash([6, 4]);
@@ -106,8 +105,8 @@ export class Live {
       ctx.strokeStyle = palette.focus;
       ctx.stroke();
       ctx.setLineDash([]);
-      label(ctx, palette, `Goal ${n + 1}`, left, top, 'center');
-    });
+      label(ctx, palette, name, left, top - size - 10, 'center');
+    }
   }
 
   /**

@@ -17,9 +17,9 @@ const TAP_PX = 5;
 
 /**
  * @param {{cones: () => number[], follows?: () => number | null, keyboard?: boolean,
- *   legend?: boolean, goals?: () => import('../types.js').TourPlan | null}} props
+ *   legend?: boolean, goals?: () => import('../types.js').Goal[]}} props
  */
-export function MapBox({ cones, follows, keyboard = true, legend = true, goals = () => null }) {
+export function MapBox({ cones, follows, keyboard = true, legend = true, goals = () => [] }) {
   const box = useRef(/** @type {HTMLElement | null} */ (null));
   const view = useRef(/** @type {MapView | null} */ (null));
   const [following, follow] = useState(false);
@@ -45,7 +45,7 @@ export function MapBox({ cones, follows, keyboard = true, legend = true, goals =
  * @param {HTMLElement} element
  * @param {import('../types.js').Scene} plan
  * @param {{cones: () => number[], keyboard: boolean,
- *   goals: () => import('../types.js').TourPlan | null}} options
+ *   goals: () => import('../types.js').Goal[]}} options
  * @param {{current: MapView | null}} view
  * @param {() => void} letGo
  */
