@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import sys
@@ -14,7 +15,7 @@ from dva_sim.console.actions import Actions
 from dva_sim.console.children import END_WITHIN, Child, ChildFailed
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.recorder import keep_run
-from dva_sim.console.world import World
+from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
@@ -29,7 +30,7 @@ NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 Say = Callable[[str], object]
 
 
-class Supervisor:
+class ConsoleSupervisor:
     """One console.
 
     Args:
@@ -53,7 +54,7 @@ class Supervisor:
         """
         options = self._options
         scenario = options.read()
-        world = World(scenario, options.scenario, options.seed)
+        world = ConsoleWorld(scenario, options.scenario, options.seed)
         keeper, outlet = None, None
         if options.record is not None:
             keeper = Keeper(options.record, world.scenario, options.seed)
@@ -76,7 +77,7 @@ class Supervisor:
         if options.record is not None:
             self._say(f"{options.record} written")
 
-    def _run(self, world: World) -> None:
+    def _run(self, world: ConsoleWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:
             web, pictures = self._start()
             serving = web.first_line()
@@ -88,6 +89,7 @@ class Supervisor:
             self._draw(world, pictures)
             world.begin()
             world.clock.pulse(FLUSH, self._flush)
+            gc.freeze()  # what stays for the whole run is not looked through again and again
             self._say(f"Console: {serving['drive']}")
             self._open_browser(str(serving["drive"]))
             if not ending.is_asked:
@@ -114,7 +116,7 @@ class Supervisor:
         self._children.append(pictures)
         return pictures
 
-    def _listen(self, world: World, web: Child, actions: Actions) -> None:
+    def _listen(self, world: ConsoleWorld, web: Child, actions: Actions) -> None:
         def hear() -> None:
             for line in web.pipe.lines():
                 actions.take(line)
@@ -125,7 +127,7 @@ class Supervisor:
 
         world.clock.watch(web.pipe.fileno(), hear)
 
-    def _draw(self, world: World, pictures: Child) -> None:
+    def _draw(self, world: ConsoleWorld, pictures: Child) -> None:
         """Without pictures all else goes on, and another process draws from then on."""
         world.show = pictures.pipe.put
 
@@ -149,7 +151,7 @@ class Supervisor:
         for child in self._children:
             child.pipe.flush()
 
-    def _leave(self, world: World, web: Child) -> None:
+    def _leave(self, world: ConsoleWorld, web: Child) -> None:
         """Everybody who drives is stopped, and a moment is left for the word of it."""
         for person in world.persons:
             person.release(lambda *_: None)

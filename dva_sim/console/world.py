@@ -42,7 +42,7 @@ POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
-class World:
+class ConsoleWorld:
     """What runs, and what of it is told.
 
     Args:
@@ -87,7 +87,7 @@ class World:
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.seat_lines = SeatLines(self)
+        self.seat_lines = SeatLines(self.run, self.feed, self.persons, self.client_of)
         self.recorder.on_applied = self.seat_lines.applied
         self.hazards = HazardFeed(self.run)
         self._newest: dict[str, Any] = {}
