@@ -211,13 +211,13 @@ def test_two_robots_get_the_same_hand_under_two_patterns(fake, visit) -> None:
 
 
 def test_a_reload_keeps_control_but_drives_no_further(page: Page) -> None:
-    who = page.locator(".who").inner_text()
+    who = page.evaluate("sessionStorage.getItem('dva-sim-client')")
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page))
         page.reload()
         expect(page.get_by_role("button", name="Release control")).to_be_enabled()
         expect(page.get_by_role("slider", name="Speed")).to_have_value("0")
-    expect(page.locator(".who")).to_have_text(who)
+    assert page.evaluate("sessionStorage.getItem('dva-sim-client')") == who
 
 
 def test_the_picture_tells_its_age_and_goes_on(page: Page) -> None:

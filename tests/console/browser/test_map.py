@@ -7,14 +7,14 @@ from patience import becomes
 from playwright.sync_api import Page, expect
 
 SMALL = ("--robots", "3", "--people", "4")
-INK = """([x, y, w, h]) => { const c = document.querySelectorAll('.map-canvas')[1];
+INK = """([x, y, w, h]) => { const c = document.querySelectorAll('.map-canvas')[2];
   const d = c.getContext('2d').getImageData(x, y, w, h).data; let sum = 0;
   for (let i = 3; i < d.length; i += 4) sum += d[i] > 0; return sum; }"""
 
 
 def test_robots_people_and_hazards_are_drawn_and_move(fake, visit) -> None:
     page = visit.open(fake(*SMALL).drive)
-    canvas = page.locator(".map-canvas").nth(1)
+    canvas = page.locator(".map-canvas").nth(2)
 
     def picture() -> str:
         return str(canvas.evaluate("c => c.toDataURL()"))
@@ -87,7 +87,7 @@ def test_the_legend_tells_what_the_fullest_tint_means(fake, visit) -> None:
 def test_other_sites_are_drawn_too(fake, visit, site: str) -> None:
     page = visit.open(fake("--robots", "3", "--people", "4", "--site", site).drive)
 
-    assert becomes(lambda: page.evaluate(INK.replace("[1]", "[0]"), [0, 0, 800, 700]) > 100_000)
+    assert becomes(lambda: page.evaluate(INK.replace("[2]", "[0]"), [0, 0, 800, 700]) > 100_000)
 
 
 def crowd(page: Page) -> int:

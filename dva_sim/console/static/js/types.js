@@ -15,6 +15,7 @@
  * @typedef {{delay_s: number, jitter_s: number, loss: number, rate_bps: number | null,
  *   processing_s: number, kind?: string, trace?: string | null}} LinkSetting
  * @typedef {{robots: number[], goals_m: number[][], radius_m: number}} TourPlan
+ * @typedef {{x: number, y: number, radius: number, name: string}} Goal
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,

@@ -1,10 +1,10 @@
 /** Take, start, drive, stop, release; and what the robot is doing. */
 import { html } from '../../vendor/preact.js';
-import { clock, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
+import { clock, link, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
 import { act } from '../net/actions.js';
 import { DriveSliders } from './drive_sliders.js';
 import { gamepad } from './gamepad.js';
-import { held, interrupted } from './hold.js';
+import { held, interrupted, wish } from './hold.js';
 import { Stick } from './stick.js';
 
 /** @typedef {import('../types.js').Thing} Thing */
@@ -14,6 +14,7 @@ export function Controls({ robots }) {
   const may = maySteer.value;
   const drives = seat.value?.drives ?? [];
   const holds = drives.length > 0;
+  const phase = seat.value?.phase ?? 'free';
   const limits = {
     max_speed_mps: Math.min(...robots.map((robot) => robot.max_speed_mps || 0.5)),
     max_turn_rate_radps: Math.min(...robots.map((robot) => robot.max_turn_rate_radps || 0.52)),
@@ -23,8 +24,10 @@ export function Controls({ robots }) {
     <div class="buttons">
       <button type="button" disabled=${!may || holds}
         onClick=${() => act('take', { robots: robots.map((robot) => robot.i) })}>Take control</button>
-      <button type="button" class="go" disabled=${!may || !holds} onClick=${() => act('start')}>Start</button>
-      <button type="button" disabled=${!may || !holds} onClick=${() => act('stop')}>Stop</button>
+      <button type="button" class=${phase === 'held' ? 'go' : ''} disabled=${!may || !holds}
+        onClick=${() => act('start')}>Start</button>
+      <button type="button" class=${phase === 'driving' ? 'go' : ''} disabled=${!may || !holds}
+        onClick=${() => act('stop')}>Stop</button>
       <button type="button" disabled=${!may || !holds} onClick=${() => act('release')}>Release control</button>
     </div>
     <p class="hint"><${Hint} holds=${holds} /></p>
@@ -48,7 +51,6 @@ function Mode(/** @type {{robots: Thing[]}} */ { robots }) {
 const PHASES = /** @type {Record<string, string>} */ ({
   asking: 'Asking for control …',
   held: 'You hold control. Start, then hold to drive.',
-  starting: 'Starting …',
   driving: 'Driving: hold a key, the stick or a slider.',
   stopping: 'Stopping …',
 });
@@ -61,8 +63,18 @@ function Hint({ holds }) {
   if (interrupted.value) return `${interrupted.value} The robot was stopped; take hold again to go on.`;
   if (!holds) return heldByOther() || 'Take control of the robot first.';
   const phase = seat.value?.phase ?? 'free';
+  const wait = link.value ? Math.round(1000 * (link.value.delay_s + link.value.processing_s)) : 0;
+  if (phase === 'starting') return `Starting: the robot answers after ${2 * wait} ms at the earliest.`;
+  if (isOnItsWay()) return `Your hand is on its way: the robot hears of it after ${wait} ms at the earliest.`;
   if (held.value && phase === 'held') return 'Press Start first: the robot does not listen yet.';
   return PHASES[phase] ?? '';
+}
+
+/** Whether something is wanted that no robot does yet. */
+function isOnItsWay() {
+  const drives = seat.value?.drives ?? [];
+  const wanted = held.value && wish.value.speed > 0 && seat.value?.phase === 'driving';
+  return wanted && drives.every((drive) => !rowOf(drive.i)?.set_speed_mps);
 }
 
 function heldByOther() {

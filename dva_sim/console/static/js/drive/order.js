@@ -3,6 +3,7 @@ import { html } from '../../vendor/preact.js';
 import { maySteer, rows, seat, thingAt } from '../store.js';
 import { act } from '../net/actions.js';
 import { roomAt } from '../map/shown.js';
+import { chooseRobots, driven } from '../shell/route.js';
 import { capital, plain } from '../ui/words.js';
 
 /** The newest order: of one's own seat, else the one that waits for somebody. */
@@ -13,12 +14,16 @@ export function OrderInHand() {
   const robot = thingAt(order.robot)?.label ?? 'a robot';
   const room = order.room || roomAt(order.x_m, order.y_m);
   const where = room ? `in ${room}` : `at ${order.x_m.toFixed(0)} m, ${order.y_m.toFixed(0)} m`;
+  const here = driven.value.some((one) => one.i === order.robot);
+  const holds = Boolean(seat.value?.drives.length);
   const off = !maySteer.value || !mine;
   return html`<section class="panel order" aria-label="Order in hand">
     <h2>Order: event ${order.event}, ${plain(order.kind)}</h2>
     <p>${capital(plain(order.kind))} reported ${where}. Drive ${robot} there, look, and say whether
       it is true.${mine ? '' : ' It waits for whoever takes control.'}</p>
     <div class="buttons">
+      ${!here && html`<button type="button" class="go" disabled=${holds}
+        onClick=${() => chooseRobots([robot])}>Choose ${robot}</button>`}
       <button type="button" disabled=${off} onClick=${() => act('confirm')}>Confirm</button>
       <button type="button" disabled=${off} onClick=${() => act('refute')}>Refute</button>
       <button type="button" disabled=${off} onClick=${() => act('decline')}>Decline</button>

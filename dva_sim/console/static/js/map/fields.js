@@ -26,6 +26,11 @@ export class Fields {
       .map((field) => ({ field, picture: paint(field, colours) }));
   }
 
+  /** Only when they are told anew. */
+  isMoving() {
+    return false;
+  }
+
   /**
    * @param {CanvasRenderingContext2D} ctx
    * @param {import('./view.js').Affine} affine

@@ -4,7 +4,6 @@ import { HAZARDS } from '../palette.js';
 import { colours } from '../shell/theme.js';
 import { drawBattery, drawName, drawPerson, drawRobot, isRoomy, modeColour, sizeOf } from './bodies.js';
 import { Sight } from './cone.js';
-import { Fields } from './fields.js';
 import { drawEvent, EVENT_PX, EVENT_UP_PX, label, ring } from './event_marks.js';
 import { SOURCES, stateColour } from './marks.js';
 import { isOpen, thingsOf } from './shown.js';
@@ -18,12 +17,11 @@ const EVERY_SECOND = 1000;
 export class Live {
   /**
    * @param {() => number[]} cones robots whose cone of sight is drawn
-   * @param {() => import('../types.js').TourPlan | null} goals
+   * @param {() => import('../types.js').Goal[]} goals
    */
   constructor(cones, goals) {
     this.cones = cones;
     this.goals = goals;
-    this.fields = new Fields();
     this.sight = new Sight(scene.peek()?.site.walls_m ?? []);
     /** @type {Body[]} */
     this.bodies = [];
@@ -37,10 +35,6 @@ export class Live {
     return ticks || tracks.isMoving(now);
   }
 
-  update() {
-    this.fields.update(hazards.peek().fields, colours.peek());
-  }
-
   /**
    * @param {CanvasRenderingContext2D} ctx
    * @param {import('./view.js').Affine} affine
@@ -49,7 +43,6 @@ export class Live {
   draw(ctx, affine, now) {
     this.second = Math.floor(now / EVERY_SECOND);
     const pen = { ctx, affine, colours: colours.peek() };
-    this.fields.draw(ctx, affine);
     this.bodies = placed(affine, now);
     this.drawCones(pen, now);
     this.drawTrails(pen);
@@ -100,12 +93,11 @@ export class Live {
 
   /** @param {Pen} pen */
   drawGoals({ ctx, affine, colours: palette }) {
-    const tour = this.goals();
-    if (!tour) return;
-    tour.goals_m.forEach(([x, y], n) => {
+    for (const { x, y, radius, name } of this.goals()) {
       const [left, top] = affine.pixel(x, y);
+      const size = Math.max(10, radius * affine.scale);
       ctx.beginPath();
-      ctx.arc(left, top, Math.max(10, tour.radius_m * affine.scale), 0, 2 * Math.PI);
+      ctx.arc(left, top, size, 0, 2 * Math.PI);
       ctx.fillStyle = `${palette.focus}33`;
       ctx.fill();
       ctx.setLineDash([6, 4]);
@@ -113,8 +105,8 @@ export class Live {
       ctx.strokeStyle = palette.focus;
       ctx.stroke();
       ctx.setLineDash([]);
-      label(ctx, palette, `Goal ${n + 1}`, left, top, 'center');
-    });
+      label(ctx, palette, name, left, top - size - 10, 'center');
+    }
   }
 
   /**

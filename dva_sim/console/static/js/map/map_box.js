@@ -6,6 +6,7 @@ import { pageAge } from '../net/world_time.js';
 import { colours } from '../shell/theme.js';
 import { Icon } from '../ui/icon.js';
 import { useEvery } from '../ui/every.js';
+import { Fields } from './fields.js';
 import { Legend } from './legend.js';
 import { Live } from './live.js';
 import { Plan } from './plan.js';
@@ -16,9 +17,9 @@ const TAP_PX = 5;
 
 /**
  * @param {{cones: () => number[], follows?: () => number | null, keyboard?: boolean,
- *   legend?: boolean, goals?: () => import('../types.js').TourPlan | null}} props
+ *   legend?: boolean, goals?: () => import('../types.js').Goal[]}} props
  */
-export function MapBox({ cones, follows, keyboard = true, legend = true, goals = () => null }) {
+export function MapBox({ cones, follows, keyboard = true, legend = true, goals = () => [] }) {
   const box = useRef(/** @type {HTMLElement | null} */ (null));
   const view = useRef(/** @type {MapView | null} */ (null));
   const [following, follow] = useState(false);
@@ -44,29 +45,36 @@ export function MapBox({ cones, follows, keyboard = true, legend = true, goals =
  * @param {HTMLElement} element
  * @param {import('../types.js').Scene} plan
  * @param {{cones: () => number[], keyboard: boolean,
- *   goals: () => import('../types.js').TourPlan | null}} options
+ *   goals: () => import('../types.js').Goal[]}} options
  * @param {{current: MapView | null}} view
  * @param {() => void} letGo
  */
 function show(element, plan, options, view, letGo) {
   const ground = new Plan(plan.site);
+  const fields = new Fields();
   const live = new Live(options.cones, options.goals);
   const paper = {
     draw: (/** @type {any} */ ctx, /** @type {any} */ affine) =>
       ground.draw(ctx, affine, colours.peek()),
     isMoving: () => false,
   };
-  const map = new MapView(element, plan.site.extent_m, paper, live, options);
+  const map = new MapView(element, plan.site.extent_m, [paper, fields, live], options);
   view.current = map;
   map.map.on('dragstart', letGo);
-  const stop = effect(() => {
-    void [colours.value, hazards.value, events.value, rows.value, selection.value];
-    live.update();
-    map.refresh();
-  });
+  const stops = [
+    effect(() => void [colours.value, map.refresh(0)]),
+    effect(() => {
+      fields.update(hazards.value.fields, colours.value);
+      map.refresh(1);
+    }),
+    effect(() => {
+      void [colours.value, hazards.value, events.value, rows.value, selection.value];
+      map.refresh(2);
+    }),
+  ];
   const stopPointing = pointing(element, map, live);
   return () => {
-    stop();
+    for (const stop of stops) stop();
     stopPointing();
     map.remove();
     view.current = null;

@@ -1,5 +1,5 @@
 /**
- * A map that Leaflet pans and zooms, and that two canvases over it draw.
+ * A map that Leaflet pans and zooms, and that canvases over it draw.
  *
  * One affine per view; what stands is drawn when the view changes, what moves when something has
  * moved. Nothing that moves is an object of Leaflet.
@@ -49,16 +49,15 @@ export class MapView {
   /**
    * @param {HTMLElement} element
    * @param {number[]} extent [xmin, ymin, xmax, ymax]
-   * @param {Scenery} ground
-   * @param {Scenery} live
+   * @param {Scenery[]} sceneries from the ground up; each has a canvas of its own
    * @param {{keyboard: boolean}} options
    */
-  constructor(element, extent, ground, live, options) {
+  constructor(element, extent, sceneries, options) {
     this.element = element;
     this.extent = extent;
     this.affine = new Affine();
-    this.parts = [ground, live].map((scenery) => ({ scenery, canvas: addCanvas(element) }));
-    this.stale = [true, true];
+    this.parts = sceneries.map((scenery) => ({ scenery, canvas: addCanvas(element) }));
+    this.stale = sceneries.map(() => true);
     this.follow = /** @type {(() => [number, number] | null) | null} */ (null);
     this.map = L.map(element, {
       crs: L.CRS.Simple,
@@ -124,12 +123,15 @@ export class MapView {
     const scale = this.map.getZoomScale(this.map.getZoom(), 0);
     Object.assign(this.affine, { scale, left: zero.x, top: zero.y, dpr });
     Object.assign(this.affine, { width: size.x, height: size.y });
-    this.stale = [true, true];
+    this.stale.fill(true);
   }
 
-  /** Draw anew what moves, though nothing has moved. */
-  refresh() {
-    this.stale = [true, true];
+  /**
+   * Draw a layer anew, though nothing on it has moved.
+   * @param {number} layer
+   */
+  refresh(layer) {
+    this.stale[layer] = true;
   }
 
   /** @param {number} now */

@@ -31,8 +31,8 @@ function App() {
   const Page = BODIES[page.value];
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
-    <div class="body"><${Warnings} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
-    <${Tour} /><${Help} />`;
+    <div class="body"><${Warnings} /><${Tour} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
+    <${Help} />`;
 }
 
 /** @param {Event} event */

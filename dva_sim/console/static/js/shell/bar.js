@@ -75,7 +75,6 @@ function Alarms() {
 function Who() {
   const me = you.value;
   if (!me) return null;
-  const role = me.role === 'drive' ? 'may drive' : 'may only look';
-  return html`<span class="item who" title="Who you are here, and what your address allows">
-    ${me.client}, ${role}</span>`;
+  return html`<span class="item who" title=${`What your address allows; the world knows this page as ${me.client}`}>
+    ${me.role === 'drive' ? 'you may drive' : 'you may look'}</span>`;
 }

@@ -21,8 +21,13 @@ const WORDS = ['Set up', 'Drive the first robot', 'Drive the second robot', 'You
 /** Where the person is in the tour; null while there is none. */
 export const progress = signal(/** @type {Progress | null} */ (null));
 
-/** The marked goals, while there is a tour. */
-export const tourGoals = () => (progress.value ? plan() : null);
+/** The marked goal of this part of the tour, if any. @returns {import('../types.js').Goal[]} */
+export function tourGoals() {
+  const leg = (progress.peek()?.step ?? 0) - 1;
+  const goal = plan()?.goals_m[leg];
+  if (!goal) return [];
+  return [{ x: goal[0], y: goal[1], radius: plan()?.radius_m ?? 1, name: `Goal ${leg + 1}` }];
+}
 
 /** @returns {import('../types.js').TourPlan | null} */
 function plan() {

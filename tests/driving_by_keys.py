@@ -14,7 +14,7 @@ from dva_sim.worlds.site import load_site
 
 TURN_RATE = math.radians(30)
 NEAR_M, AHEAD = 0.6, 0.12  # of a waypoint; of a heading that will do [rad]
-LOOK_S = 0.1
+SITE = "import('/static/js/store.js').then(store => store.scene.value.site.name)"
 
 
 class Driver:
@@ -24,13 +24,12 @@ class Driver:
         page: The page for driving.
         base: Address of the console.
         robot: Label.
-        site: Name of the site.
         delay: Of the link, one way: what is seen has happened long ago [s].
     """
 
-    def __init__(self, page: Page, base: str, robot: str, site: str, delay: float) -> None:
+    def __init__(self, page: Page, base: str, robot: str, delay: float) -> None:
         self._page, self._base, self._robot, self._delay = page, base, robot, delay
-        self._planner = Planner(load_site(site), 0.45)
+        self._planner = Planner(load_site(page.evaluate(SITE)), 0.45)
         self._down: set[str] = set()
 
     def state(self) -> dict[str, Any]:
@@ -73,10 +72,18 @@ class Driver:
 
     def _press(self, keys: set[str], seconds: float) -> None:
         """Hold keys for a while, then see what has come of it."""
+        self._start_again()
         self._hold(keys)
         self._page.wait_for_timeout(1000 * seconds)
         self._hold(set())
         self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
+
+    def _start_again(self) -> None:
+        """On a machine that does much else, robots are held now and then."""
+        mode = self._page.get_by_role("status", name="Mode")
+        if mode.inner_text() != "Teleoperation":
+            self._page.get_by_role("button", name="Start", exact=True).click()
+            self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
 
     def _hold(self, keys: set[str]) -> None:
         for key in self._down - keys:
