@@ -171,7 +171,7 @@ class Actions:
         # Who drives a robot from here learns of its end at once, whoever pressed the button.
         own = self._world.person(0 if seat is None else seat.number)
         for person in self._world.persons:
-            if person is not own:
+            if person is not own or seat is None:
                 person.ended_by_others(robots)
         own.emergency(robots, said)
 

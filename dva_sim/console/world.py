@@ -12,10 +12,10 @@ from typing import Any
 
 from dva_sim.agents.observation import FRAME, Cameras
 from dva_sim.agents.operator.attention import OperatorSetup
-from dva_sim.agents.operator.held_robot import Console, HeldRobot
+from dva_sim.agents.operator.handheld import Console
+from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person import PersonAgent
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console import link as sliders
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
@@ -23,13 +23,13 @@ from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens
 from dva_sim.console.seat_lines import SeatLines
+from dva_sim.console.sliders import LinkSliders
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import (
     Scenario,
     command_timeout_s,
-    mean_processing_s,
     phone_profile,
 )
 
@@ -75,7 +75,7 @@ class ConsoleWorld:
         self.feed, self.lag = Feed(self.run), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Tell = lambda *_: None
-        self.link, self.wanted = scenario.link, dict[str, float]()
+        self.sliders = LinkSliders(self.run)
         self.dropped: Callable[[], int] = lambda: 0
         self._console = Console(
             setup=self._setup(scenario), phone=phone_profile(scenario), reach=self.run.stage.reach
@@ -102,7 +102,7 @@ class ConsoleWorld:
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
         scene = scene_of(self.run, self.feed.things, self.name, self.seed)
-        scene["link"] = self.link_line()
+        scene["link"] = self.sliders.line()
         self.tell(scene)
         self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
@@ -147,19 +147,6 @@ class ConsoleWorld:
 
     # --- what is told ----------------------------------------------------------------------
 
-    def link_line(self) -> Line:
-        """What the link is like now."""
-        link, trace = self.link, self.link.trace_up or self.link.trace_down
-        return {
-            "delay_s": link.delay_s,
-            "jitter_s": link.jitter_s,
-            "loss": link.loss,
-            "rate_bps": link.rate_bps,
-            "processing_s": self.wanted.get("processing_s", mean_processing_s(self.scenario)),
-            "kind": "modelled",
-            "trace": trace or link.delay_log,
-        }
-
     def clock_line(self) -> Line:
         """How time goes by."""
         return {
@@ -179,7 +166,7 @@ class ConsoleWorld:
             "k": "rows",
             "t": self.feed.now_ms,
             "clock": self.clock_line(),
-            "link": self.link_line(),
+            "link": self.sliders.line(),
             "dropped": self.dropped(),
             "robots": self.feed.robots(self.lag.held),
             "people": self.feed.people(),
@@ -276,38 +263,16 @@ class ConsoleWorld:
     # --- the link --------------------------------------------------------------------------
 
     def change_link(self, given: Line) -> str:
-        """Change the link of all robots; what it is then, in words.
+        """Change the link of all robots; what is changed, in words.
 
         Raises:
             ConfigError: what cannot be.
         """
-        wanted = sliders.read(given)
-        link = sliders.changed(self.scenario.link, self.wanted | wanted)
-        self.wanted |= wanted
-        now = self.clock.now
-        for pair in self.run.links.values():
-            for each in pair:
-                each.change(now, link)
-        self.link = link
-        if "processing_s" in wanted:
-            self._change_processing(wanted["processing_s"])
-        self._be_patient()
-        told = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
-        self.recorder.tell(now, "console", f"link: {told}", "link")
-        return told
-
-    def _change_processing(self, seconds: float) -> None:
-        for robot in self.run.field.robots.values():
-            robot.inbox.service = lambda: seconds
-        self.run.audit.expect(seconds)
-
-    def _be_patient(self) -> None:
-        """Time-outs are those that the link needs as it is now."""
-        scenario = sliders.with_link(self.scenario, self.link, self.wanted.get("processing_s"))
-        self.run.be_patient(scenario)
+        told, scenario = self.sliders.change(given)
         self._console = replace(self._console, setup=self._setup(scenario))
         for person in self.persons:
             person.console = self._console
+        return told
 
 
 def camera_url(base: str, label: str) -> str:

@@ -8,49 +8,21 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.operator import steps
-from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.command_sender import CommandSender
-from dva_sim.agents.operator.strategies import Reach
+from dva_sim.agents.operator.handheld import Console, Input, Said
 from dva_sim.agents.operator.supervision import BLIND_AFTER
-from dva_sim.agents.tilt import GivenTilt, PhoneProfile
+from dva_sim.agents.tilt import GivenTilt
 from dva_sim.kernel.recorder import DriveLog, Shown
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
 MOST_INPUTS = 4096  # that are remembered until they act
-
-Said = Callable[[bool, str], object]  # whether it was done, and what there is to say of it
-
-
-class Input(NamedTuple):
-    """What a person wants: its number, when it came [s], and shares of the robot's limits."""
-
-    number: int
-    time: float
-    speed: float
-    turn: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Console:
-    """What persons at a console work with.
-
-    Attributes:
-        setup: Pattern, rate, time-outs, as of simulated operators.
-        phone: Turns what a person wants into commands.
-        reach: What a robot can do, by its id.
-    """
-
-    setup: OperatorSetup
-    phone: PhoneProfile
-    reach: Callable[[str], Reach]
 
 
 class HeldRobot:
@@ -276,7 +248,7 @@ class HeldRobot:
     def emergency(self, said: Said) -> None:
         """Stop at once, by the way that waits for nothing."""
         self.end("emergency")
-        ask_emergency(self.device, self.robot, self.session, said)
+        steps.ask_emergency(self.device, self.robot, self.session, said)
 
     def _look_at_picture(self, log: DriveLog) -> bool:
         """No picture for too long: the link is lost, whatever the pattern."""
@@ -318,18 +290,6 @@ _NOT_NOW = {
     "stopping": "it has not stopped yet",
     "gone": "it is not yours",
 }
-
-
-def ask_emergency(device: AgentDevice, robot: str, session: int, said: Said) -> None:
-    """Send a robot an emergency, which it obeys whoever sends it."""
-    label = device.label_of(robot)
-    device.ask(
-        robot,
-        m.Emergency(),
-        lambda reply: said(reply.code == m.OK, f"{label} has stopped"),
-        lambda: said(False, f"{label} does not answer"),
-        session,
-    )
 
 
 def _why(reply: m.Reply) -> str:

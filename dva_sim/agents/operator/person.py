@@ -11,7 +11,9 @@ from collections.abc import Callable, Sequence
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.agents.operator.held_robot import Console, HeldRobot, Said, ask_emergency
+from dva_sim.agents.operator.handheld import Console, Gathered, Said
+from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.steps import ask_emergency
 from dva_sim.protocol import messages as m
 
 MOST_ROBOTS = 2  # that one person drives by the same input
@@ -249,30 +251,3 @@ class PersonAgent:
     def _let_go(self, held: HeldRobot) -> None:
         if self.robots.get(held.robot) is held:
             del self.robots[held.robot]
-
-
-class Gathered:
-    """One answer made of several: all must be good.
-
-    Args:
-        count: How many are to come.
-        said: Told once all have.
-
-    Attributes:
-        failed: Called before, if one was not good.
-    """
-
-    def __init__(self, count: int, said: Said) -> None:
-        self._left, self._said, self._good = count, said, True
-        self._texts: list[str] = []
-        self.failed: Callable[[], object] = lambda: None
-
-    def __call__(self, done: bool, text: str) -> None:
-        """One of them has come."""
-        self._left -= 1
-        self._good = self._good and done
-        self._texts.append(text)
-        if self._left == 0:
-            if not self._good:
-                self.failed()
-            self._said(self._good, "; ".join(dict.fromkeys(self._texts)))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.operator.handheld import Said
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
@@ -111,3 +112,15 @@ def start(
 def give_back(device: AgentDevice, robot: str, session: int) -> None:
     """Tell the DVA that a permission is needed no longer."""
     device.ask(device.dva, m.PermissionRevocation(robot, device.id_tag, session))
+
+
+def ask_emergency(device: AgentDevice, robot: str, session: int, said: Said) -> None:
+    """Send a robot an emergency, which it obeys whoever sends it."""
+    label = device.label_of(robot)
+    device.ask(
+        robot,
+        m.Emergency(),
+        lambda reply: said(reply.code == m.OK, f"{label} has stopped"),
+        lambda: said(False, f"{label} does not answer"),
+        session,
+    )

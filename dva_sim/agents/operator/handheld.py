@@ -1,0 +1,65 @@
+"""What persons at a console hold in their hands, and what they want with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from dva_sim.agents.operator.attention import OperatorSetup
+from dva_sim.agents.operator.strategies import Reach
+from dva_sim.agents.tilt import PhoneProfile
+
+Said = Callable[[bool, str], object]
+"""Told whether something was done, and what there is to say of it."""
+
+
+class Input(NamedTuple):
+    """What a person wants: its number, when it came [s], and shares of the robot's limits."""
+
+    number: int
+    time: float
+    speed: float
+    turn: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Console:
+    """What persons at a console work with.
+
+    Attributes:
+        setup: Pattern, rate, time-outs, as of simulated operators.
+        phone: Turns what a person wants into commands.
+        reach: What a robot can do, by its id.
+    """
+
+    setup: OperatorSetup
+    phone: PhoneProfile
+    reach: Callable[[str], Reach]
+
+
+class Gathered:
+    """One answer made of several: all must be good.
+
+    Args:
+        count: How many are to come.
+        said: Told once all have.
+
+    Attributes:
+        failed: Called before, if one was not good.
+    """
+
+    def __init__(self, count: int, said: Said) -> None:
+        self._left, self._said, self._good = count, said, True
+        self._texts: list[str] = []
+        self.failed: Callable[[], object] = lambda: None
+
+    def __call__(self, done: bool, text: str) -> None:
+        """One of them has come."""
+        self._left -= 1
+        self._good = self._good and done
+        self._texts.append(text)
+        if self._left == 0:
+            if not self._good:
+                self.failed()
+            self._said(self._good, "; ".join(dict.fromkeys(self._texts)))

@@ -1,0 +1,65 @@
+"""The link of a running world under the sliders of its pages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from dva_sim.console.link import changed, read, with_link
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.scenario import Scenario, mean_processing_s
+
+
+class LinkSliders:
+    """What the link of all robots is like, and how it is changed while it carries.
+
+    Args:
+        run: Whose.
+
+    Attributes:
+        link: As it is now.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run, self.link = run, run.scenario.link
+        self._wanted: dict[str, float] = {}
+
+    def line(self) -> dict[str, Any]:
+        """What it is like, for pages."""
+        link = self.link
+        usual = mean_processing_s(self._run.scenario)
+        return {
+            "delay_s": link.delay_s,
+            "jitter_s": link.jitter_s,
+            "loss": link.loss,
+            "rate_bps": link.rate_bps,
+            "processing_s": self._wanted.get("processing_s", usual),
+            "kind": "modelled",
+            "trace": link.trace_up or link.trace_down or link.delay_log,
+        }
+
+    def change(self, given: Mapping[str, Any]) -> tuple[str, Scenario]:
+        """Change it: what is changed, in words, and a scenario with the time-outs it needs.
+
+        Raises:
+            ConfigError: what cannot be.
+        """
+        run, wanted = self._run, read(given)
+        self.link = changed(run.scenario.link, self._wanted | wanted)
+        self._wanted |= wanted
+        now = run.clock.now
+        for pair in run.links.values():
+            for each in pair:
+                each.change(now, self.link)
+        if "processing_s" in wanted:
+            self._change_processing(wanted["processing_s"])
+        scenario = with_link(run.scenario, self.link, self._wanted.get("processing_s"))
+        run.be_patient(scenario)
+        told = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
+        run.recorder.tell(now, "console", f"link: {told}", "link")
+        return told, scenario
+
+    def _change_processing(self, seconds: float) -> None:
+        for robot in self._run.field.robots.values():
+            robot.inbox.service = lambda: seconds
+        self._run.audit.expect(seconds)
