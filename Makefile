@@ -9,7 +9,7 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo published test test-all test-contract test-system test-browser test-soak check same-bytes bench clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak check same-bytes bench clean
 
 # Two processes share the tests. Compiled files are kept whatever a shell says: without them each
 # run compiles all tests again, for half a minute.
@@ -22,6 +22,9 @@ setup: $(DEV)  ## the development environment, in .venv
 
 demo: $(RUNTIME)  ## one drive as picture and film, and the main study's small version: a minute
 	@$(BIN)/dva-sim demo -o $(DEMO)
+
+console: $(RUNTIME)  ## drive robots yourself, on a page in the browser; Ctrl-C ends it
+	@$(BIN)/dva-sim console
 
 published: $(RUNTIME)  ## the main study at its published size, and its report: ten minutes
 	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o results/req-rep-vs-pub-sub

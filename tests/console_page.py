@@ -3,7 +3,7 @@
 import time
 
 from dva_sim.console.actions import Actions
-from dva_sim.console.world import World
+from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.clock import US
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.scenario import build, load
@@ -33,7 +33,7 @@ class Page:
     def __init__(self, monkeypatch, scenario="hands-on", seed=1, client="c1", **changes):
         document = load(scenario) if isinstance(scenario, str) else scenario
         changes = {key.replace("__", "."): value for key, value in changes.items()}
-        self.world = World(build(document, changes), "a test", seed, VirtualPace())
+        self.world = ConsoleWorld(build(document, changes), "a test", seed, VirtualPace())
         monkeypatch.setattr(time, "monotonic", lambda: self.world.clock.now)
         self.lines, self.frames, self.client = [], [], client
         self.world.tell = lambda line, key="": self.lines.append(line)

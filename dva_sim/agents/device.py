@@ -127,13 +127,7 @@ class AgentDevice:
         if self.silent:
             self.clock.call_after(self.attempts * self.timeout, on_failure)
             return
-        key = peer, isinstance(body, m.Emergency)
-        requester = self._requesters.get(key)
-        if requester is None:
-            requester = self._requesters[key] = Requester(
-                self.network, self.id_tag, peer, self.timeout, self.attempts
-            )
-
+        requester = self._requester(peer, isinstance(body, m.Emergency))
         message = self.outbox.message(peer, body, self.clock.now, session)
 
         def answered(data: bytes) -> None:
@@ -147,6 +141,20 @@ class AgentDevice:
                 self.ask(peer, self._registration)  # the next request will be heard
 
         requester.request(encode(message), answered, on_failure)
+
+    def _requester(self, peer: str, urgent: bool) -> Requester:
+        """What asks a peer, over a connection of its own for what is urgent."""
+        key = peer, urgent
+        if key not in self._requesters:
+            self._requesters[key] = Requester(
+                self.network, self.id_tag, peer, self.timeout, self.attempts
+            )
+        return self._requesters[key]
+
+    def connect(self, peer: str) -> None:
+        """Connect to a peer now: over a long link the first request need not wait for that."""
+        for urgent in (True, False):
+            self._requester(peer, urgent).open()
 
     def be_patient(self, timeout: float) -> None:
         """From now on wait so long for each answer [s]."""

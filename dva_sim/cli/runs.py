@@ -162,7 +162,7 @@ def console(
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
     """
     from dva_sim.console.options import ConsoleOptions  # late: start-up
-    from dva_sim.console.supervisor import Supervisor  # late: start-up
+    from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
     from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
 
     changes = tuple(set_ or ())
@@ -178,7 +178,7 @@ def console(
         overwrite=overwrite,
     )
     with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):
-        Supervisor(options, _say_at_once).run()
+        ConsoleSupervisor(options, _say_at_once).run()
 
 
 def _say_at_once(line: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from dva_sim.agents.operator.person import PersonAgent
 from dva_sim.console.seats import Answers, Seats
-from dva_sim.console.world import World
+from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.network.realtime import FASTEST
@@ -34,7 +34,7 @@ class Actions:
         world: In which.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: ConsoleWorld) -> None:
         self._world = world
         self._seats, self._answers = Seats(), Answers()
         world.hold = self._stop_all

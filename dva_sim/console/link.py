@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.scenario import Scenario, start_needs_s, time_out_s
@@ -61,10 +62,7 @@ def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:
         gone["bursts"] = None
         ways = {way: special.model_copy(update={"bursts": None}) for way, special in ways.items()}
     made = link.model_copy(update=values | gone | ways)
-    try:
-        return LinkConfig.model_validate(made.model_dump())
-    except ValueError as error:
-        raise ConfigError(f"no such link: {error}") from None
+    return validate(LinkConfig, made.model_dump(), lambda problem, _: ConfigError(problem))
 
 
 def with_link(scenario: Scenario, link: LinkConfig, processing: float | None) -> Scenario:

@@ -16,7 +16,7 @@ from pathlib import Path
 from dva_sim.experiments.report.figures.palette import INK, look_of
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures.colours import FIRE, GAS, KINDS, ROBOT_MODES, SMOKE, WATER
-from dva_sim.worlds import view
+from dva_sim.worlds import tints, view
 from dva_sim.worlds.hazards import KINDS as HAZARDS
 
 STATIC = Path(__file__).parent / "static"
@@ -27,7 +27,7 @@ Palette = Mapping[str, str]
 
 
 def _floors(*dark: str) -> dict[str, tuple[str, str]]:
-    return {f"floor-{i}": pair for i, pair in enumerate(zip(view.FLOORS, dark, strict=True))}
+    return {f"floor-{i}": pair for i, pair in enumerate(zip(tints.FLOORS, dark, strict=True))}
 
 
 # What it is for: in light, in dark.
@@ -47,9 +47,9 @@ COLOURS: Mapping[str, tuple[str, str]] = {
     "warning": ("#b84a00", "#ff9a4d"),
     # --- plan
     **_floors("#2a3038", "#2f2d29", "#29302b", "#302a2d", "#2c2c33", "#293030"),
-    "corridor": (view.CORRIDOR, "#262b32"),
-    "paving": (view.PAVING, "#2d2c2a"),
-    "grass": (view.GRASS, "#242c22"),
+    "corridor": (tints.CORRIDOR, "#262b32"),
+    "paving": (tints.PAVING, "#2d2c2a"),
+    "grass": (tints.GRASS, "#242c22"),
     "map-floor": (view.MAP_FLOOR, "#2a3038"),
     "outside": ("#e6e6e2", "#101316"),
     "wall": (view.WALL, "#8b939c"),
@@ -113,8 +113,8 @@ NEEDED: tuple[tuple[str, str, float], ...] = (
     *((state, "card", TEXT) for state in _STATES),
     *((f"on-{what}", what, TEXT) for what in ("critical", "high", "medium", "focus", "stop")),
     *((mode, "floor-0", MARK) for mode in ("idle", "mission", "teleoperation", "emergency")),
-    *(("wall", f"floor-{i}", MARK) for i in range(len(view.FLOORS))),
-    *(("room-name", f"floor-{i}", TEXT) for i in range(len(view.FLOORS))),
+    *(("wall", f"floor-{i}", MARK) for i in range(len(tints.FLOORS))),
+    *(("room-name", f"floor-{i}", TEXT) for i in range(len(tints.FLOORS))),
     *((f"pattern-{name}", "card", MARK) for name in PATTERNS),
     ("edge", "card", MARK),
     ("edge", "page", MARK),

@@ -22,7 +22,7 @@ AT_ONCE = 1 << 16  # that are read [B]
 Line = dict[str, Any]
 
 
-class Outbox:
+class LineOutbox:
     """Lines that wait to be written.
 
     Attributes:
@@ -74,14 +74,14 @@ class LinePipe:
     def __init__(self, end: socket.socket) -> None:
         end.setblocking(False)
         self._end, self._rest, self._read = end, b"", b""
-        self.outbox, self.is_open = Outbox(), True
+        self.outbox, self.is_open = LineOutbox(), True
 
     def fileno(self) -> int:
         """Of the socket."""
         return self._end.fileno()
 
     def put(self, line: Line, key: object = None) -> None:
-        """Write a line as soon as there is room; see `Outbox`."""
+        """Write a line as soon as there is room; see `LineOutbox`."""
         if self.is_open:
             self.outbox.put(line, key)
             self.flush()

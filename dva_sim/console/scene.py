@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-import math
 from typing import Any
 
 import numpy as np
+import shapely
 from shapely.geometry import mapping
 
 from dva_sim.console import link
@@ -18,10 +18,10 @@ from dva_sim.simulation.full.run import Run
 from dva_sim.worlds.maps import OCCUPIED
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_export import features_of
+from dva_sim.worlds.tints import floor_tint
 
 Line = dict[str, Any]
 
-FLOOR, PATH, YARD = "#eef3f8", "#e7e2d8", "#e3eedd"  # of rooms, paths and other ground outdoors
 MOST_FEATURES = 20_000
 RULES = {
     "S1": "A robot moves only by a command that came within the watchdog.",
@@ -71,6 +71,7 @@ def patterns_of(own: str) -> list[Line]:
 
 def site_of(site: Site) -> Line:
     """The plan of a site, in metres and as GeoJSON in degrees."""
+    tints: dict[str, str] = {}
     told: Line = {
         "name": site.name,
         "extent_m": _rounded(site.extent),
@@ -83,7 +84,7 @@ def site_of(site: Site) -> Line:
             {
                 "name": room.name,
                 "polygon_m": _rounded(room.polygon),
-                "floor": FLOOR if not room.outdoor else PATH if room.paved else YARD,
+                "floor": floor_tint(room, tints),
                 "outdoor": room.outdoor,
             }
             for room in site.rooms
@@ -127,8 +128,6 @@ def geojson_of(site: Site) -> Line:
 
 
 def _to_degrees(site: Site, shape: Any) -> Line:
-    import shapely
-
     def convert(points: Any) -> Any:
         degrees = np.array([site.frame.to_latlon(x, y) for x, y in points.tolist()])
         return degrees[:, ::-1].round(8)
@@ -167,8 +166,3 @@ def legend(run: Run) -> list[Line]:
 def _rounded(numbers: Any) -> Any:
     """Metres to the millimetre, as plain lists."""
     return np.asarray(numbers, dtype=float).round(3).tolist()
-
-
-def heading_of(dx: float, dy: float) -> float:
-    """Of a direction [rad]."""
-    return math.atan2(dy, dx)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.console.feed import Feed
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
-
-if TYPE_CHECKING:
-    from dva_sim.console.world import World
+from dva_sim.simulation.full.run import Run
 
 Line = dict[str, Any]
 PHASES = ("driving", "starting", "stopping", "asking", "held")  # the first that holds is told
@@ -22,11 +21,16 @@ class SeatLines:
     """Lines for those who sit somewhere.
 
     Args:
-        world: Where.
+        run: In which.
+        feed: About it.
+        persons: By the numbers of their seats.
+        client_of: Who sits there, by the same numbers.
     """
 
-    def __init__(self, world: World) -> None:
-        self._world = world
+    def __init__(
+        self, run: Run, feed: Feed, persons: list[PersonAgent], client_of: dict[int, str]
+    ) -> None:
+        self._run, self._feed, self._persons, self._client_of = run, feed, persons, client_of
         self._acted: dict[str, Line] = {}  # by robot: the newest input that is in its set point
 
     def applied(self, drive: DriveLog) -> None:
@@ -44,7 +48,7 @@ class SeatLines:
             }
 
     def _held(self, drive: DriveLog) -> HeldRobot | None:
-        for person in self._world.persons:
+        for person in self._persons:
             held = person.robots.get(drive.robot)
             if held is not None and held.log is drive:
                 return held
@@ -52,20 +56,20 @@ class SeatLines:
 
     def waiting_order(self) -> Line | None:
         """An order for a seat in which nobody sits yet."""
-        orders = [p.order for p in self._world.persons if p.order is not None and not p.attended]
+        orders = [p.order for p in self._persons if p.order is not None and not p.attended]
         return self._order(orders[0]) if orders else None
 
     def lines(self) -> Iterator[tuple[str, Line]]:
         """A line for each client that sits somewhere."""
-        for number, client in self._world.client_of.items():
-            yield client, self._line(client, self._world.persons[number])
+        for number, client in self._client_of.items():
+            yield client, self._line(client, self._persons[number])
 
     def _line(self, client: str, person: PersonAgent) -> Line:
         held = list(person.robots.values())
         phases = {each.phase for each in held}
         return {
             "k": "seat",
-            "t": self._world.feed.now_ms,
+            "t": self._feed.now_ms,
             "seat": client,
             "label": person.device.label,
             "phase": next((phase for phase in PHASES if phase in phases), "free"),
@@ -75,26 +79,25 @@ class SeatLines:
         }
 
     def _order(self, order: m.Order) -> Line:
-        world = self._world
         where = order.position
-        x, y = world.run.stage.site.frame.to_xy(where.latitude, where.longitude)
+        x, y = self._run.stage.site.frame.to_xy(where.latitude, where.longitude)
         return {
             "event": order.event_id,
             "kind": order.kind,
-            "robot": world.feed.numbers.get(order.device or ""),
+            "robot": self._feed.numbers.get(order.device or ""),
             "x_m": round(x, 2),
             "y_m": round(y, 2),
-            "room": world.run.stage.site.room_at(x, y),
+            "room": self._run.stage.site.room_at(x, y),
         }
 
     def _drive(self, held: HeldRobot) -> Line:
-        world, log = self._world, held.log
-        robot, reach = world.run.field.robots[held.robot], world.run.stage.reach(held.robot)
+        run, log = self._run, held.log
+        robot, reach = run.field.robots[held.robot], run.stage.reach(held.robot)
         acted = self._acted.get(held.robot, {})
         frame, age = held.frame, robot.picture_age
         told: Line = {
-            "i": world.feed.numbers[held.robot],
-            "pattern": world.feed.pattern_of(held.robot),
+            "i": self._feed.numbers[held.robot],
+            "pattern": self._feed.pattern_of(held.robot),
             "phase": held.phase,
             "mode": robot.controller.mode.value,
             "session": held.session,

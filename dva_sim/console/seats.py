@@ -13,7 +13,7 @@ MOST_SEATS = 16
 
 
 @dataclass
-class Taken:
+class TakenSeat:
     """A seat in which somebody sits.
 
     Attributes:
@@ -35,7 +35,7 @@ class Seats:
     """
 
     def __init__(self) -> None:
-        self.taken: dict[str, Taken] = {}
+        self.taken: dict[str, TakenSeat] = {}
 
     def sit(self, client: str) -> int | None:
         """The number of the seat of a client, the lowest that is free; None: there is none."""
@@ -44,7 +44,7 @@ class Seats:
         used = {seat.number for seat in self.taken.values()}
         free = next((n for n in range(MOST_SEATS) if n not in used), None)
         if free is not None:
-            self.taken[client] = Taken(free)
+            self.taken[client] = TakenSeat(free)
         return free
 
     def stand_up(self, client: str) -> int | None:

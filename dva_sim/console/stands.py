@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.controller import STAND, Mode
 from dva_sim.agents.robot.robot import RobotAgent
 
 STILL = 0.02  # slower it stands [m/s, rad/s]
@@ -25,6 +25,8 @@ def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
     if body.jammed:
         return "it is stuck against something"
     if controller.mode is Mode.TELEOPERATION:
+        if point == STAND and not robot.stale:
+            return "waits for the first command: its connection is being opened"
         if now >= point.until:
             return _without_command(robot, now)
         if abs(point.speed) < STILL and abs(point.turn_rate) < STILL:

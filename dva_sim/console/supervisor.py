@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import socket
 import sys
@@ -14,7 +15,7 @@ from dva_sim.console.actions import Actions
 from dva_sim.console.children import END_WITHIN, Child, ChildFailed
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.recorder import keep_run
-from dva_sim.console.world import World
+from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
@@ -23,12 +24,13 @@ WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
 LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
 FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
+MOST_RESTARTS = 5  # of the process that draws
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
 Say = Callable[[str], object]
 
 
-class Supervisor:
+class ConsoleSupervisor:
     """One console.
 
     Args:
@@ -39,7 +41,8 @@ class Supervisor:
     def __init__(self, options: ConsoleOptions, say: Say) -> None:
         self._options, self._say = options, say
         self._children: list[Child] = []
-        self._failed = ""
+        self._to_web: socket.socket | None = None
+        self._failed, self._restarts = "", 0
 
     def run(self) -> None:
         """Run until Ctrl-C, SIGTERM, or the end of the web process.
@@ -51,7 +54,7 @@ class Supervisor:
         """
         options = self._options
         scenario = options.read()
-        world = World(scenario, options.scenario, options.seed)
+        world = ConsoleWorld(scenario, options.scenario, options.seed)
         keeper, outlet = None, None
         if options.record is not None:
             keeper = Keeper(options.record, world.scenario, options.seed)
@@ -74,18 +77,19 @@ class Supervisor:
         if options.record is not None:
             self._say(f"{options.record} written")
 
-    def _run(self, world: World) -> None:
+    def _run(self, world: ConsoleWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:
             web, pictures = self._start()
             serving = web.first_line()
             world.serve_cameras(str(serving["base"]))
             actions = Actions(world)
-            world.tell, world.show = web.pipe.put, pictures.pipe.put
+            world.tell = web.pipe.put
             world.dropped = lambda: web.pipe.outbox.dropped
             self._listen(world, web, actions)
             self._draw(world, pictures)
             world.begin()
             world.clock.pulse(FLUSH, self._flush)
+            gc.freeze()  # what stays for the whole run is not looked through again and again
             self._say(f"Console: {serving['drive']}")
             self._open_browser(str(serving["drive"]))
             if not ending.is_asked:
@@ -95,19 +99,24 @@ class Supervisor:
 
     def _start(self) -> tuple[Child, Child]:
         options = self._options
-        ours, theirs = socket.socketpair()
+        ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += [] if options.token else ["--no-token"]
         web = Child("web process", WEB, words, [ours])
         self._children.append(web)
-        pictures = Child("pictures process", PICTURES, ["--web-fd", str(theirs.fileno())], [theirs])
-        self._children.append(pictures)
         ours.close()
-        theirs.close()
-        return web, pictures
+        return web, self._start_pictures()
 
-    def _listen(self, world: World, web: Child, actions: Actions) -> None:
+    def _start_pictures(self) -> Child:
+        """Our copy of its end stays open, so that another one can take its place."""
+        end = self._to_web
+        assert end is not None
+        pictures = Child("pictures process", PICTURES, ["--web-fd", str(end.fileno())], [end])
+        self._children.append(pictures)
+        return pictures
+
+    def _listen(self, world: ConsoleWorld, web: Child, actions: Actions) -> None:
         def hear() -> None:
             for line in web.pipe.lines():
                 actions.take(line)
@@ -118,14 +127,23 @@ class Supervisor:
 
         world.clock.watch(web.pipe.fileno(), hear)
 
-    def _draw(self, world: World, pictures: Child) -> None:
-        """Without pictures all else goes on."""
+    def _draw(self, world: ConsoleWorld, pictures: Child) -> None:
+        """Without pictures all else goes on, and another process draws from then on."""
+        world.show = pictures.pipe.put
 
         def hear() -> None:
             pictures.pipe.lines()
-            if not pictures.pipe.is_open:
-                world.clock.unwatch(pictures.pipe.fileno())
-                world.recorder.tell(world.clock.now, "console", pictures.why(), "link")
+            if pictures.pipe.is_open:
+                return
+            world.clock.unwatch(pictures.pipe.fileno())
+            world.recorder.tell(world.clock.now, "console", pictures.why(), "link")
+            self._children.remove(pictures)
+            pictures.end()
+            pictures.make_sure(0.0)
+            if self._restarts < MOST_RESTARTS:
+                self._restarts += 1
+                self._draw(world, self._start_pictures())
+                world.show_scene()
 
         world.clock.watch(pictures.pipe.fileno(), hear)
 
@@ -133,7 +151,7 @@ class Supervisor:
         for child in self._children:
             child.pipe.flush()
 
-    def _leave(self, world: World, web: Child) -> None:
+    def _leave(self, world: ConsoleWorld, web: Child) -> None:
         """Everybody who drives is stopped, and a moment is left for the word of it."""
         for person in world.persons:
             person.release(lambda *_: None)
@@ -143,6 +161,8 @@ class Supervisor:
         web.pipe.put({"k": "bye", "t": world.feed.now_ms, "why": "the console was ended"})
 
     def _end_all(self) -> None:
+        if self._to_web is not None:
+            self._to_web.close()
         for child in self._children:
             child.end()
         deadline = time.monotonic() + END_WITHIN

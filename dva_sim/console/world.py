@@ -42,7 +42,7 @@ POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
-class World:
+class ConsoleWorld:
     """What runs, and what of it is told.
 
     Args:
@@ -87,7 +87,7 @@ class World:
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.seat_lines = SeatLines(self)
+        self.seat_lines = SeatLines(self.run, self.feed, self.persons, self.client_of)
         self.recorder.on_applied = self.seat_lines.applied
         self.hazards = HazardFeed(self.run)
         self._newest: dict[str, Any] = {}
@@ -104,19 +104,19 @@ class World:
         scene = scene_of(self.run, self.feed.things, self.name, self.seed)
         scene["link"] = self.link_line()
         self.tell(scene)
-        self.show(
-            {
-                "k": "scene",
-                "scenario": self.scenario.model_dump(mode="json"),
-                "seed": self.seed,
-                "things": self.feed.things,
-            }
-        )
+        self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
         self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def show_scene(self) -> None:
+        """Tell whoever draws, from the beginning, what there is to be seen."""
+        scenario = self.scenario.model_dump(mode="json")
+        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+        for number, when in self.run.field.contained.items():
+            self.show({"k": "contain", "t": round(1000 * when), "n": number})
 
     def person(self, number: int) -> PersonAgent:
         """The person of a seat, by its number from 0; new ones register first."""
@@ -125,6 +125,8 @@ class World:
             person = PersonAgent(device, self._console)
             person.on_robot = self._watch_robot
             device.register()
+            for robot in self.run.field.robots:
+                device.connect(robot)  # an emergency does not wait for a connection
             self.feed.add(device.id_tag, device.label, "operator")
             self.persons.append(person)
         return self.persons[number]

@@ -6,7 +6,6 @@ As a picture of its own (a poster) it has a key.
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,8 @@ from scipy import ndimage
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.site import FOOTPRINT, Site
-from dva_sim.worlds.site_parts import Exit, Room
+from dva_sim.worlds.site_parts import Exit
+from dva_sim.worlds.tints import GRASS, PAVING, floor_tint
 from dva_sim.worlds.view_marks import (
     CAMERA,
     DETECTORS,
@@ -43,10 +43,6 @@ from dva_sim.worlds.view_marks import (
 
 Floats = NDArray[np.float64]
 
-# Soft floors, so that tracks and hazards stand out.
-FLOORS = ("#eef3f8", "#f6f1e7", "#edf4ec", "#f6edf0", "#f0eff7", "#eaf4f4")
-CORRIDOR = "#fbfbf9"
-PAVING, GRASS = "#ece9e3", "#dfe9d4"
 MAP_FLOOR = "#f5f4ef"
 WALL, SOLID, SOLID_EDGE, DOOR = "#3a3f46", "#dcdfe3", "#b9bec6", "#b08c5a"
 EXIT = "#009e73"
@@ -131,21 +127,12 @@ def _draw_rooms(ax: Axes, site: Site) -> None:
     """Yards below paths below rooms; rooms of one purpose have one colour."""
     tints: dict[str, str] = {}
     rooms = sorted(site.rooms, key=lambda room: (not room.outdoor, room.paved))
-    colours = [_floor(room, tints) for room in rooms]
+    colours = [floor_tint(room, tints) for room in rooms]
     polygons = [room.polygon for room in rooms]
     ax.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors="none", zorder=1))
     solids = PolyCollection(list(site.solids), facecolors=SOLID, edgecolors=SOLID_EDGE, zorder=2)
     solids.set_linewidth(0.5)
     ax.add_collection(solids)
-
-
-def _floor(room: Room, tints: dict[str, str]) -> str:
-    if room.outdoor:
-        return PAVING if room.paved else GRASS
-    if "corridor" in room.name.lower():
-        return CORRIDOR
-    purpose = re.sub(r"\W*\b[A-Z]?\d*$", "", room.name)
-    return tints.setdefault(purpose, FLOORS[len(tints) % len(FLOORS)])
 
 
 def _draw_grid(ax: Axes, site: Site) -> None:

@@ -29,7 +29,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 SLOW = 20  # clients
-PAIRS, BLOCK_S, SETTLE_S = 12, 8.0, 1.0
+PAIRS, BLOCK_S, SETTLE_S = 12, 6.0, 1.0
 PERIOD_S = 0.02  # of inputs
 WORDS = ("console", "--no-open", "--port", "0")
 MOST = 5.0  # the difference of the 99th percentiles should be less [ms]
@@ -116,9 +116,10 @@ class Hand:
         while self._phase != "driving":
             with suppress(TimeoutError):
                 self.ask("start", within=1.0)
-            with suppress(TimeoutError):
-                while self._phase != "driving":
-                    self._next(1.0)
+            ends = time.monotonic() + 1.0
+            while self._phase != "driving" and time.monotonic() < ends:
+                with suppress(TimeoutError):
+                    self._next(0.2)
 
     def turn(self, seconds: float) -> None:
         """Turn on the spot."""

@@ -15,7 +15,7 @@ import shapely
 from dva_sim.worlds.geojson import write_features
 from dva_sim.worlds.site import Site, load_site
 from dva_sim.worlds.site_export import features_of
-from dva_sim.worlds.view import _floor
+from dva_sim.worlds.tints import floor_tint
 
 PATTERNS = (("req-rep", "REQ/REP"), ("pub-sub", "PUB/SUB"), ("latest-wins", "PUB/SUB, latest wins"))
 LINK = {"delay_s": 0.05, "jitter_s": 0.01, "loss": 0.0, "rate_bps": 2e7, "processing_s": 0.05}
@@ -49,7 +49,7 @@ def site_line(site: Site) -> dict[str, Any]:
             {
                 "name": room.name,
                 "polygon_m": np.round(room.polygon, 3).tolist(),
-                "floor": _floor(room, tints),
+                "floor": floor_tint(room, tints),
                 "outdoor": room.outdoor,
             }
             for room in site.rooms

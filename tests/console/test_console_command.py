@@ -158,7 +158,8 @@ def test_what_was_driven_and_recorded_holds_every_rule(programs, tmp_path):
     with client(address_of(console)) as page:
         assert page.do("link", delay_s=0.1)[0]
         assert page.do("take", robots=[0, 1])[0]
-        assert page.do("start")[0]
+        # On a machine that lags nobody may start: again and again, until it does not.
+        wait_until(lambda: page.do("start")[0], "is driven")
         for _ in range(100):
             page.want(0.5, 0.1)
         assert page.do("stop")[0]

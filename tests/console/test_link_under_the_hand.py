@@ -3,6 +3,8 @@
 import pytest
 from console_page import Page
 
+from dva_sim.agents.robot.controller import Mode
+
 FAST = {"rate_bps": 1e9}
 
 
@@ -120,3 +122,31 @@ def test_the_rate_of_a_recorded_link_is_the_recordings(monkeypatch, tmp_path):
     assert text == "the recorded trace gives this link's rate"
     assert page.told("rows")[-1]["link"]["trace"] == str(trace)
     assert page.do("link", delay_s=0.1)[0]
+
+
+def test_an_emergency_waits_for_no_connection_whatever_the_delay(monkeypatch):
+    page = Page(monkeypatch)
+    assert page.do("link", delay_s=0.5)[0]
+    page.let(10.0)
+    assert page.do("take", robots=[0])[0]
+    page.let(5.0)
+    assert page.do("start")[0]
+    page.want(0.5)
+    page.let(6.0)
+    assert page.robot().body.speed > 0.2
+    page.actions.take({"id": "now", "client": "another", "do": "emergency", "robots": "all"})
+    page.let(0.51)
+    assert page.robot().controller.mode is Mode.IDLE
+    page.let(0.1)
+    assert page.told("rows")[-1]["robots"][0]["mode"] == "Idle"
+
+
+def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypatch):
+    page = Page(monkeypatch)
+    assert page.do("link", delay_s=0.5)[0]
+    page.let(10.0)
+    assert page.do("take", robots=[0])[0]
+    assert page.do("start")[0]
+    page.let(0.6)
+    told = page.told("rows")[-1]["robots"][0]["stands"]
+    assert told == "waits for the first command: its connection is being opened"

@@ -195,6 +195,7 @@ def drawing():
     assert found.end() == ""
 
 
+@pytest.mark.system
 def test_one_that_was_killed_is_replaced_on_the_same_sockets_and_ends_with_the_run(drawing):
     for time in (1, 2):
         drawing.watch(0)
@@ -212,6 +213,7 @@ def test_one_that_was_killed_is_replaced_on_the_same_sockets_and_ends_with_the_r
     assert drawing.process.wait(PATIENCE_S) == 0
 
 
+@pytest.mark.system
 def test_whoever_does_not_read_pictures_does_not_stop_it(drawing):
     drawing.watch(0)
     drawing.say(scene())

@@ -271,6 +271,7 @@ def test_an_action_answers_when_the_simulation_has(console):
     assert answer.json == {"id": "rest-1", "ok": False, "text": "BUSY since 0:12"}
 
 
+@pytest.mark.system
 def test_without_an_answer_an_action_says_so(console):
     answer = console.ask("/api/emergency", "POST", {}, console.drive)
     assert answer.status == 504
@@ -463,6 +464,7 @@ def test_the_story_from_a_line_on(free):
         assert free.ask(f"/api/story?from={wrong}").status == 400
 
 
+@pytest.mark.system
 def test_of_a_slow_page_the_rest_knows_nothing_and_it_is_dropped_in_the_end():
     wide = {
         "k": "rows",
@@ -489,6 +491,7 @@ def test_of_a_slow_page_the_rest_knows_nothing_and_it_is_dropped_in_the_end():
         page.close()
 
 
+@pytest.mark.system
 def test_64_pages_are_served_and_one_more_is_told_so():
     with serving() as served, ExitStack() as stack:
         pages = [stack.enter_context(served.page(served.look).ws) for _ in range(64)]
@@ -546,14 +549,6 @@ def test_ctrl_c_is_for_the_simulation():
     with serving() as served:
         served.process.send_signal(signal.SIGINT)
         assert served.ask("/healthz").status == 200
-
-
-def test_when_the_simulation_hangs_health_says_so():
-    with serving() as served:
-        assert served.ask("/healthz").status == 200
-        assert becomes(lambda: served.ask("/healthz").status == 503)
-        served.say(places(1, [0, 0, 0, 0, 0]))
-        assert becomes(lambda: served.ask("/healthz").status == 200)
 
 
 def test_a_line_that_makes_no_sense_is_left_out():

@@ -282,6 +282,7 @@ EXPECTED = {
         both_robots_at_the_fire, dear=True
     ),
     # Using it
+    "dva-sim console": NOT_HERE,
     "dva-sim list": Expected(
         told("req-rep-vs-pub-sub", "fire-drill", "caparica", "servrobot", "hazard_team")
     ),

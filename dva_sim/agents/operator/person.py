@@ -76,6 +76,7 @@ class PersonAgent:
             held = HeldRobot(self.device, robot, lambda: self.console, self._alert, self._let_go)
             held.on_frame = self._on_frame
             self.robots[robot] = held
+            self.device.connect(robot)
             taken.append(held)
             self.on_robot(held)
 

@@ -30,6 +30,9 @@ Told = Callable[[Answer], object]
 class Simulation:
     """The simulation, as seen from here.
 
+    Args:
+        clock: Real time [s].
+
     Attributes:
         state: The newest of everything.
         ended: Set when the simulation has ended.
@@ -38,7 +41,8 @@ class Simulation:
         kinds: Called with each line's kind when the state has changed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
         self.state = RunState()
         self.ended = asyncio.Event()
         self.why = ""
@@ -46,7 +50,7 @@ class Simulation:
         self.changed: Callable[[str, dict[str, Any]], None] = lambda kind, line: None
         self._lines = Lines()
         self._pipe = PipeEnd(self._take, self._end)
-        self._heard = time.monotonic()
+        self._heard = clock()
         self._pending: dict[str, list[Told]] = {}
         self._complaints = 0
 
@@ -57,13 +61,13 @@ class Simulation:
     @property
     def runs(self) -> bool:
         """Whether the simulation is there and, once it has begun, still speaks."""
-        speaks = self.state.scene is None or time.monotonic() - self._heard < SILENCE
+        speaks = self.state.scene is None or self._clock() - self._heard < SILENCE
         return self._pipe.is_open and not self.ended.is_set() and speaks
 
     # --- what it says --------------------------------------------------------------------
 
     def _take(self, data: bytes) -> None:
-        self._heard = time.monotonic()
+        self._heard = self._clock()
         try:
             lines = self._lines.feed(data)
         except ValueError as error:

@@ -73,9 +73,9 @@ class Link:
     def change(self, now: float, config: LinkConfig) -> None:
         """Be like another link from `now` on [s]: delay, its law, loss and rate.
 
-        What is under way keeps its fate, what waits in the queue keeps its place and leaves at
-        the new rate from now on where the rate is constant, and nothing overtakes what was sent
-        before the change, unless the link may reorder. The room of the queue stays.
+        What was sent keeps its fate, and nothing overtakes it, unless the link may reorder. What
+        is sent from now on finds as many bytes in the queue, at the new rate where a rate is
+        constant. The room of the queue stays.
 
         Raises:
             ConfigError: a recorded delay cannot be read.

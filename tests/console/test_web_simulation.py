@@ -1,0 +1,118 @@
+"""What is known of the simulation, and what is asked of it: alive, hung, ended."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+
+from console_served import scene
+
+from dva_sim.console.web.simulation import MOST_PENDING, SILENCE, Simulation
+
+
+class Clock:
+    """Time that passes when it is told to [s]."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@contextmanager
+def ends() -> Iterator[tuple[socket.socket, int]]:
+    ours, theirs = socket.socketpair()
+    with ours:
+        yield ours, theirs.detach()
+
+
+async def until(condition: Callable[[], object]) -> None:
+    while not condition():
+        await asyncio.sleep(0.001)
+
+
+def play(story: Callable[[Simulation, Clock, socket.socket], Awaitable[None]]) -> None:
+    """Tell a story of a simulation."""
+
+    async def told() -> None:
+        clock = Clock()
+        simulation = Simulation(clock)
+        await simulation.open(number)
+        await story(simulation, clock, ours)
+        simulation.close()
+        await asyncio.sleep(0)
+
+    with ends() as (ours, number):
+        asyncio.run(told())
+
+
+def say(end: socket.socket, *lines: dict[str, object]) -> None:
+    for line in lines:
+        end.sendall(json.dumps(line).encode() + b"\n")
+
+
+def test_it_may_take_its_time_to_begin_but_then_its_silence_counts():
+    async def story(simulation, clock, end):
+        assert simulation.runs
+        clock.now += 10 * SILENCE
+        assert simulation.runs
+        say(end, scene())
+        await until(lambda: simulation.state.scene)
+        clock.now += SILENCE - 0.1
+        assert simulation.runs
+        clock.now += 0.2
+        assert not simulation.runs
+        say(end, {"k": "rows", "t": 1})
+        await until(lambda: simulation.state.latest)
+        assert simulation.runs
+
+    play(story)
+
+
+def test_it_has_ended_when_it_says_so_or_is_gone():
+    async def says(simulation, clock, end):
+        say(end, {"k": "bye", "why": "Ctrl-C"})
+        await simulation.ended.wait()
+        assert simulation.why == "Ctrl-C"
+        assert not simulation.runs
+
+    async def goes(simulation, clock, end):
+        end.shutdown(socket.SHUT_RDWR)
+        await simulation.ended.wait()
+        assert simulation.why == "the simulation has ended"
+
+    play(says)
+    play(goes)
+
+
+def test_an_answer_goes_to_all_who_asked_the_same():
+    async def story(simulation, clock, end):
+        asked = {"id": "a", "do": "start", "client": "c1"}
+        waiting = [asyncio.ensure_future(simulation.answer(asked)) for _ in range(2)]
+        await asyncio.sleep(0)
+        say(end, {"k": "done", "id": "a", "ok": True, "text": "yes"})
+        assert [line["text"] for line in await asyncio.gather(*waiting)] == ["yes", "yes"]
+        end.setblocking(False)
+        assert end.recv(1000).count(b"\n") == 1
+
+    play(story)
+
+
+def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
+    async def story(simulation, clock, end):
+        told = []
+        for number in range(MOST_PENDING):
+            simulation.ask({"id": f"{number}", "do": "start"}, told.append)
+            end.recv(1000)
+        simulation.ask({"id": f"{MOST_PENDING}", "do": "start"}, told.append)
+        assert [line["id"] for line in told] == [f"{MOST_PENDING}"]
+        assert "too much" in told[0]["text"]
+        say(end, {"k": "bye", "why": "over"})
+        await simulation.ended.wait()
+        assert [line["text"] for line in told[1:]] == ["over"] * MOST_PENDING
+
+    play(story)
