@@ -7,13 +7,14 @@ import time
 from typing import Any
 
 from patience import PATIENCE_S
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
 TURN_RATE = math.radians(30)
-NEAR_M, AHEAD = 0.6, 0.12  # of a waypoint; of a heading that will do [rad]
+LONGEST_S = 4.0  # of going straight on, before one looks again
+AHEAD = 0.12  # a heading that will do [rad]
 SITE = "import('/static/js/store.js').then(store => store.scene.value.site.name)"
 
 
@@ -61,14 +62,15 @@ class Driver:
         here = self.pose()
         way = self._planner.path(here[:2], (x, y))
         points = [(x, y)] if way is None else [(float(a), float(b)) for a, b in way]
-        ahead = next((p for p in points if math.dist(p, here[:2]) > NEAR_M), points[-1])
+        seen = [p for p in points if self._planner.line_of_sight(here[:2], p)]
+        ahead = max(seen or points[:1], key=lambda p: math.dist(p, here[:2]))
         off = math.atan2(ahead[1] - here[1], ahead[0] - here[0]) - here[2]
         off = (off + math.pi) % (2 * math.pi) - math.pi
         if abs(off) > AHEAD:
             self._press({"ArrowLeft" if off > 0 else "ArrowRight"}, abs(off) / TURN_RATE)
         else:
             far = min(math.dist(ahead, here[:2]), math.dist((x, y), here[:2]) - 0.5 * near)
-            self._press({"ArrowUp"}, max(0.2, far / 0.5))
+            self._press({"ArrowUp"}, min(LONGEST_S, max(0.2, far / 0.5)))
 
     def _press(self, keys: set[str], seconds: float) -> None:
         """Hold keys for a while, then see what has come of it."""
@@ -83,6 +85,7 @@ class Driver:
         mode = self._page.get_by_role("status", name="Mode")
         if mode.inner_text() != "Teleoperation":
             self._page.get_by_role("button", name="Start", exact=True).click()
+            expect(mode).to_have_text("Teleoperation")
             self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
 
     def _hold(self, keys: set[str]) -> None:

@@ -17,6 +17,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_play
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 MISSING = "these tests need Chromium: apt-get install chromium (make test leaves them out)"
+CUT = "ERR_INCOMPLETE_CHUNKED_ENCODING"  # a camera's stream has ended with its world
 FAKE = Path(__file__).parents[1] / "fake_world.py"
 
 expect.set_options(timeout=1000 * PATIENCE_S / 4)
@@ -128,7 +129,7 @@ class Visit:
         return tab
 
     def _note(self, kind: str, text: str) -> None:
-        if kind == "error":
+        if kind == "error" and CUT not in text:
             self.errors.append(text)
 
 
