@@ -150,3 +150,19 @@ def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypa
     page.let(0.6)
     told = page.told("rows")[-1]["robots"][0]["stands"]
     assert told == "waits for the first command: its connection is being opened"
+
+
+@pytest.mark.parametrize("pattern", ["latest-wins", "req-rep"])
+def test_a_hold_that_begins_before_the_drive_counts_once_it_has_begun(monkeypatch, pattern):
+    page = Page(monkeypatch, pattern=pattern)
+    page.let(1.0)
+    assert page.do("link", delay_s=0.5)[0]
+    assert page.do("take", robots=[0])[0]
+    for _ in range(2):
+        page.want(0.5)
+        assert page.do("start")[0]
+        page.let(6.0)
+        assert page.robot().body.speed == pytest.approx(0.25, abs=0.03)
+        page.let_go()
+        page.let(3.0)
+        assert page.robot().controller.mode is Mode.IDLE

@@ -22,6 +22,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
+STILL_WANTED = 0.3  # what was wanted no longer ago holds when a drive begins [s]
 MOST_INPUTS = 4096  # that are remembered until they act
 
 
@@ -210,6 +211,8 @@ class HeldRobot:
             heeds=setup.heeds,
         )
         self._sender.start()
+        if device.clock.now - self.last.time < STILL_WANTED:
+            self.want(self.last.number, self.last.speed, self.last.turn)
         device.clock.every(1.0, lambda: self._look_at_picture(log), start=device.clock.now + 1.0)
 
     def want(self, number: int, speed: float, turn: float) -> None:
