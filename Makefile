@@ -35,7 +35,9 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 
 test-all: $(DEV)  ## all tests
 	@echo "Running all tests ..."
-	@$(PYTEST)
+	@$(PYTEST) -m "not browser"
+	@echo "Running those in a browser ..."
+	@$(BIN)/python -m pytest -m browser
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
 	@$(PYTEST) -m contract

@@ -133,7 +133,7 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     ),
     m.TaskBid: st.builds(m.TaskBid, numbers, real(0, 1e6)),
     m.TaskAward: st.builds(m.TaskAward, numbers),
-    m.RelocationOrder: st.builds(m.RelocationOrder, positions),
+    m.Relocation: st.builds(m.Relocation, positions),
     m.Reply: st.builds(
         m.Reply, st.integers(0, UINT32), st.integers(0, 999), characters(0, 256), contents
     ),

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.seats import Answers, Seats
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import ConfigError

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from dva_sim.agents.operator.held_robot import HeldRobot
-from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.feed import Feed
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m

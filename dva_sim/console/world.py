@@ -14,7 +14,7 @@ from dva_sim.agents.observation import FRAME, Cameras
 from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
-from dva_sim.agents.operator.person import PersonAgent
+from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed

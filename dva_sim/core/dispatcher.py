@@ -173,7 +173,7 @@ class Dispatcher:
             return None
         self.situations.sends_to_wait(entry.device.id_tag, move.station, eta, now)
         self.orders.counters["relocated"] += 1
-        return [Send(entry.device.id_tag, m.RelocationOrder(place))]
+        return [Send(entry.device.id_tag, m.Relocation(place))]
 
 
 def _is_to_look(send: Send) -> bool:

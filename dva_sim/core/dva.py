@@ -134,7 +134,7 @@ class Dva:
         elif isinstance(body, m.TaskAnnouncement):
             self.dispatcher.auctions.no_bid(body.event_id, send.to)
             sends = self.dispatcher.decide(now)
-        elif isinstance(body, m.RelocationOrder):
+        elif isinstance(body, m.Relocation):
             self.dispatcher.situations.forget_move(send.to)
         elif isinstance(body, m.GetSensorInfo):
             self.sensing.told(send.to, None, now)

@@ -418,7 +418,7 @@ class TaskAward:
 
 
 @dataclass(frozen=True, slots=True)
-class RelocationOrder:
+class Relocation:
     """The DVA lets an idle guard wait at another place from now on."""
 
     position: Position
@@ -565,7 +565,7 @@ Body = (
     | TaskAnnouncement
     | TaskBid
     | TaskAward
-    | RelocationOrder
+    | Relocation
     | Reply
 )
 

@@ -231,7 +231,7 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "TaskAnnouncement": _read_task_announcement,
     "TaskBid": _read_task_bid,
     "TaskAward": lambda element: m.TaskAward(_int(element[0])),
-    "Relocation": lambda element: m.RelocationOrder(_read_position(element[0])),
+    "Relocation": lambda element: m.Relocation(_read_position(element[0])),
 }
 _PAYLOAD_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "RobotStatus": _read_status,

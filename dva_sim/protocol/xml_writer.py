@@ -328,7 +328,7 @@ def _write_task_award(body: m.TaskAward) -> str:
     return f"<Event><TaskAward><EventID>{number}</EventID></TaskAward></Event>"
 
 
-def _write_relocation(body: m.RelocationOrder) -> str:
+def _write_relocation(body: m.Relocation) -> str:
     return f"<Event><Relocation>{_write_position(body.position)}</Relocation></Event>"
 
 
@@ -446,7 +446,7 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.TaskAnnouncement: ("SimpleMsg", _write_task_announcement),
     m.TaskBid: ("SimpleMsg", _write_task_bid),
     m.TaskAward: ("SimpleMsg", _write_task_award),
-    m.RelocationOrder: ("SimpleMsg", _write_relocation),
+    m.Relocation: ("SimpleMsg", _write_relocation),
     m.Reply: ("SimpleMsg", _write_reply),
 }
 

@@ -86,7 +86,7 @@ def test_only_the_dva_gives_orders(dva: PretendedDva, guard: GuardAgent) -> None
     place = dva.position(FAR)
     for body in (
         m.Order(1, "fire", place, None),
-        m.RelocationOrder(place),
+        m.Relocation(place),
         m.TaskAnnouncement(1, "fire", place, 0.5, 2.0),
         m.TaskAward(1),
         m.OrderProgress(1, "done"),
@@ -306,7 +306,7 @@ def test_an_idle_guard_that_is_relocated_walks_there_and_waits(
     dva: PretendedDva, guard: GuardAgent
 ) -> None:
     place = dva.position(FAR)
-    assert dva.say(GUARD, m.RelocationOrder(place)) == m.OK
+    assert dva.say(GUARD, m.Relocation(place)) == m.OK
     assert guard.activity == "getting ready"
     dva.run_for(60.0)
     assert at(guard) == pytest.approx(FAR, abs=0.2)
@@ -318,7 +318,7 @@ def test_a_guard_tells_where_it_is_while_it_moves(dva: PretendedDva, guard: Guar
     seen = []
     hear = lambda data: seen.append(dva.device.read(data).body.activity)  # noqa: E731
     dva.network.subscribe(dva.device.id_tag, GUARD, "status|", hear)
-    dva.say(GUARD, m.RelocationOrder(dva.position(FAR)))
+    dva.say(GUARD, m.Relocation(dva.position(FAR)))
     dva.run_for(60.0)
     assert list(dict.fromkeys(seen)) == ["getting ready", "walking", "waiting"]
 
@@ -326,23 +326,23 @@ def test_a_guard_tells_where_it_is_while_it_moves(dva: PretendedDva, guard: Guar
 def test_who_stands_there_already_does_not_even_get_ready(
     dva: PretendedDva, guard: GuardAgent
 ) -> None:
-    assert dva.say(GUARD, m.RelocationOrder(dva.position((POST[0] + 0.9, POST[1])))) == m.OK
+    assert dva.say(GUARD, m.Relocation(dva.position((POST[0] + 0.9, POST[1])))) == m.OK
     assert guard.activity == "waiting"
-    assert dva.say(GUARD, m.RelocationOrder(dva.position((POST[0] + 1.1, POST[1])))) == m.OK
+    assert dva.say(GUARD, m.Relocation(dva.position((POST[0] + 1.1, POST[1])))) == m.OK
     assert guard.activity == "getting ready"
 
 
 def test_a_guard_with_an_order_is_not_relocated(dva: PretendedDva, guard: GuardAgent) -> None:
     dva.order(1, FAR, "stand_by")
-    assert dva.say(GUARD, m.RelocationOrder(dva.position(NEAR))) == m.BUSY
+    assert dva.say(GUARD, m.Relocation(dva.position(NEAR))) == m.BUSY
 
 
 def test_an_order_interrupts_a_relocation_and_the_newest_relocation_holds(
     dva: PretendedDva, guard: GuardAgent
 ) -> None:
-    dva.say(GUARD, m.RelocationOrder(dva.position(FARTHER)))
+    dva.say(GUARD, m.Relocation(dva.position(FARTHER)))
     dva.run_for(15.0)
-    assert dva.say(GUARD, m.RelocationOrder(dva.position(FAR))) == m.OK
+    assert dva.say(GUARD, m.Relocation(dva.position(FAR))) == m.OK
     dva.run_for(5.0)
     start = dva.now
     assert dva.order(1, NEAR) == m.OK
@@ -366,7 +366,7 @@ def test_an_idle_guard_bids_what_guards_usually_need_to_get_ready_and_its_own_wa
 def test_who_is_under_way_to_another_post_bids_the_way_alone(
     dva: PretendedDva, guard: GuardAgent
 ) -> None:
-    dva.say(GUARD, m.RelocationOrder(dva.position(FARTHER)))
+    dva.say(GUARD, m.Relocation(dva.position(FARTHER)))
     dva.run_for(20.0)
     dva.announce(7, FARTHER)
     left = math.dist(at(guard), FARTHER)

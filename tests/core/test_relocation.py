@@ -13,7 +13,7 @@ from dva_sim.core.sessions import Send
 from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m
 
-THERE = m.RelocationOrder(east(90))
+THERE = m.Relocation(east(90))
 GROUND = SiteKnowledge(
     None,
     (WaitingPlace("west", east(0)), WaitingPlace("east", east(90))),

@@ -15,6 +15,7 @@ MOST_LINES = 600
 
 # One meaning for each public class, but for these.
 SHARED_NAMES = {
+    "Relocation": "a policy's advice, and the message of the protocol that carries it",
     "Results": "what a folder holds, and the same with what can be concluded from it",
 }
 

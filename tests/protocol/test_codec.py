@@ -154,7 +154,7 @@ def test_a_speed_that_is_no_bounded_number_is_not_encoded(speed):
         m.OrderProgress(7.5, "done"),
         m.Order(7, "fire", m.Position(0, 0), None, "run"),
         m.Order(7, "fire", m.Position(0, 0), None, None),
-        m.RelocationOrder(m.Position(90.5, 0.0)),
+        m.Relocation(m.Position(90.5, 0.0)),
         m.Reply(1, m.OK, "", m.SensorInfo("http://a b")),
         m.Reply(1, m.OK, "", "content"),
         "body",

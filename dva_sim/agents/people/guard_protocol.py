@@ -88,7 +88,7 @@ class GuardProtocol:
                 return self._ordered(order, now)
             case m.OrderProgress(state=state) as word if state == OVER:
                 return self._stand_down(word)
-            case m.RelocationOrder(position=place):
+            case m.Relocation(position=place):
                 return self._relocated(place, now)
             case m.TaskAnnouncement() as announcement:
                 return self._heard(announcement, now)

@@ -206,7 +206,7 @@ class Unit:
             return self.order(body, self.device)
         if isinstance(body, m.OrderProgress):
             return self._stand_down(body)
-        if isinstance(body, m.RelocationOrder):
+        if isinstance(body, m.Relocation):
             return self._wait_at(self.world.terrain.known_at(body.position))
         if isinstance(body, m.TaskAnnouncement):
             return self._bid(body)

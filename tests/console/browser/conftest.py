@@ -93,7 +93,7 @@ def own_world(tmp_path: Path) -> Iterator[Callable[..., tuple[World, Callable[[]
         yield start
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # while Playwright is there, no other test has asyncio
 def chromium() -> Iterator[Browser]:
     """The system's own."""
     path = next((found for name in NAMES if (found := shutil.which(name))), None)
