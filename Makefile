@@ -33,11 +33,9 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."
 	@$(PYTEST) -m "not system and not soak and not browser"
 
-test-all: $(DEV)  ## all tests
+test-all: $(DEV)  ## all tests but those in a browser
 	@echo "Running all tests ..."
 	@$(PYTEST) -m "not browser"
-	@echo "Running those in a browser ..."
-	@$(BIN)/python -m pytest -m browser
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
 	@$(PYTEST) -m contract
@@ -46,7 +44,7 @@ test-system: $(DEV)  ## programs as users start them, with real processes, socke
 	@$(PYTEST) -m system
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
-	@$(PYTEST) -m browser
+	@$(BIN)/python -m pytest -m browser
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
