@@ -15,6 +15,9 @@ DEMO := results/demo
 # run compiles all tests again, for half a minute.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --halves
 
+# Pages are drawn by several processes of the browser already: these tests share nothing.
+BROWSER := $(BIN)/python -m pytest tests/console/browser
+
 help:  ## say what can be made
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
 
@@ -33,8 +36,9 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."
 	@$(PYTEST) -m "not system and not soak and not browser"
 
-test-all: $(DEV)  ## all tests but those in a browser
-	@echo "Running all tests ..."
+test-all: $(DEV)  ## all tests
+	@echo "Running those in a browser, then all others ..."
+	@$(BROWSER)
 	@$(PYTEST) -m "not browser"
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
@@ -44,7 +48,7 @@ test-system: $(DEV)  ## programs as users start them, with real processes, socke
 	@$(PYTEST) -m system
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
-	@$(BIN)/python -m pytest -m browser
+	@$(BROWSER)
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"

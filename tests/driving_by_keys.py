@@ -6,6 +6,7 @@ import math
 import time
 from typing import Any
 
+import numpy as np
 from patience import PATIENCE_S
 from playwright.sync_api import Page, expect
 
@@ -14,6 +15,8 @@ from dva_sim.worlds.site import load_site
 
 TURN_RATE = math.radians(30)
 LONGEST_S = 4.0  # of going straight on, before one looks again
+ROOM = 0.8  # between a straight way and the nearest wall, where there is so much [m]
+STEP = 0.1  # [m]
 AHEAD = 0.12  # a heading that will do [rad]
 SITE = "import('/static/js/store.js').then(store => store.scene.value.site.name)"
 
@@ -62,7 +65,7 @@ class Driver:
         here = self.pose()
         way = self._planner.path(here[:2], (x, y))
         points = [(x, y)] if way is None else [(float(a), float(b)) for a, b in way]
-        seen = [p for p in points if self._planner.line_of_sight(here[:2], p)]
+        seen = [p for p in points if self._is_free(here[:2], p)]
         ahead = max(seen or points[:1], key=lambda p: math.dist(p, here[:2]))
         off = math.atan2(ahead[1] - here[1], ahead[0] - here[0]) - here[2]
         off = (off + math.pi) % (2 * math.pi) - math.pi
@@ -71,6 +74,13 @@ class Driver:
         else:
             far = min(math.dist(ahead, here[:2]), math.dist((x, y), here[:2]) - 0.5 * near)
             self._press({"ArrowUp"}, min(LONGEST_S, max(0.2, far / 0.5)))
+
+    def _is_free(self, here: tuple[float, float], there: tuple[float, float]) -> bool:
+        """Whether one may go straight there, a little off the line as well."""
+        steps = max(2, int(math.dist(here, there) / STEP))
+        room = self._planner.room_at(np.linspace(here, there, steps))
+        least = min(ROOM, float(room[0]), float(room[-1]))
+        return self._planner.line_of_sight(here, there) and bool(np.all(room >= least - 0.05))
 
     def _press(self, keys: set[str], seconds: float) -> None:
         """Hold keys for a while, then see what has come of it."""

@@ -31,7 +31,7 @@ class SeatLines:
         self, run: Run, feed: Feed, persons: list[PersonAgent], client_of: dict[int, str]
     ) -> None:
         self._run, self._feed, self._persons, self._client_of = run, feed, persons, client_of
-        self._acted: dict[str, Line] = {}  # by robot: the newest input that is in its set point
+        self._acted: dict[str, Line] = {}  # by robot: of the newest command that has taken effect
 
     def applied(self, drive: DriveLog) -> None:
         """A command has taken effect: which input was behind it?"""
@@ -39,13 +39,12 @@ class SeatLines:
         if held is None or not drive.applied:
             return
         command = drive.applied[-1]
+        acted = self._acted.setdefault(drive.robot, {})
+        acted["age_ms"] = round(1000 * (command.time - command.issued), 1)
         given = held.acted(command.issued, command.sample_age)
         if given is not None:
-            self._acted[drive.robot] = {
-                "n": given.number,
-                "at_ms": round(1000 * time.time(), 1),
-                "loop_ms": round(1000 * (command.time - given.time), 1),
-            }
+            acted["input"] = {"n": given.number, "at_ms": round(1000 * time.time(), 1)}
+            acted["loop_ms"] = round(1000 * (command.time - given.time), 1)
 
     def _held(self, drive: DriveLog) -> HeldRobot | None:
         for person in self._persons:
@@ -94,7 +93,7 @@ class SeatLines:
         run, log = self._run, held.log
         robot, reach = run.field.robots[held.robot], run.stage.reach(held.robot)
         acted = self._acted.get(held.robot, {})
-        frame, age = held.frame, robot.picture_age
+        frame = held.frame
         told: Line = {
             "i": self._feed.numbers[held.robot],
             "pattern": self._feed.pattern_of(held.robot),
@@ -106,11 +105,11 @@ class SeatLines:
                 round(held.last.turn * reach.turn_rate, 3),
             ],
             "command": [0.0, 0.0],
-            "command_age_ms": None if age is None else round(1000 * age),
+            "command_age_ms": acted.get("age_ms"),
             "picture_ms": None if frame is None else round(1000 * frame.captured),
             "picture_arrived_ms": None if frame is None else round(1000 * held.arrived),
             "loop_ms": acted.get("loop_ms"),
-            "input": {key: acted[key] for key in ("n", "at_ms")} if acted else None,
+            "input": acted.get("input"),
         }
         return told | (_counts(log) if log is not None else _NONE)
 

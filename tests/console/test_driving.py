@@ -184,8 +184,37 @@ def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
     event = page.told("events")[-1]["events"][0]
     assert event["state"] == "confirmed"
     assert page.seat()["order"] is None
-    page.do("stop")
     assert page.world.recorder.drives[-1].outcome == "confirmed"
+    assert page.seat()["phase"] == "free"
+    assert "take control again" in page.seat()["alert"]
+    page.let(2.0)
+    assert page.do("take", robots=[order["robot"]])[0]
+    assert page.do("start")[0]
+
+
+def test_who_loses_an_order_is_told_and_may_take_the_robot_again(monkeypatch):
+    page = Page(monkeypatch, dispatch__still_within_s=20)
+    page.let(30.0)
+    order = page.told("rows")[-1]["order"]
+    assert page.do("take", robots=[order["robot"]])[0]
+    assert page.do("start")[0]
+    page.let(40.0)
+    seat = page.seat()
+    assert (seat["phase"], seat["order"], seat["drives"]) == ("free", None, [])
+    assert "take control again" in seat["alert"]
+    assert page.world.recorder.drives[-1].outcome == "recalled"
+    assert page.do("take", robots=[order["robot"]])[0]
+    assert page.do("start")[0]
+    page.want(0.5)
+    page.let(2.0)
+    assert page.robot(order["robot"]).body.speed > 0.2
+
+
+def test_the_age_of_a_command_is_the_links_delay_and_no_more_than_that_by_much(driving):
+    driving.do("link", delay_s=0.25)
+    driving.want(0.5)
+    driving.let(3.0)
+    assert driving.drive()["command_age_ms"] == pytest.approx(252, abs=20)
 
 
 def test_an_order_to_an_empty_seat_is_declined_after_a_while_and_others_go(page):

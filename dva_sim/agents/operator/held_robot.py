@@ -120,6 +120,12 @@ class HeldRobot:
             self._alert(f"{self.label}: the permission was revoked")
             self._be_gone()
 
+    def taken_back(self, outcome: str) -> None:
+        """The DVA has ended the session; the robot has been told, or soon will be."""
+        if self.phase != "gone":
+            self.stop(outcome)
+            self._be_gone()
+
     def _be_gone(self) -> None:
         self.phase = "gone"
         if self._picture is not None:

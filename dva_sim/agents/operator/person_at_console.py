@@ -13,6 +13,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.operator.handheld import Console, Gathered, Said
 from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.operator import RECALLED
 from dva_sim.agents.operator.steps import ask_emergency
 from dva_sim.protocol import messages as m
 
@@ -220,19 +221,21 @@ class PersonAgent:
 
     def _on_recall(self, event: int) -> None:
         if self.order is not None and self.order.event_id == event:
-            self.order = None
-            self._forget_event()
-            self._alert(f"event {event} is settled, or another's")
+            self._end_order(f"event {event} is settled, or another's", RECALLED)
 
     def _put_down(self, state: str) -> None:
         assert self.order is not None
         self.device.progress(self.order.event_id, state)
-        self.order = None
-        self._forget_event()
+        self._end_order(f"event {self.order.event_id} is {state}", "gave up")
 
-    def _forget_event(self) -> None:
-        for held in self.robots.values():
-            held.event = 0
+    def _end_order(self, why: str, outcome: str) -> None:
+        """With an order the DVA ends the right to drive its robot."""
+        assert self.order is not None
+        held, self.order = self.robots.get(self.order.device or ""), None
+        if held is not None:
+            held.taken_back(outcome)
+            why += f"; to drive {held.label} on, take control again"
+        self._alert(why)
 
     def _on_frame(self, held: HeldRobot, frame: CameraFrame) -> None:
         """The app says by itself when the robot is where it was sent."""

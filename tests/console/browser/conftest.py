@@ -98,7 +98,7 @@ def chromium() -> Iterator[Browser]:
     """The system's own."""
     path = next((found for name in NAMES if (found := shutil.which(name))), None)
     if path is None:
-        pytest.fail(MISSING, pytrace=False)
+        pytest.exit(MISSING, returncode=1)
     with sync_playwright() as playwright:
         arguments = ["--no-sandbox", "--disable-gpu"]
         browser = playwright.chromium.launch(executable_path=path, args=arguments)

@@ -1,0 +1,55 @@
+"""The program itself: 500 ms, a drive by keyboard to the fire, confirmed; its recording holds."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from driving_by_keys import Driver
+from patience import PATIENCE_S, becomes
+from playwright.sync_api import expect
+from programs import Programs, all_gone_after
+
+DELAY_S = 0.5
+NEAR_M = 2.5  # of the fire: there it can be seen
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
+
+
+def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(
+    tmp_path: Path, visit, programs: Programs
+) -> None:
+    record = tmp_path / "drive.mcap"
+    console = programs.start("console", "--no-open", "--port", "0", "--record", record)
+    console.wait_to_say("Console:")
+    address = re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
+    page = visit.open(address, "drive")
+    base = address.partition("?")[0]
+    page.get_by_role("slider", name="Delay").fill(str(1000 * DELAY_S))
+    expect(page.get_by_role("status", name="Link")).to_contain_text("modelled 500 ms")
+
+    order = page.get_by_role("region", name="Order in hand")
+    expect(order).to_contain_text("fire", timeout=1000 * PATIENCE_S)
+    robot = re.findall(r"Drive (\S+) there", order.inner_text())[0]
+    if page.get_by_role("button", name=f"Choose {robot}").count():
+        page.get_by_role("button", name=f"Choose {robot}").click()
+    driver = Driver(page, base, robot, DELAY_S)
+    fire = next(event for event in driver.state()["events"] if event["kind"] == "fire")
+    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    driver.drive_to(fire["x_m"], fire["y_m"], NEAR_M)
+    page.get_by_role("button", name="Confirm").click()
+
+    assert becomes(lambda: "confirmed" in str(driver.state()["events"]))
+    page.close()  # it would complain that nobody is there any more
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    checked = programs.start("check", record)
+    assert checked.ends() == 0, checked.complained
