@@ -189,6 +189,48 @@ def test_emergency_stop_and_its_key_stop_all_robots(page: Page) -> None:
         expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
 
 
+@pytest.mark.parametrize("end", ["key", "button", "stop"])
+def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page: Page, end) -> None:
+    with held(page, "ArrowLeft"):
+        assert becomes(lambda: inputs(page) and inputs(page)[-1]["turn"] == 1)
+        if end == "key":
+            page.keyboard.press("Shift+Escape")
+        else:
+            name = "Stop" if end == "stop" else "Emergency stop"
+            page.get_by_role("button", name=name, exact=True).click()
+        expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+        expect(page.get_by_role("slider", name="Turn rate")).to_have_value("0")
+        count = len(inputs(page))
+        page.get_by_role("button", name="Start", exact=True).click()
+        expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+        page.keyboard.down("ArrowLeft")  # the repeat of a key that is still down
+        page.wait_for_timeout(200)
+        assert [line for line in inputs(page)[count:] if line["held"]] == []
+    with held(page, "ArrowLeft"):
+        assert becomes(lambda: inputs(page)[-1]["turn"] == 1)
+
+
+def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(page: Page) -> None:
+    slider = page.get_by_role("slider", name="Speed")
+    box = slider.bounding_box()
+    assert box
+    x, y = box["x"], box["y"] + box["height"] / 2
+
+    page.mouse.move(x + 0.5 * box["width"], y)
+    page.mouse.down()
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    page.keyboard.press("Shift+Escape")
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+    count = len(inputs(page))
+    page.mouse.move(x + 0.7 * box["width"], y)
+    page.mouse.move(x + 0.9 * box["width"], y)
+    expect(slider).to_have_value("0")
+    assert [line for line in inputs(page)[count:] if line["held"]] == []
+    page.mouse.up()
+    slider.click(position={"x": 0.5 * box["width"], "y": box["height"] / 2})
+    assert becomes(lambda: any(line["held"] for line in inputs(page)[count:]))
+
+
 def test_two_robots_get_the_same_hand_under_two_patterns(fake, visit) -> None:
     page = visit.open(fake("--robots", "3", "--people", "4").drive, "drive")
     listen(page)

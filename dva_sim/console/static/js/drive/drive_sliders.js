@@ -1,9 +1,10 @@
 /** Speed and turn rate as sliders that spring back. */
-import { html, useEffect, useRef } from '../../vendor/preact.js';
+import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { Slider } from '../ui/slider.js';
 import { hold, letGo, onRelease, wish } from './hold.js';
 
 const DEGREES = 180 / Math.PI;
+const MOVES = /^(Arrow|Page|Home|End)/; // keys that move a slider
 
 /** @param {number} value [m/s] */
 const speedText = (value) => `${value.toFixed(2)} m/s`;
@@ -36,41 +37,53 @@ export function DriveSliders({ limits, disabled }) {
 
 /**
  * A slider wants something while a pointer or a key holds it. A value that came otherwise, as from
- * assistive technology, counts while the slider has the focus and the page can be seen.
+ * assistive technology, counts while the slider has the focus and the page can be seen. After an
+ * interruption the hand that is still on it counts for nothing: it is spent until it lets go.
  * @param {string} source
  */
 function useSpring(source) {
-  const pressed = useRef(false);
+  const grip = useRef('');
+  const spent = useRef(false);
+  const [, showZero] = useState(0);
   useEffect(() => {
-    const end = onRelease(() => (pressed.current = false));
+    const end = onRelease(() => (spent.current = Boolean(grip.current)));
     return () => {
       end();
       letGo(source);
     };
   }, [source]);
-  const press = () => (pressed.current = true);
-  const release = () => {
-    if (!pressed.current) return;
-    pressed.current = false;
+  const grasp = (/** @type {string} */ by) => () => {
+    grip.current = by;
+    spent.current = false;
+  };
+  const open = (/** @type {string} */ by) => () => {
+    if (grip.current !== by) return;
+    grip.current = '';
+    spent.current = false;
     letGo(source);
   };
+  const keyDown = (/** @type {KeyboardEvent} */ event) => {
+    if (MOVES.test(event.key) && !event.repeat) grasp('key')();
+  };
   const keyUp = (/** @type {KeyboardEvent} */ event) => {
-    if (event.key !== 'Tab' && event.key !== 'Shift') release();
+    if (MOVES.test(event.key)) open('key')();
   };
   const blur = () => {
-    pressed.current = false;
+    grip.current = '';
+    spent.current = false;
     letGo(source);
   };
   return {
     want: (/** @type {import('./hold.js').Wish} */ wanted) => {
-      if (document.hasFocus() || !document.hidden) hold(source, wanted);
+      if (spent.current) showZero((n) => n + 1); // the browser has moved the knob: put it back
+      else if (document.hasFocus() || !document.hidden) hold(source, wanted);
     },
     more: {
-      onPointerDown: press,
-      onPointerUp: release,
-      onPointerCancel: release,
-      onLostPointerCapture: release,
-      onKeyDown: (/** @type {KeyboardEvent} */ event) => event.key !== 'Tab' && press(),
+      onPointerDown: grasp('pointer'),
+      onPointerUp: open('pointer'),
+      onPointerCancel: open('pointer'),
+      onLostPointerCapture: open('pointer'),
+      onKeyDown: keyDown,
       onKeyUp: keyUp,
       onBlur: blur,
     },

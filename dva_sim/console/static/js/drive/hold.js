@@ -4,10 +4,11 @@
  * Keys, pointer, sliders and gamepad each say what they want for as long as they are held; the
  * newest that wants anything counts. Whatever interrupts (the window loses the focus, the page is
  * hidden, the connection breaks, the screen is turned) stops at once, and what was held then counts
- * for nothing until it has been let go: only a new gesture drives on.
+ * for nothing until it has been let go: only a new gesture drives on. So it is after the end of a
+ * drive, too: a hand that nobody has lifted does not move the robot at the next start.
  */
-import { signal } from '../../vendor/preact.js';
-import { you } from '../store.js';
+import { effect, signal } from '../../vendor/preact.js';
+import { seat, you } from '../store.js';
 import { steer } from '../net/wire.js';
 
 const EVERY_MS = 40;
@@ -63,12 +64,33 @@ export function onRelease(release) {
  */
 export function interrupt(why) {
   const was = held.value;
-  sources.clear();
-  for (const release of releases) release();
-  changed();
+  forget();
   if (!was) return;
   steer({ do: 'gone' });
   interrupted.value = why;
+}
+
+/** Whatever is held counts for nothing until it has been let go and taken anew. */
+export function forget() {
+  sources.clear();
+  for (const release of releases) release();
+  changed();
+}
+
+/**
+ * Forget what is held when a drive ends, or does not come about, whoever ended it. What is taken
+ * hold of later counts, also while the next drive is being started.
+ * @returns {() => void} how to end that
+ */
+function watchEnds() {
+  let before = '';
+  return effect(() => {
+    if (!seat.value) return; // told anew in a moment: no end of a drive
+    const now = seat.value.phase;
+    const failed = before === 'starting' && now !== 'starting' && now !== 'driving';
+    if (failed || (before === 'driving' && now !== 'driving')) forget();
+    before = now;
+  });
 }
 
 function changed() {
@@ -118,7 +140,9 @@ export function watchInterruptions() {
   document.addEventListener('visibilitychange', hide);
   document.addEventListener('freeze', leave);
   window.screen?.orientation?.addEventListener?.('change', turned);
+  const endWatch = watchEnds();
   return () => {
+    endWatch();
     window.removeEventListener('blur', blur);
     window.removeEventListener('pagehide', leave);
     document.removeEventListener('visibilitychange', hide);

@@ -1,9 +1,11 @@
 /** What the person asks of the world, with the answer to each. */
 import { signal } from '../../vendor/preact.js';
+import { forget } from '../drive/hold.js';
 import { notice } from '../store.js';
 import { steer } from './wire.js';
 
 const PATIENCE_MS = 8000;
+const ENDS = ['stop', 'release'];
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */
 const waiting = new Map();
@@ -24,6 +26,7 @@ function newId() {
  * @returns {Promise<{ok: boolean, text: string}>}
  */
 export async function act(what, more = {}) {
+  if (ENDS.includes(what)) forget();
   const id = newId();
   if (!steer({ id, do: what, ...more })) {
     return told({ ok: false, text: 'There is no connection to the world; nothing was sent.' });
@@ -58,8 +61,9 @@ export function socketLost(unexpected) {
   if (unexpected) driveLost.value += 1;
 }
 
-/** Stop all robots, on a way of its own. */
+/** Stop all robots, on a way of its own. What is held then drives no robot at the next start. */
 export async function emergencyStop() {
+  forget();
   const body = JSON.stringify({ id: newId(), robots: 'all' });
   const headers = { 'Content-Type': 'application/json' };
   try {
