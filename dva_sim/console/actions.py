@@ -8,17 +8,25 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.seats import Answers, Seats
+from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.network.realtime import FASTEST
 
 Line = dict[str, Any]
-Said = Callable[[bool, str], object]
+
+
+class Said(Protocol):
+    """Whoever waits for the answer to an action."""
+
+    def __call__(self, ok: bool, text: str, /, **more: Any) -> object:
+        """Told whether it was done, what there is to say of it, and what was asked for."""
+
 
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
@@ -51,6 +59,7 @@ class Actions:
             "confirm": lambda client, _, said: self._person(client).report("confirmed", said),
             "refute": lambda client, _, said: self._person(client).report("refuted", said),
             "decline": self._decline,
+            "tour": self._tour,
         }
 
     def take(self, line: Line) -> None:
@@ -69,7 +78,7 @@ class Actions:
         if not self._answers.begin(number):
             known = self._answers.given[number]
             if known is not None:
-                self._tell(number, *known)
+                self._tell(known)
             return
         said = partial(self._said, number)
         do = self._doers.get(what)
@@ -81,14 +90,14 @@ class Actions:
         except (Refused, ConfigError) as error:
             said(False, str(error))
 
-    def _said(self, number: str, ok: bool, text: str) -> None:
-        self._answers.end(number, ok, text)
-        self._tell(number, ok, text)
+    def _said(self, number: str, ok: bool, text: str, **more: Any) -> None:
+        answer = {"k": "done", "id": number, "ok": ok, "text": text, **more}
+        self._answers.end(number, answer)
+        self._tell(answer)
         self._world.tell_now()
 
-    def _tell(self, number: str, ok: bool, text: str) -> None:
-        now = self._world.feed.now_ms
-        self._world.tell({"k": "done", "t": now, "id": number, "ok": ok, "text": text})
+    def _tell(self, answer: Line) -> None:
+        self._world.tell({**answer, "t": self._world.feed.now_ms})
 
     # --- seats -----------------------------------------------------------------------------
 
@@ -242,6 +251,14 @@ class Actions:
         clock.pace(None if factor is None else float(factor), paused)
         now = "time stands still" if clock.paused else f"{clock.factor:g} times real time"
         said(True, now)
+
+    def _tour(self, _: str, line: Line, said: Said) -> None:
+        plan = tour_of(self._world.run, self._world.feed.numbers)
+        if plan is None:
+            raise Refused(
+                "the tour needs two robots with 3 m of free way: drive them into the open"
+            )
+        said(True, "two goals", tour=plan)
 
     def _watch(self, robots: Any) -> None:
         numbers = robots if isinstance(robots, list) else []

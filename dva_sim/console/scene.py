@@ -11,7 +11,6 @@ from shapely.geometry import mapping
 
 from dva_sim.console import link
 from dva_sim.console.lag import LIMIT
-from dva_sim.console.tour import tour_of
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures import colours
 from dva_sim.simulation.full.run import Run
@@ -49,7 +48,6 @@ def scene_of(run: Run, things: list[Line], name: str, seed: int) -> Line:
         "lag_limit_s": LIMIT,
         "rules": RULES,
         "legend": legend(run),
-        "tour": tour_of(run, things),
     }
 
 

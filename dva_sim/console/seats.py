@@ -7,6 +7,7 @@ wants must come again and again while it holds on: who falls silent is stopped.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 SILENT_AFTER = 0.3  # without a word while something is held: it is let go [s]
 MOST_SEATS = 16
@@ -76,13 +77,13 @@ class Answers:
     """What was answered to actions by their id, so that one said twice is done once.
 
     Attributes:
-        given: The answers; None while one is still to come.
+        given: The answers, as lines; None while one is still to come.
     """
 
     MOST = 1000
 
     def __init__(self) -> None:
-        self.given: dict[str, tuple[bool, str] | None] = {}
+        self.given: dict[str, dict[str, Any] | None] = {}
 
     def begin(self, number: str) -> bool:
         """Whether an action is new."""
@@ -93,6 +94,6 @@ class Answers:
             del self.given[next(iter(self.given))]
         return True
 
-    def end(self, number: str, ok: bool, text: str) -> None:
+    def end(self, number: str, answer: dict[str, Any]) -> None:
         """An action has come to its end."""
-        self.given[number] = ok, text
+        self.given[number] = answer

@@ -1,68 +1,93 @@
-"""The places of the guided tour: two robots, and for each a goal ahead on a free straight way.
+"""The places of the guided tour: two robots, and for each a goal at the end of a free straight way.
 
-One person drives both by the same input, so that both goals lie alike: as far away, and as much to
-a side. Goals straight ahead are taken before others, far ones before near ones.
+One person drives one after the other, so that both goals lie alike from where the robots stand
+now: as far away, and as much to a side. Going straight on takes as long under any pattern, turning
+to something and stopping there does not: goals behind or beside a robot come before those ahead.
 """
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
-from typing import Any
+from collections.abc import Mapping
+from itertools import pairwise, product
+from typing import Any, NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.simulation.full.run import Run
 from dva_sim.worlds.site import Site
 
-FAR, LEAST = 8.0, 4.0  # of a goal [m]
-SIDE_COSTS = 3.0  # a goal by so much nearer is as good as one a radian more to a side [m]
-RADIUS = 1.0  # of the place that counts as the goal [m]
-STEP, TURN = 0.2, math.radians(5.0)
-ROOM = 0.15  # on both sides of a robot, beside its own radius [m]
+FAR, LEAST = 5.0, 3.0  # of a goal [m]
+RADIUS = 0.6  # of the ring in which a robot has to stand [m]
+STEP, TURN = 0.2, math.radians(15.0)
+TURNED = math.radians(45.0)  # from here on a goal asks for a turn
+WIDE, NARROW = (0.45, 0.3), (0.15,)  # room on both sides of a robot, beside its own radius [m]
 BASE = 1.0  # so near where it stands, a robot has room anyway [m]
 
 
-def tour_of(run: Run, things: list[dict[str, Any]]) -> dict[str, Any] | None:
-    """Two robots and their goals; None where there are no two with a way."""
-    site, robots = run.stage.site, list(run.field.robots.values())
-    numbers = [thing["i"] for thing in things if thing["kind"] == "robot"]
-    for one, other in pairwise(range(len(robots))):
-        pair = robots[one], robots[other]
-        found = goal_of(site, pair)
-        if found is not None:
-            goals = [_ahead(robot, *found) for robot in pair]
+class Way(NamedTuple):
+    """A straight way from where a robot stands.
+
+    Attributes:
+        length: [m]
+        side: From the robot's heading to it, to the left positive [rad].
+    """
+
+    length: float
+    side: float
+
+
+def tour_of(run: Run, numbers: Mapping[str, int]) -> dict[str, Any] | None:
+    """Two robots and their goals, from where they stand now; None: no two have such a way.
+
+    Args:
+        run: In which.
+        numbers: Of the robots, by id.
+    """
+    site = run.stage.site
+    for pair in pairwise(run.field.robots.values()):
+        way = way_of(site, pair)
+        if way is not None:
+            goals = [_ahead(robot, way) for robot in pair]
             return {
-                "robots": [numbers[one], numbers[other]],
+                "robots": [numbers[robot.device.id_tag] for robot in pair],
                 "goals_m": [[round(x, 2), round(y, 2)] for x, y in goals],
                 "radius_m": RADIUS,
+                "length_m": round(way.length, 2),
+                "side_rad": round(way.side, 3),
             }
     return None
 
 
-def goal_of(site: Site, robots: tuple[RobotAgent, ...]) -> tuple[float, float] | None:
-    """How far [m] and how much to the left [rad] a goal lies that all of them can go to."""
-    best: tuple[float, float, float] | None = None
-    for number in range(round(math.pi / TURN)):
-        for side in {number * TURN, -number * TURN}:
-            way = min(_free_way(site, robot, side) for robot in robots)
-            worth = way - SIDE_COSTS * abs(side)
-            if way >= LEAST and (best is None or worth > best[0]):
-                best = worth, way, side
-    return None if best is None else best[1:]
+def way_of(site: Site, robots: tuple[RobotAgent, ...]) -> Way | None:
+    """The longest way that all of them have: with room beside it and with a turn, if it can be."""
+    for rooms, turned in product((WIDE, NARROW), (True, False)):
+        for room in rooms:
+            sides = [side for side in _sides() if (abs(side) >= TURNED) is turned]
+            ways = [
+                Way(min(_free(site, robot, side, room) for robot in robots), side) for side in sides
+            ]
+            best = max(ways, key=lambda way: way.length)
+            if best.length >= LEAST:
+                return best
+    return None
 
 
-def _ahead(robot: RobotAgent, far: float, side: float) -> tuple[float, float]:
+def _sides() -> list[float]:
+    return [number * TURN for number in range(-11, 13)]
+
+
+def _ahead(robot: RobotAgent, way: Way) -> tuple[float, float]:
     pose = robot.body.pose()
-    angle = pose.heading + side
-    return pose.x + far * math.cos(angle), pose.y + far * math.sin(angle)
+    angle = pose.heading + way.side
+    return pose.x + way.length * math.cos(angle), pose.y + way.length * math.sin(angle)
 
 
-def _free_way(site: Site, robot: RobotAgent, side: float) -> float:
-    """How far a robot gets straight on [m]."""
+def _free(site: Site, robot: RobotAgent, side: float, room: float) -> float:
+    """How far a robot gets on a straight line to a side [m]."""
     way = 0.0
     while way + STEP <= FAR + 1e-9:
-        x, y = _ahead(robot, way + STEP, side)
-        if not site.is_free(x, y, robot.body.radius + ROOM if way > BASE else 0.0):
+        x, y = _ahead(robot, Way(way + STEP, side))
+        if not site.is_free(x, y, robot.body.radius + room if way > BASE else 0.0):
             break
         way += STEP
     return way

@@ -153,7 +153,6 @@ class Scene:
             "stale_s": 1.0,
             "rules": ["A robot without a command for 3 s stops."],
             "legend": [],
-            "tour": self._tour(),
             "lag_limit_s": 0.25,
         }
 
@@ -172,11 +171,12 @@ class Scene:
             about["camera"] = {"field_of_view_deg": 70, "range_m": 12, "rate_hz": 10}
         return about
 
-    def _tour(self) -> dict[str, Any] | None:
-        if len(self.robots) < 2:
-            return None
-        goals = [[round(r.x + 2, 2), round(r.y, 2)] for r in self.robots[:2]]
-        return {"robots": [0, 1], "goals_m": goals, "radius_m": 1.0}
+    def tour(self) -> dict[str, Any]:
+        """Two goals straight ahead."""
+        two = [(r.x, r.y, r.heading) for r in self.robots[:2]]
+        goals = [[x + 2 * math.cos(angle), y + 2 * math.sin(angle)] for x, y, angle in two]
+        about = {"radius_m": 0.6, "length_m": 2.0, "side_rad": 0.0}
+        return {"robots": [0, 1], "goals_m": goals, **about}
 
     def hazards(self, t: float) -> dict[str, Any]:
         """The line `hazards` at a time [s]: a fire and its smoke, a leak and its gas."""

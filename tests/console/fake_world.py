@@ -90,6 +90,7 @@ class FakeWorld:
         self.link = dict(LINK)
         self.seats: dict[str, Seat] = {}
         self.watched: set[int] = set()
+        self.toured = False  # from then on robots that nobody drives stand
         self.done: dict[str, dict[str, Any]] = {}
         self.pictures = not options.no_pictures
         self.socket, theirs = socket.socketpair()
@@ -142,7 +143,8 @@ class FakeWorld:
         except (KeyError, ValueError, AttributeError) as error:
             ok, text = False, str(error)
         if key is not None:
-            self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text}
+            more = {"tour": self.scene.tour()} if what == "tour" else {}
+            self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text, **more}
             self.say(self.done[key])
 
     # --- actions -----------------------------------------------------------------------
@@ -151,6 +153,12 @@ class FakeWorld:
         print(f"Console: {asked['drive']}", flush=True)
         print(f"Look only: {asked['look']}", flush=True)
         self.say(self.scene.line())
+
+    def do_tour(self, asked: dict[str, Any]) -> str:
+        self.toured = True
+        for robot in self.scene.robots:
+            robot.wanted = (0.0, 0.0)
+        return "two goals"
 
     def do_watch(self, asked: dict[str, Any]) -> None:
         self.watched = set(asked["robots"])
@@ -178,7 +186,7 @@ class FakeWorld:
         seat = self.seat_of(asked)
         self.halt(seat, "free")
         for robot in seat.robots:
-            robot.wanted = None
+            robot.wanted = (0.0, 0.0) if self.toured else None
         seat.robots = []
         self.tell(seat)
 

@@ -1,5 +1,6 @@
 """Deciders and pipes of the console's world, by themselves."""
 
+import cmath
 import json
 import socket
 
@@ -9,7 +10,7 @@ from dva_sim.console.lag import GOOD_FOR, LIMIT, LagRule
 from dva_sim.console.link import changed, read
 from dva_sim.console.pipes import MOST_WAITING, LineOutbox, LinePipe
 from dva_sim.console.seats import MOST_SEATS, SILENT_AFTER, Answers, Seats
-from dva_sim.console.tour import LEAST, tour_of
+from dva_sim.console.tour import FAR, LEAST, tour_of
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.full.run import Run
@@ -56,8 +57,8 @@ def test_an_action_is_new_once_and_answers_are_forgotten_in_time():
     answers = Answers()
     assert answers.begin("1")
     assert not answers.begin("1")
-    answers.end("1", True, "done")
-    assert answers.given["1"] == (True, "done")
+    answers.end("1", {"ok": True})
+    assert answers.given["1"] == {"ok": True}
     for number in range(2, Answers.MOST + 10):
         answers.begin(str(number))
     assert len(answers.given) == Answers.MOST
@@ -146,21 +147,20 @@ def test_numbers_beyond_the_sliders_are_refused(given):
         read(given)
 
 
-def test_both_goals_of_the_tour_lie_alike_and_are_free():
-    run = Run(build(load("hands-on")), 1)
-    things = [{"i": n, "kind": "robot"} for n in range(2)]
-    tour = tour_of(run, things)
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_both_goals_of_the_tour_lie_alike_and_are_free(seed):
+    run = Run(build(load("hands-on")), seed)
+    tour = tour_of(run, dict(zip(run.field.robots, range(2), strict=True)))
     seen = []
     for robot, (x, y) in zip(run.field.robots.values(), tour["goals_m"], strict=True):
         pose = robot.body.pose()
         assert run.stage.site.is_free(x, y, robot.body.radius)
-        away = complex(x - pose.x, y - pose.y)
-        seen.append(away * complex(1, 0) / pow(2.718281828459045, 1j * pose.heading))
+        seen.append(complex(x - pose.x, y - pose.y) * cmath.exp(-1j * pose.heading))
     assert abs(seen[0] - seen[1]) < 0.05
-    assert LEAST <= abs(seen[0]) <= 8.1
-    assert abs(seen[0].imag) < 1.0
+    assert LEAST <= abs(seen[0]) <= FAR + 0.1
+    assert seen[0] == pytest.approx(cmath.rect(tour["length_m"], tour["side_rad"]), abs=0.05)
 
 
 def test_one_robot_has_no_tour():
     run = Run(build(load("drive-to-event")), 1)
-    assert tour_of(run, [{"i": 0, "kind": "robot"}]) is None
+    assert tour_of(run, dict.fromkeys(run.field.robots, 0)) is None

@@ -120,6 +120,7 @@ ACTIONS: dict[str, tuple[dict[str, Check], tuple[str, ...]]] = {
     "confirm": ({}, ()),
     "refute": ({}, ()),
     "decline": ({}, ()),
+    "tour": ({}, ()),
 }
 # Those that have no answer.
 SILENT: dict[str, tuple[dict[str, Check], tuple[str, ...]]] = {

@@ -14,12 +14,13 @@
  *
  * @typedef {{delay_s: number, jitter_s: number, loss: number, rate_bps: number | null,
  *   processing_s: number, kind?: string, trace?: string | null}} LinkSetting
- * @typedef {{robots: number[], goals_m: number[][], radius_m: number}} TourPlan
+ * @typedef {{robots: number[], goals_m: number[][], radius_m: number, length_m: number,
+ *   side_rad: number}} TourPlan
  * @typedef {{x: number, y: number, radius: number, name: string}} Goal
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, tour?: TourPlan | null}} Scene
+ *   lag_limit_s: number}} Scene
  *
  * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean}} Clock
  * @typedef {{i: number, mode: string, pattern: string, battery: number | null,
@@ -49,7 +50,7 @@
  *   drives: SeatDrive[]}} Seat
  *
  * @typedef {{client: string, role: string}} You
- * @typedef {{id: string, ok: boolean, text: string}} Done
+ * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
  */
 export {};

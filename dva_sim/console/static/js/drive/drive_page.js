@@ -6,7 +6,7 @@ import { watch } from '../net/sockets.js';
 import { LinkPanel } from '../network/link_panel.js';
 import { MapBox } from '../map/map_box.js';
 import { driven } from '../shell/route.js';
-import { tourGoals } from '../tour/tour.js';
+import { tourGoals } from '../tour/progress.js';
 import { CameraPicture } from './camera.js';
 import { Controls } from './controls.js';
 import { driveByGamepad } from './gamepad.js';

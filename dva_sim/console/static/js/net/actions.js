@@ -23,7 +23,7 @@ function newId() {
  * Ask for something; what is refused is told to the person.
  * @param {string} what
  * @param {object} [more]
- * @returns {Promise<{ok: boolean, text: string}>}
+ * @returns {Promise<import('../types.js').Done>}
  */
 export async function act(what, more = {}) {
   if (ENDS.includes(what)) forget();
@@ -38,19 +38,19 @@ export async function act(what, more = {}) {
   );
   const done = await answer;
   window.clearTimeout(timer);
-  return told(/** @type {{ok: boolean, text: string}} */ (done));
+  return told(/** @type {import('../types.js').Done} */ (done));
 }
 
-/** @param {{ok: boolean, text: string}} done */
+/** @param {import('../types.js').Done} done */
 function told(done) {
   notice.value = done.ok ? '' : done.text;
   return done;
 }
 
-/** @param {{id: string, ok: boolean, text: string}} done */
+/** @param {import('../types.js').Done} done */
 export function settle(done) {
-  waiting.get(done.id)?.(done);
-  waiting.delete(done.id);
+  waiting.get(done.id ?? '')?.(done);
+  waiting.delete(done.id ?? '');
 }
 
 /** @param {boolean} unexpected */
