@@ -78,6 +78,7 @@ class ConsoleSupervisor:
             self._say(f"{options.record} written")
 
     def _run(self, world: ConsoleWorld) -> None:
+        options = self._options
         with ending_when_asked(world.clock, supervised=False) as ending:
             web, pictures = self._start()
             serving = web.first_line()
@@ -91,6 +92,8 @@ class ConsoleSupervisor:
             world.clock.pulse(FLUSH, self._flush)
             gc.freeze()  # what stays for the whole run is not looked through again and again
             self._say(f"Console: {serving['drive']}")
+            if options.token:
+                self._say(f"Look only: {serving['look']}")
             self._open_browser(str(serving["drive"]))
             if not ending.is_asked:
                 world.clock.go()

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import urllib.error
 import urllib.request
 from contextlib import ExitStack, closing, contextmanager
 from functools import partial
@@ -186,3 +187,22 @@ def test_without_a_token_the_address_holds_none_and_lets_everybody_in(programs):
     assert "token" not in address
     with client(address) as page:
         assert page.do("take", robots=[0])[0]
+
+
+def test_a_second_address_is_for_those_who_only_look(programs, console):
+    address = address_of(console)
+    console.wait_to_say("Look only: ")
+    look = re.search(r"^Look only: (\S+)$", console.said, re.MULTILINE)[1]
+    base, _, token = look.partition("?token=")
+    headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+    assert address.partition("?token=")[0] == base
+    assert address.partition("?token=")[2] != token
+
+    seen = urllib.request.Request(f"{base}api/state", headers=headers)
+    with urllib.request.urlopen(seen) as answer:
+        assert answer.status == 200
+    acts = urllib.request.Request(f"{base}api/emergency", b'{"id": "a"}', headers)
+    with pytest.raises(urllib.error.HTTPError) as told:
+        urllib.request.urlopen(acts)
+    with told.value as refused:
+        assert refused.code == 403

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import ipaddress
+import socket
+
 import pytest
 
+from dva_sim.console.web.__main__ import own_address
 from dva_sim.console.web.access import Asked, Role, Tokens, name_in, rules
 
 TOKENS = Tokens("looks", "drives")
@@ -127,3 +131,11 @@ def test_names_in_host_headers():
     assert name_in("[::1]:80") == "::1"
     assert name_in("Lab-PC") == "lab-pc"
     assert name_in("a b") is None
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+def test_an_address_for_all_is_told_as_one_that_leads_here(host):
+    told = ipaddress.ip_address(own_address(host))
+    assert not told.is_unspecified
+    with socket.socket(socket.AF_INET if told.version == 4 else socket.AF_INET6) as here:
+        here.bind((str(told), 0))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import signal
+import socket
 import sys
 from collections.abc import Sequence
 
@@ -83,13 +85,23 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """What the simulation is told first: where this console is, and its secrets."""
-    local = "::1" if ":" in host else "127.0.0.1"
-    shown = local if access.any_address else host.strip("[]")
+    shown = own_address(host) if access.any_address else host.strip("[]")
     base = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/"
     drive, look = (
         f"{base}?token={t}" if t else base for t in (access.tokens.drive, access.tokens.look)
     )
     return {"do": "serving", "port": port, "base": base, "drive": drive, "look": look}
+
+
+def own_address(host: str) -> str:
+    """Where others find this machine, if it listens on all its addresses; else itself alone."""
+    family, far, local = socket.AF_INET, "192.0.2.1", "127.0.0.1"  # RFC 5737: nobody has it
+    if ":" in host:
+        family, far, local = socket.AF_INET6, "2001:db8::1", "::1"  # RFC 3849: likewise
+    with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as sock:
+        sock.connect((far, 9))  # of a datagram socket that sends nothing: it chooses a way
+        return str(sock.getsockname()[0])
+    return local
 
 
 if __name__ == "__main__":
