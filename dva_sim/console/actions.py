@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.seats import Answers, Seats
+from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import ConfigError
@@ -196,11 +196,12 @@ class Actions:
 
     def _gone(self, client: str) -> None:
         """The page is hidden, or its socket closed: nobody has a hand on it."""
-        self._stop_one(client, "the page is gone, or hidden")
+        self._stop_one(client, "stopped: the page was hidden, left or cut off")
 
     def _look_for_the_silent(self) -> None:
+        why = f"stopped: the page was silent for {SILENT_AFTER:g} s while it held on"
         for client in self._seats.silent(time.monotonic()):
-            self._stop_one(client, "nothing was heard of the page while it held on")
+            self._stop_one(client, why)
 
     def _stop_one(self, client: str, why: str) -> None:
         seat = self._seats.taken.get(client)
@@ -246,7 +247,7 @@ class Actions:
         if paused is not None and not isinstance(paused, bool):
             raise Refused("paused should be true or false")
         if paused:
-            self._stop_all("time stands still")
+            self._stop_all("stopped: time stands still")
         clock = self._world.clock
         clock.pace(None if factor is None else float(factor), paused)
         now = "time stands still" if clock.paused else f"{clock.factor:g} times real time"

@@ -10,7 +10,7 @@ from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.stands import why_stands
-from dva_sim.core.events import FINAL, Event
+from dva_sim.core.events import FINAL, Event, State
 from dva_sim.kernel.recorder import Moment
 from dva_sim.live.parts import Rate
 from dva_sim.simulation.full.run import Run
@@ -165,7 +165,6 @@ class Feed:
         run, where = self._run, event.position
         x, y = run.stage.site.frame.to_xy(where.latitude, where.longitude)
         detected = event.times.get("detected", 0.0)
-        since = max(event.times.values(), default=detected)
         return {
             "number": event.number,
             "kind": event.kind,
@@ -177,8 +176,8 @@ class Feed:
             "severity": next(name for least, name in SEVERITIES if event.severity >= least),
             "severity_value": round(event.severity, 2),
             "state": str(event.state),
-            "over": event.state in FINAL,
-            "since_ms": round(1000 * since),
+            "over": not event.open,
+            "since_ms": round(1000 * _since(event)),
             "reported_ms": round(1000 * detected),
             "assigned": [run.stage.labels.get(name, name) for name in _sent(event)],
         }
@@ -189,6 +188,18 @@ class Feed:
         moments, recorder.timeline = recorder.timeline, list[Moment]()
         for time, who, what, kind in moments:
             yield {"k": "story", "t": round(1000 * time), "who": who, "what": what, "kind": kind}
+
+
+_BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
+
+
+def _since(event: Event) -> float:
+    """When an event came into its state [s]."""
+    times = event.times
+    detected = times.get("detected", 0.0)
+    if event.state is State.PENDING:
+        return max(detected, event.waiting_since)
+    return times.get(_BEGINS.get(event.state, "closed"), detected)
 
 
 def _sent(event: Event) -> Iterator[str]:

@@ -82,5 +82,5 @@ class HazardFeed:
             "columns": int(cells.shape[1]),
             "rows": int(cells.shape[0]),
             "cells": base64.b64encode(cells.tobytes()).decode(),
-            "full": {"value": FULL[kind], "unit": unit},
+            "full": {"value": FULL[kind], "unit": unit.replace("m2", "m²")},
         }

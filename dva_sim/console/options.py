@@ -48,7 +48,9 @@ class ConsoleOptions:
         document, changes = load(self.scenario), parse_changes(self.changes)
         model = document.data.get("model", "full")
         if model != "full":
-            raise ConfigError(f"{self.scenario!r} has the model {model!r}, in which nobody moves")
+            raise ConfigError(
+                f"{self.scenario!r} has the model {model!r}; a console shows the model 'full' alone"
+            )
         try:
             scenario = build(document, changes)
         except ConfigError as error:

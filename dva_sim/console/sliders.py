@@ -31,11 +31,13 @@ class LinkSliders:
         return {
             "delay_s": link.delay_s,
             "jitter_s": link.jitter_s,
+            "jitter_wanted_s": self._wanted.get("jitter_s", link.jitter_s),
             "loss": link.loss,
             "rate_bps": link.rate_bps,
             "processing_s": self._wanted.get("processing_s", usual),
             "kind": "modelled",
             "trace": link.trace_up or link.trace_down or link.delay_log,
+            "rate_trace": link.trace_up or link.trace_down,
         }
 
     def change(self, given: Mapping[str, Any]) -> tuple[str, Scenario]:
@@ -56,6 +58,8 @@ class LinkSliders:
         scenario = with_link(run.scenario, self.link, self._wanted.get("processing_s"))
         run.be_patient(scenario)
         told = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
+        if self.link.jitter_s < self._wanted.get("jitter_s", 0.0):
+            told += f"; jitter is kept within the delay, at {self.link.jitter_s:g} s"
         run.recorder.tell(now, "console", f"link: {told}", "link")
         return told, scenario
 

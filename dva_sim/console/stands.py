@@ -6,6 +6,7 @@ from dva_sim.agents.robot.controller import STAND, Mode
 from dva_sim.agents.robot.robot import RobotAgent
 
 STILL = 0.02  # slower it stands [m/s, rad/s]
+HELD_BACK = 0.25  # of the speed that was asked for: what creeps in contact is held back
 LAG = "held: this machine cannot keep up with real time"
 
 
@@ -18,12 +19,14 @@ def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
         held_by_lag: Whether nobody may drive now.
     """
     body, controller, point = robot.body, robot.controller, robot.set_point
+    if body.jammed:
+        return "it is stuck against something"
+    if body.in_contact and STILL < abs(point.speed) > abs(body.speed) / HELD_BACK:
+        return "something is in its way"
     if abs(body.speed) > STILL or abs(body.turn_rate) > STILL:
         return ""
     if not body.powered:
         return "its battery is empty"
-    if body.jammed:
-        return "it is stuck against something"
     if controller.mode is Mode.TELEOPERATION:
         if point == STAND and not robot.stale:
             return "waits for the first command: its connection is being opened"
@@ -31,7 +34,7 @@ def why_stands(robot: RobotAgent, now: float, held_by_lag: bool) -> str:
             return _without_command(robot, now)
         if abs(point.speed) < STILL and abs(point.turn_rate) < STILL:
             return "it is asked to stand"
-        return "something is in its way" if body.in_contact else "it sets off, or is held back"
+        return "it sets off, or is held back"
     if held_by_lag:
         return LAG
     if controller.mode is Mode.MISSION:

@@ -256,7 +256,7 @@ class ConsoleWorld:
     def _late(self, behind: float) -> None:
         """An event comes too late: above the limit nobody drives on."""
         if self.lag.measured(time.monotonic(), behind):
-            why = f"held: {behind:.2f} s behind real time, more than a drive bears"
+            why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
             self.hold(why)
             self.recorder.tell(self.clock.now, "console", why, "link")
 

@@ -139,7 +139,7 @@ def test_a_port_that_is_taken_is_told_in_a_line(programs, console):
     ("words", "told"),
     [
         (("no-such-place",), "no-such-place"),
-        (("small-shift",), "in which nobody moves"),
+        (("small-shift",), "a console shows the model"),
         (("--set", "link.delay_s=-1"), "--set link.delay_s=-1"),
         (("--set", "robot.count=99"), "robot.count"),
         (("--record", "run.avi"), "should end in .mcap"),

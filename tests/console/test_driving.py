@@ -210,6 +210,27 @@ def test_who_loses_an_order_is_told_and_may_take_the_robot_again(monkeypatch):
     assert page.robot(order["robot"]).body.speed > 0.2
 
 
+def test_a_robot_that_pushes_against_something_says_so_while_it_creeps(driving):
+    robot = driving.robot()
+    before = robot.body.in_contact
+    for _ in range(400):  # straight on until something is in the way
+        driving.let(0.1)
+        if robot.body.in_contact and robot.body.speed < 0.05:
+            break
+    driving.let(0.6)
+    told = driving.told("rows")[-1]["robots"][0]["stands"]
+    assert not before
+    assert told in ("something is in its way", "it is stuck against something")
+
+
+def test_the_age_of_an_event_is_that_of_its_state(page):
+    page.let(20.0)
+    event = page.told("events")[-1]["events"][0]
+    assert (event["state"], event["over"]) == ("assigned", False)
+    book = page.world.run.dva.desk.book
+    assert event["since_ms"] == round(1000 * book.open[event["number"]].times["assigned"])
+
+
 def test_the_age_of_a_command_is_the_links_delay_and_no_more_than_that_by_much(driving):
     driving.do("link", delay_s=0.25)
     driving.want(0.5)

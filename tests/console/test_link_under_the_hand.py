@@ -73,8 +73,11 @@ def test_half_of_all_packets_lost_makes_frames_and_commands_rarer_and_later(driv
 
 
 def test_jitter_keeps_within_the_delay_and_comes_back_with_it(driving):
-    assert driving.do("link", jitter_s=0.2)[0]
+    done, text = driving.do("link", jitter_s=0.2)
+    assert done
+    assert "jitter is kept within the delay, at 0 s" in text
     assert driving.told("rows")[-1]["link"]["jitter_s"] == 0.0
+    assert driving.told("rows")[-1]["link"]["jitter_wanted_s"] == 0.2
     assert driving.do("link", delay_s=0.3)[0]
     assert driving.told("rows")[-1]["link"]["jitter_s"] == 0.2
     driving.let(5.0)
@@ -121,6 +124,7 @@ def test_the_rate_of_a_recorded_link_is_the_recordings(monkeypatch, tmp_path):
     assert not done
     assert text == "the recorded trace gives this link's rate"
     assert page.told("rows")[-1]["link"]["trace"] == str(trace)
+    assert page.told("rows")[-1]["link"]["rate_trace"] == str(trace)
     assert page.do("link", delay_s=0.1)[0]
 
 

@@ -116,8 +116,21 @@ def test_a_new_press_drives_again_after_an_interruption(page: Page) -> None:
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page))
         page.evaluate("window.dispatchEvent(new Event('blur'))")
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page)[-1]["held"] is True)
+
+
+def test_the_focus_goes_on_to_the_button_that_comes_next(page: Page) -> None:
+    page.get_by_role("button", name="Stop", exact=True).focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
+    page.get_by_role("button", name="Start", exact=True).focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="Start", exact=True)).to_be_disabled()
+    expect(page.get_by_role("button", name="Stop", exact=True)).to_be_focused()
 
 
 def test_the_stick_steers_while_a_pointer_holds_it(page: Page) -> None:

@@ -54,7 +54,7 @@ def test_silence_makes_the_page_look_old(fake, page: Page) -> None:
 
     page.route_web_socket("**/ws/state*", route)
     page.goto(f"{fake(*SMALL).drive}#/map")
-    expect(page.locator(".age")).to_have_text("page 0.1 s")
+    expect(page.locator(".age")).to_have_text("data 0.1 s old")
     silent.append(True)
 
     expect(page.locator(".stale")).to_be_visible()

@@ -35,7 +35,10 @@ export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
-export const maySteer = computed(() => you.value?.role === 'drive');
+/** Whether this page's address is one for driving. */
+export const mayDrive = computed(() => you.value?.role === 'drive');
+/** Whether anything can be steered now. */
+export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
 
 const robotRows = computed(
   () => new Map((rows.value?.robots ?? []).map((row) => [row.i, row])),

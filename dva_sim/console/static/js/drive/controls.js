@@ -1,6 +1,6 @@
 /** Take, start, drive, stop, release; and what the robot is doing. */
-import { html } from '../../vendor/preact.js';
-import { clock, link, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
+import { html, useEffect, useRef } from '../../vendor/preact.js';
+import { clock, connection, link, mayDrive, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
 import { act } from '../net/actions.js';
 import { DriveSliders } from './drive_sliders.js';
 import { gamepad } from './gamepad.js';
@@ -15,16 +15,17 @@ export function Controls({ robots }) {
   const drives = seat.value?.drives ?? [];
   const holds = drives.length > 0;
   const phase = seat.value?.phase ?? 'free';
+  const canStart = drives.some((drive) => drive.phase === 'held');
   const limits = {
     max_speed_mps: Math.min(...robots.map((robot) => robot.max_speed_mps || 0.5)),
     max_turn_rate_radps: Math.min(...robots.map((robot) => robot.max_turn_rate_radps || 0.52)),
   };
-  return html`<section class="panel controls" aria-label="Hands">
+  return html`<section class="panel controls" aria-label="Driving">
     <div class="statuses"><span>Mode</span><${Mode} robots=${robots} /></div>
-    <div class="buttons">
+    <div class="buttons" ref=${useNextButton(may ? NEXT[phase] : undefined)}>
       <button type="button" disabled=${!may || holds}
         onClick=${() => act('take', { robots: robots.map((robot) => robot.i) })}>Take control</button>
-      <button type="button" class=${phase === 'held' ? 'go' : ''} disabled=${!may || !holds}
+      <button type="button" class=${phase === 'held' ? 'go' : ''} disabled=${!may || !canStart}
         onClick=${() => act('start')}>Start</button>
       <button type="button" class=${phase === 'driving' ? 'go' : ''} disabled=${!may || !holds}
         onClick=${() => act('stop')}>Stop</button>
@@ -36,6 +37,29 @@ export function Controls({ robots }) {
     <p class="keys soft">Hold <kbd>↑</kbd> <kbd>←</kbd> <kbd>→</kbd> or <kbd>W</kbd> <kbd>A</kbd> <kbd>D</kbd>,
       the stick, a slider${gamepad.value ? ' or a shoulder button of the gamepad' : ''}; <kbd>Shift</kbd> slowly. Letting go stops.</p>
   </section>`;
+}
+
+/** Which button comes next, by the phase; while something is asked for, none does yet. */
+const NEXT = /** @type {Record<string, number>} */ ({ free: 0, held: 1, driving: 2 });
+
+/**
+ * Lead the focus on when the button that had it can be pressed no longer: keys alone suffice.
+ * @param {number | undefined} next
+ */
+function useNextButton(next) {
+  const box = useRef(/** @type {HTMLElement | null} */ (null));
+  const newest = useRef(/** @type {EventTarget | null} */ (null));
+  useEffect(() => {
+    const note = (/** @type {FocusEvent} */ event) => (newest.current = event.target);
+    document.addEventListener('focusin', note);
+    return () => document.removeEventListener('focusin', note);
+  }, []);
+  useEffect(() => {
+    const had = newest.current;
+    const lost = had instanceof HTMLButtonElement && had.disabled && box.current?.contains(had);
+    if (lost && next !== undefined) box.current?.querySelectorAll('button')[next].focus();
+  });
+  return box;
 }
 
 /** The modes of the robots on this page; announced when they change, and only then. */
@@ -57,16 +81,17 @@ const PHASES = /** @type {Record<string, string>} */ ({
 
 /** What to do next, or why nothing moves. @param {{holds: boolean}} props */
 function Hint({ holds }) {
-  if (!maySteer.value) return 'This address may only look. The address for driving is printed where the console was started.';
+  if (connection.value !== 'open') return 'There is no connection to the world: nothing can be driven.';
+  if (!mayDrive.value) return 'This address may only look. The address for driving is printed where the console was started.';
   if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
   if (clock.value.paused) return 'The world is paused.';
-  if (interrupted.value) return `${interrupted.value} The robot was stopped; take hold again to go on.`;
+  if (interrupted.value) return `${interrupted.value} The robot was stopped: press Start, then take hold again.`;
   if (!holds) return heldByOther() || 'Take control of the robot first.';
   const phase = seat.value?.phase ?? 'free';
   const wait = link.value ? Math.round(1000 * (link.value.delay_s + link.value.processing_s)) : 0;
   if (phase === 'starting') return `Starting: the robot answers after ${2 * wait} ms at the earliest.`;
   if (isOnItsWay()) return `Your hand is on its way: the robot hears of it after ${wait} ms at the earliest.`;
-  if (held.value && phase === 'held') return 'Press Start first: the robot does not listen yet.';
+  if (held.value && phase === 'held') return 'Let go and press Start, then take hold again: the robot does not listen yet.';
   return PHASES[phase] ?? '';
 }
 

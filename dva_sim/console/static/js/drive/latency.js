@@ -22,7 +22,7 @@ const KINDS = /** @type {{title: string, hint: string, none: string, read: (i: n
   },
   {
     title: 'Round trip',
-    none: 'no answers',
+    none: 'this pattern has no answers',
     hint: 'from a command sent to its answer',
     read: (i) => driveOf(i)?.round_trip_ms ?? null,
   },

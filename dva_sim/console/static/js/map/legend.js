@@ -1,10 +1,11 @@
 /** What the marks of the map mean. */
 import { html } from '../../vendor/preact.js';
 import { hazards } from '../store.js';
-import { ModeMark, SeverityMark, StateMark } from '../ui/icon.js';
+import { HAZARDS } from '../palette.js';
+import { ModeMark, SeverityMark, SourceMark, StateMark } from '../ui/icon.js';
 import { plain } from '../ui/words.js';
 
-const MODES = ['Idle', 'Mission', 'Teleoperation', 'Emergency'];
+const MODES = ['Idle', 'Mission', 'Teleoperation'];
 const STATES = ['pending', 'assigned', 'on scene', 'confirmed', 'contained', 'refuted',
   'escalated', 'expired']; // prettier-ignore
 
@@ -19,11 +20,16 @@ export function Legend() {
         <li><span class="dot bystander"></span>bystander</li>
         <li><span class="cone"></span>what the camera sees</li>
         <li><span class="dashes"></span>is sent there</li>
+        <li><span class="trail"></span>where it came along</li>
+        <li><span class="battery"></span>battery</li>
+        <li><span class="door"></span>door</li>
+        <li><span class="exit"></span>exit</li>
       </ul>
       <ul>
         ${['critical', 'high', 'medium', 'low'].map(
           (rank) => html`<li><${SeverityMark} severity=${rank} />event: ${rank}</li>`,
         )}
+        ${Object.keys(HAZARDS).map((kind) => html`<li><${SourceMark} kind=${kind} />source: ${plain(kind)}</li>`)}
         <li><span class="field smoke"></span>smoke</li>
         <li><span class="field gas"></span>gas</li>
         <li><span class="field water"></span>water</li>

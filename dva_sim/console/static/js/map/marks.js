@@ -45,14 +45,15 @@ export const PERSON = (() => {
 })();
 
 /** Of the kinds of hazards, by their mark in films. */
-export const SOURCES = /** @type {Record<string, Path2D>} */ ({
-  '*': path(
-    'M0 -.6L.15 -.2L.57 -.19L.24 .08L.35 .49L0 .25L-.35 .49L-.24 .08L-.57 -.19L-.15 -.2Z',
-  ),
-  v: path('M0 .5L.5 -.4H-.5Z'),
-  D: path('M0 -.5L.5 0L0 .5L-.5 0Z'),
-  X: path('M-.4 -.4L.4 .4M.4 -.4L-.4 .4'),
+export const SOURCE_SHAPES = /** @type {Record<string, string>} */ ({
+  '*': 'M0 -.6L.15 -.2L.57 -.19L.24 .08L.35 .49L0 .25L-.35 .49L-.24 .08L-.57 -.19L-.15 -.2Z',
+  v: 'M0 .5L.5 -.4H-.5Z',
+  D: 'M0 -.5L.5 0L0 .5L-.5 0Z',
+  X: 'M-.4 -.4L.4 .4M.4 -.4L-.4 .4',
 });
+export const SOURCES = Object.fromEntries(
+  Object.entries(SOURCE_SHAPES).map(([mark, shape]) => [mark, path(shape)]),
+);
 
 /** The state of an event, in a box of 24. */
 export const STATES = /** @type {Record<string, string>} */ ({

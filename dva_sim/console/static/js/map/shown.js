@@ -7,9 +7,6 @@ const RANKS = ['critical', 'high', 'medium', 'low'];
 /** @param {import('../types.js').SiteEvent} event */
 export const isOpen = (event) => !(event.over ?? CLOSED.has(event.state));
 
-/** Whether nobody has done anything about it. @param {import('../types.js').SiteEvent} event */
-export const isAlarm = (event) => event.state === 'pending' || event.state === 'escalated';
-
 /** Open ones first, then the most severe, then the oldest. */
 export function eventsInOrder() {
   return [...events.value].sort(
@@ -20,11 +17,11 @@ export function eventsInOrder() {
   );
 }
 
-/** How many alarms there are of each severity. */
+/** How many events of each severity are open. */
 export function alarms() {
   const counts = /** @type {Record<string, number>} */ ({});
   for (const rank of RANKS) counts[rank] = 0;
-  for (const event of events.value) if (isAlarm(event)) counts[event.severity] += 1;
+  for (const event of events.value) if (isOpen(event)) counts[event.severity] += 1;
   return counts;
 }
 

@@ -1,6 +1,6 @@
 /** The two sockets: one tells what is, the other carries what the person does. */
 import { effect } from '../../vendor/preact.js';
-import { connection, maySteer, you } from '../store.js';
+import { connection, mayDrive, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
 import { rememberedClient } from './client_id.js';
@@ -10,6 +10,7 @@ import { isDriveSocket, replaceDriveSocket } from './wire.js';
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 4000;
 const RESYNC_EVERY_MS = 1000;
+const LEAVING = 1001; // the server ends
 
 /** @type {WebSocket | null} */
 let state = null;
@@ -39,13 +40,17 @@ export function connect() {
     tell({ do: 'watch', robots: watched });
   };
   socket.onmessage = (event) => receive(JSON.parse(event.data));
-  socket.onclose = () => {
+  socket.onclose = (event) => {
     stopAsking();
-    if (['open', 'connecting'].includes(connection.value)) connection.value = 'lost';
+    if (event.code === LEAVING && isAlive()) connection.value = event.reason || 'it was ended';
+    else if (isAlive()) connection.value = 'lost';
     window.setTimeout(connect, wait);
     wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
   };
 }
+
+/** Whether nobody has said yet that the world has ended. */
+const isAlive = () => ['open', 'connecting', 'lost'].includes(connection.value);
 
 /** @param {any} line */
 function receive(line) {
@@ -81,7 +86,7 @@ export function watch(robots) {
 /** Open the socket for driving whenever this page may, under the name that it has got. */
 export function keepDriveSocket() {
   effect(() => {
-    const client = maySteer.value ? you.value?.client : null;
+    const client = mayDrive.value ? you.value?.client : null;
     replaceDriveSocket(client ? open(client) : null);
   });
 }

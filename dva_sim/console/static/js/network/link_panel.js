@@ -39,7 +39,7 @@ export function LinkPanel({ heading = 'The link you choose' }) {
     <${Presets} />
     <div class="knobs">
       ${KNOBS.map((knob) => html`<${LinkSlider} key=${knob.key} knob=${knob} />`)}
-      <${Bandwidth} /><${TimeFactor} />
+      <${Bandwidth} /><${TimeFactor} /><${JitterNote} />
     </div>
   </section>`;
 }
@@ -76,7 +76,14 @@ function LinkSlider({ knob }) {
     disabled=${!maySteer.value} onInput=${set} />`;
 }
 
-/** From 10 kbit/s to 1 Gbit/s, each step a share more. */
+/** Why the slider of the jitter stands lower than it was put. */
+function JitterNote() {
+  const { jitter_s: is = 0, jitter_wanted_s: wanted = 0 } = link.value ?? {};
+  const text = wanted > is + 1e-6 ? `${ms(1000 * wanted)} of jitter are wanted; it is kept within the delay.` : '';
+  return html`<p class="jitter-note soft" role="status">${text}</p>`;
+}
+
+/** From 10 kbit/s to 1 Gbit/s, each step a share more; a recorded trace gives the rate by itself. */
 function Bandwidth() {
   const [least, most] = scene.value?.link_limits?.rate_bps ?? [1e4, 1e9];
   const decades = Math.log10(most / least);
@@ -84,9 +91,11 @@ function Bandwidth() {
   const told = link.value?.rate_bps ?? most;
   const at = Math.round((EACH * Math.log10(told / least)) / decades);
   const [value, set] = useOwn(at, (step) => act('link', { rate_bps: Math.round(rateOf(step)) }));
+  const trace = link.value?.rate_trace;
+  const text = (/** @type {number} */ step) => (trace ? 'by the trace' : rateText(rateOf(step)));
   return html`<${Slider} name="Bandwidth" min=${0} max=${EACH} step=${1} value=${value}
-    text=${(/** @type {number} */ step) => rateText(rateOf(step))} hint="Of the link, in each direction"
-    disabled=${!maySteer.value} onInput=${set} />`;
+    text=${text} hint="Of the link, in each direction"
+    disabled=${!maySteer.value || Boolean(trace)} onInput=${set} />`;
 }
 
 function TimeFactor() {

@@ -37,7 +37,7 @@ function Figures() {
   const heads = ['Robot', 'Mode', 'Pattern', 'Commands', 'Waiting', 'Lost', 'Refused', 'Command age', 'Round trip'];
   const units = ['', '', '', '1/s', '', '', '', 'ms', 'ms'];
   return html`<section class="panel figures-panel" aria-label="Figures">
-    <h2>Each robot <span class="count">${rows.value?.dropped ?? 0} lines dropped on the way to this page</span></h2>
+    <h2>Each robot <span class="count">${rows.value?.dropped ?? 0} messages to the pages given up</span></h2>
     <div class="scrolls" tabindex="0" role="group" aria-label="Table, scrolls sideways"><table><thead><tr>
       ${heads.map((head, n) => html`<th scope="col">${head}${units[n] && html`<small> ${units[n]}</small>`}</th>`)}
     </tr></thead><tbody>

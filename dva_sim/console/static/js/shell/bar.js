@@ -60,12 +60,12 @@ function Age() {
   const error = roundTrip.value.error;
   const more = Number.isNaN(error) ? '' : `; to the server and back ${roundTrip.value.ms.toFixed(1)} ms, clocks ±${error.toFixed(1)} ms`;
   return html`<span class=${old ? 'item age old' : 'item age'} title=${`How old the newest word from the world is${more}`}>
-    page ${known ? secondsText(age) : '–'}</span>`;
+    data ${known ? `${secondsText(age)} old` : '–'}</span>`;
 }
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/map" title="Events that nobody has dealt with yet, by severity">
+  return html`<a class="item alarms" href="#/map" title="Open events, by severity">
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,

@@ -1,6 +1,7 @@
 /** Icons of the sprite, and the marks of severities and states: never without a word beside. */
 import { html } from '../../vendor/preact.js';
-import { STATES, stateColour } from '../map/marks.js';
+import { SOURCE_SHAPES, STATES, stateColour } from '../map/marks.js';
+import { HAZARDS } from '../palette.js';
 
 /** @param {{name: string}} props */
 export function Icon({ name }) {
@@ -21,6 +22,14 @@ export function SeverityMark({ severity, quiet = false }) {
   const look = quiet ? 'mark quiet' : `mark ${severity}`;
   return html`<svg class=${look} viewBox="0 0 24 24" aria-hidden="true" focusable="false">
     <path d=${SHAPES[severity] ?? SHAPES.low} />
+  </svg>`;
+}
+
+/** Where a hazard comes from, as on the map. @param {{kind: string}} props */
+export function SourceMark({ kind }) {
+  const look = /** @type {Record<string, {mark: string, colour: string}>} */ (HAZARDS)[kind];
+  return html`<svg class="icon source" viewBox="-.65 -.65 1.3 1.3" aria-hidden="true" focusable="false">
+    <path d=${SOURCE_SHAPES[look.mark]} fill=${look.colour} stroke="currentColor" stroke-width=".08" />
   </svg>`;
 }
 
