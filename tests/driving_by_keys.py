@@ -7,8 +7,8 @@ import time
 from typing import Any
 
 import numpy as np
-from patience import PATIENCE_S
-from playwright.sync_api import Page, expect
+from patience import PATIENCE_S, becomes
+from playwright.sync_api import Page
 
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
@@ -84,19 +84,26 @@ class Driver:
 
     def _press(self, keys: set[str], seconds: float) -> None:
         """Hold keys for a while, then see what has come of it."""
-        self._start_again()
+        self.start()
         self._hold(keys)
         self._page.wait_for_timeout(1000 * seconds)
         self._hold(set())
         self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
 
-    def _start_again(self) -> None:
-        """On a machine that does much else, robots are held now and then."""
+    def start(self) -> None:
+        """Begin to drive; on a machine that does much else, robots are held now and then."""
         mode = self._page.get_by_role("status", name="Mode")
-        if mode.inner_text() != "Teleoperation":
-            self._page.get_by_role("button", name="Start", exact=True).click()
-            expect(mode).to_have_text("Teleoperation")
-            self._page.wait_for_timeout(1000 * (2 * self._delay + 0.5))
+        button = self._page.get_by_role("button", name="Start", exact=True)
+
+        def is_driven() -> bool:
+            if mode.inner_text() == "Teleoperation":
+                return True
+            if button.is_enabled():
+                button.click()
+            self._page.wait_for_timeout(1000 * (4 * self._delay + 0.5))
+            return False
+
+        assert becomes(is_driven)
 
     def _hold(self, keys: set[str]) -> None:
         for key in self._down - keys:

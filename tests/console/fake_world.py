@@ -88,6 +88,7 @@ class FakeWorld:
         self.scene = Scene(options.site, options.robots, options.people, options.hostile)
         self.t, self.factor, self.paused = 0.0, 1.0, False
         self.link = dict(LINK)
+        self.events: Any = None  # as told last
         self.seats: dict[str, Seat] = {}
         self.watched: set[int] = set()
         self.toured = False  # from then on robots that nobody drives stand
@@ -368,7 +369,10 @@ class FakeWorld:
         if ticks % 50 == 2:
             self.say(self.scene.hazards(self.t) | {"t": self.ms})
         if ticks % 100 == 3:
-            self.say(self.scene.events(self.t) | {"t": self.ms})
+            events = self.scene.events(self.t)
+            if events != self.events:  # the real world tells of them when they change, too
+                self.events = events
+                self.say(events | {"t": self.ms})
             who = self.scene.all[ticks % len(self.scene.all)].label
             self.say({"k": "story", "who": who, "what": "looks around", "kind": "event"})
         for seat in self.seats.values():

@@ -75,6 +75,21 @@ def test_events_tell_state_age_and_who_is_sent(fake, visit) -> None:
     expect(page.get_by_role("complementary")).to_contain_text("min ago")
 
 
+def test_the_age_of_an_event_goes_on_while_nothing_is_told_of_it(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    event = page.get_by_role("region", name="Events").get_by_role("button").first
+    ages: dict[str, set[int]] = {}  # by state: a new one would be told
+
+    def goes_on() -> bool:
+        state, age = event.locator(".state").inner_text().split()[:2]
+        minutes, seconds = map(int, age.split(":"))
+        seen = ages.setdefault(state, set())
+        seen.add(60 * minutes + seconds)
+        return any({n, n + 1, n + 2} <= seen for n in seen)
+
+    assert becomes(goes_on)
+
+
 def test_the_legend_tells_what_the_fullest_tint_means(fake, visit) -> None:
     page = visit.open(fake(*SMALL).drive)
     page.get_by_text("Legend").click()

@@ -32,14 +32,16 @@ function Events() {
   return html`<section aria-label="Events">
     <h2>Events <span class="count">${open} open of ${list.length}</span></h2>
     ${list.length === 0 && html`<p class="none">Nothing has been reported.</p>`}
-    <ul class="rows">${list.map((event) => html`<${EventRow} key=${event.number} event=${event} />`)}</ul>
+    <ul class="rows">${list.map((event) => html`<${EventRow} key=${event.number} event=${event} age=${ageOf(event)} />`)}</ul>
   </section>`;
 }
 
-/** @param {{event: SiteEvent}} props */
-function EventRow({ event }) {
+/** @param {SiteEvent} event */
+const ageOf = (event) => (isOpen(event) ? ageText(worldNow() - event.since_ms) : '');
+
+/** @param {{event: SiteEvent, age: string}} props a row is drawn anew when one of them changes */
+function EventRow({ event, age }) {
   const open = isOpen(event);
-  const age = open ? ageText(worldNow() - event.since_ms) : '';
   return html`<li><button type="button" class=${open ? 'row' : 'row over'}
     aria-pressed=${isChosen('event', event.number)}
     onClick=${() => choose({ kind: 'event', key: event.number })}>
