@@ -23,7 +23,7 @@ from dva_sim.console.web.phones import NoCertificate
 AUTHORITY, LEAF = "authority.pem", "console.pem"
 
 
-class Kept(NamedTuple):
+class KeptCertificates(NamedTuple):
     """What is served with.
 
     Attributes:
@@ -49,7 +49,7 @@ def data_folder() -> Path:
     return home / ".local" / "share" / "dva-sim"
 
 
-def certificates(folder: Path, hosts: Hosts, now: datetime | None = None) -> Kept:
+def certificates(folder: Path, hosts: Hosts, now: datetime | None = None) -> KeptCertificates:
     """Authority and certificate for these hosts: those that are kept, or new ones.
 
     Args:
@@ -79,7 +79,7 @@ def certificates(folder: Path, hosts: Hosts, now: datetime | None = None) -> Kep
         raise NoCertificate(
             f"no certificate can be kept in {folder}: {error.strerror or error}"
         ) from error
-    return Kept(authority, folder / LEAF, tuple(told))
+    return KeptCertificates(authority, folder / LEAF, tuple(told))
 
 
 def _private(folder: Path) -> None:
