@@ -77,6 +77,7 @@ class Served:
         self.serving = self.next_asked("serving")
         self.port: int = self.serving["port"]
         self.drive, self.look = (_token(self.serving[role]) for role in ("drive", "look"))
+        self.phone = _token(self.serving["phone"] or "")
         if begins:
             self.say(scene())
 

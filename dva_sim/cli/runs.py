@@ -143,6 +143,15 @@ def console(
     host: Annotated[
         str, Option(metavar="HOST", help="Address of this machine to listen on.")
     ] = "127.0.0.1",
+    phones: Annotated[
+        bool, Option("--phones", help="An address for phones, by https, with a QR code.")
+    ] = False,
+    phones_host: Annotated[
+        str, Option(metavar="HOST", help="Address of this machine to listen on for phones.")
+    ] = "0.0.0.0",
+    phones_port: Annotated[
+        int, count("Port for phones; 0: any that is free.", metavar="PORT", most=65_535)
+    ] = 8766,
     no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
     no_token: Annotated[
         bool, Option("--no-token", help="Let everybody in who reaches the page.")
@@ -160,6 +169,7 @@ def console(
         dva-sim console  # two robots, two guards, a fire and a leak
         dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
+        dva-sim console --phones  # prints an address to be scanned by a phone
     """
     from dva_sim.console.options import ConsoleOptions  # late: start-up
     from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
@@ -173,6 +183,9 @@ def console(
         host=host,
         port=port,
         token=not no_token,
+        phones=phones,
+        phones_host=phones_host,
+        phones_port=phones_port,
         open=not no_open,
         record=record,
         overwrite=overwrite,

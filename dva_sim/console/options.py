@@ -10,7 +10,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.writing import check_target
 from dva_sim.simulation.scenario import Scenario, build, load
 
-DEFAULT, DEFAULT_PORT = "hands-on", 8765
+DEFAULT, DEFAULT_PORT, PHONES_PORT = "hands-on", 8765, 8766
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +24,9 @@ class ConsoleOptions:
         host: Address to listen on.
         port: 0: any that is free.
         token: Whether the address has to hold a secret.
+        phones: Whether phones have an address of their own, by https.
+        phones_host: Address to listen on for them.
+        phones_port: 0: any that is free.
         open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
         overwrite: What is there may be replaced.
@@ -35,6 +38,9 @@ class ConsoleOptions:
     host: str = "127.0.0.1"
     port: int = DEFAULT_PORT
     token: bool = True
+    phones: bool = False
+    phones_host: str = "0.0.0.0"
+    phones_port: int = PHONES_PORT
     open: bool = True
     record: Path | None = None
     overwrite: bool = False

@@ -8,8 +8,9 @@ import socket
 import sys
 import time
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from typing import Any
 
 from dva_sim.console.actions import Actions
 from dva_sim.console.children import END_WITHIN, Child, ChildFailed
@@ -94,6 +95,7 @@ class ConsoleSupervisor:
             self._say(f"Console: {serving['drive']}")
             if options.token:
                 self._say(f"Look only: {serving['look']}")
+            self._say_of_phones(serving)
             self._open_browser(str(serving["drive"]))
             if not ending.is_asked:
                 world.clock.go()
@@ -106,6 +108,9 @@ class ConsoleSupervisor:
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += [] if options.token else ["--no-token"]
+        if options.phones:
+            words += ["--phones-host", options.phones_host]
+            words += ["--phones-port", str(options.phones_port)]
         web = Child("web process", WEB, words, [ours])
         self._children.append(web)
         ours.close()
@@ -171,6 +176,19 @@ class ConsoleSupervisor:
         deadline = time.monotonic() + END_WITHIN
         for child in self._children:
             child.make_sure(deadline)
+
+    def _say_of_phones(self, serving: Mapping[str, Any]) -> None:
+        """Their address, also for a camera; and what people should know of it."""
+        for told in serving["told"]:
+            self._say(told)
+        if address := serving["phone"]:
+            from dva_sim.console.qr_code import half_blocks  # late: start-up
+
+            self._say(f"Phone: {address}")
+            if (sys.stdout.encoding or "").lower().replace("-", "") == "utf8":
+                self._say(half_blocks(address, sys.stdout.isatty()))
+            trust = address.partition("?")[0].removesuffix("phone")
+            self._say(f"A phone has to trust this machine once: {trust}trust says how.")
 
     def _open_browser(self, address: str) -> None:
         """Where there is one; never where nobody could see it."""

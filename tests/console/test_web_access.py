@@ -7,8 +7,8 @@ import socket
 
 import pytest
 
-from dva_sim.console.web.__main__ import own_address
 from dva_sim.console.web.access import Asked, Role, Tokens, name_in, rules
+from dva_sim.console.web.addresses import own_address
 
 TOKENS = Tokens("looks", "drives")
 HERE = rules("127.0.0.1", 8123, tokens=TOKENS)

@@ -6,8 +6,18 @@ import json
 
 import pytest
 
-from dva_sim.console.web.actions import ACTIONS, BadMessage, Bucket, asked_of, id_of, read
-from dva_sim.console.web.outbox import MOST, OutgoingLines
+from dva_sim.console.web.access import Role
+from dva_sim.console.web.actions import (
+    ACTIONS,
+    NOT_BY_PHONE,
+    Bucket,
+    asked_of,
+    check_role,
+    id_of,
+    read,
+)
+from dva_sim.console.web.checks import BadMessage
+from dva_sim.console.web.outbox import MOST, MOST_BATCHES, OutgoingLines
 from dva_sim.console.web.pipes import Lines
 
 LABELS = {"robot-1": 0, "robot-2": 3}
@@ -138,3 +148,101 @@ def test_lines_come_whole_out_of_any_pieces():
         found += lines.feed(bytes([byte]))
     assert found == [b'{"a":1}', b'{"b":2}', b""]
     assert lines.feed(b":3}\n") == [b'{"c":3}']
+
+
+REGISTER = {"server": "127.0.0.1", "port": 5600, "label": "my phone", "type": "Robot"}
+CALIBRATE = {
+    "reference_mps2": [0.0, 6.9, 6.9],
+    "speed_step_mps2": 0.35,
+    "turn_step_mps2": 0.12,
+    "max_delay_s": 0.5,
+    "pipeline": "default",
+    "filter": None,
+    "mapping": "absolute",
+}
+SAMPLES = {"n": 4, "at": [1.0, 2.5], "xyz": [[0, 1, 2], [0, 1, 2]], "hand": True, "orientation": 0}
+REPORT = {"kind": "fire", "x_m": 1.0, "y_m": 2.0, "severity": "high"}
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("phone_register", REGISTER),
+        ("phone_devices", {}),
+        ("phone_permission", {"device": "02:00:00:01:00:01", "level": "both"}),
+        ("phone_calibrate", CALIBRATE),
+        ("phone_calibrate", CALIBRATE | {"reference_mps2": None, "ios": True}),
+        ("samples", SAMPLES),
+        ("guard_join", {"guard": "guard-1"}),
+        ("guard_answer", {"accept": False, "reason": "I am hurt"}),
+        ("guard_say", {"what": "contained"}),
+        ("guard_place", {"x_m": -3.5, "y_m": 2}),
+        ("guard_report", REPORT),
+    ],
+)
+def test_what_phones_and_guards_ask_for_is_known(name, given):
+    assert asked_of(name, given, LABELS, silent=True) == {"do": name, **given}
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "word"),
+    [
+        ("phone_register", REGISTER | {"server": "x" * 65}, "server should be a text"),
+        ("phone_register", REGISTER | {"port": 0}, "port should be a whole number"),
+        ("phone_register", REGISTER | {"label": ""}, "label should be a text"),
+        ("phone_register", REGISTER | {"label": "a\nb"}, "in one line"),
+        ("phone_register", REGISTER | {"type": "Guard"}, "type should be one of"),
+        ("phone_permission", {"device": "a b", "level": "both"}, "device should be a name"),
+        ("phone_permission", {"device": "a", "level": "all"}, "level should be one of"),
+        ("phone_calibrate", CALIBRATE | {"reference_mps2": [0, 1]}, "list of 3 to 3"),
+        ("phone_calibrate", CALIBRATE | {"reference_mps2": [0, 1, float("nan")]}, "a number"),
+        ("phone_calibrate", CALIBRATE | {"speed_step_mps2": 0}, "speed_step_mps2 should be"),
+        ("phone_calibrate", CALIBRATE | {"max_delay_s": 5.1}, "max_delay_s should be"),
+        ("phone_calibrate", CALIBRATE | {"mapping": "wild"}, "mapping should be one of"),
+        ("samples", SAMPLES | {"at": [2.5, 1.0]}, "at should rise"),
+        ("samples", SAMPLES | {"at": [1.0]}, "equally long"),
+        ("samples", SAMPLES | {"at": [1.0] * 65}, "list of 1 to 64"),
+        ("samples", SAMPLES | {"xyz": [[0, 1, 2], [0, 1, None]]}, "should be a number"),
+        ("samples", SAMPLES | {"orientation": 45}, "orientation should be one of"),
+        ("samples", SAMPLES | {"orientation": False}, "orientation should be one of"),
+        ("guard_answer", {"accept": True, "reason": "x" * 201}, "reason should be a text"),
+        ("guard_say", {"what": "gone home"}, "what should be one of"),
+        ("guard_place", {"x_m": 1e9, "y_m": 0}, "x_m should be a number"),
+        ("guard_report", REPORT | {"kind": "war"}, "kind should be one of"),
+    ],
+)
+def test_what_of_it_makes_no_sense_is_refused_in_one_line(name, given, word):
+    with pytest.raises(BadMessage, match=word) as error:
+        asked_of(name, given, LABELS, silent=True)
+    assert "\n" not in str(error.value)
+
+
+def test_samples_wait_in_their_order_and_the_oldest_of_too_many_are_lost():
+    lines = OutgoingLines()
+    for n in range(MOST_BATCHES + 3):
+        lines.put({"do": "samples", "client": "c1", "n": n})
+    lines.put({"do": "samples", "client": "c2", "n": 70})
+    lines.put({"do": "stop", "client": "c1"})
+    found = [(line["do"], line["client"], line.get("n")) for line in waiting(lines)]
+    assert found[:3] == [("stop", "c1", None), ("samples", "c1", 3), ("samples", "c2", 70)]
+    assert [n for what, client, n in found if client == "c1" and what == "samples"] == [
+        *range(3, MOST_BATCHES + 3)
+    ]
+
+
+def test_samples_of_a_page_that_is_gone_are_forgotten():
+    lines = OutgoingLines()
+    lines.put({"do": "samples", "client": "c1", "n": 1})
+    lines.put({"do": "gone", "client": "c1"})
+    assert [line["do"] for line in waiting(lines)] == ["gone"]
+
+
+def test_a_phone_may_do_what_a_phone_does_and_who_looks_nothing():
+    for name in ("start", "stop", "emergency", "samples", "guard_say", "phone_register"):
+        check_role(Role.PHONE, name)
+        with pytest.raises(BadMessage, match="only look"):
+            check_role(Role.LOOK, name)
+    for name in NOT_BY_PHONE:
+        check_role(Role.DRIVE, name)
+        with pytest.raises(BadMessage, match="may not"):
+            check_role(Role.PHONE, name)

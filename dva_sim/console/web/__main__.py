@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import contextlib
 import signal
-import socket
 import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dva_sim.console.web.access import Entrance, Tokens, rules
+from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
 from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.phones import NoCertificate
 from dva_sim.console.web.server import listen, make_server, serve
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.kernel.errors import DvaSimError
+
+if TYPE_CHECKING:
+    from dva_sim.console.web.phone_listener import PhoneListener
 
 FAREWELL = 0.2  # for last words on their way [s]
 
@@ -39,6 +44,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--pictures-fd", type=int, help="socket to who draws pictures")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
     parser.add_argument("--port", type=int, default=0, help="0 for any that is free")
+    parser.add_argument("--phones-host", default="0.0.0.0", help="address for phones")
+    parser.add_argument("--phones-port", type=int, help="https for phones; 0 for any; else none")
+    parser.add_argument("--certificates", type=Path, help="folder of those for phones")
     parser.add_argument("--name", action="append", default=[], help="another name of this machine")
     parser.add_argument("--no-token", action="store_true", help="everybody may drive")
     return parser
@@ -52,6 +60,7 @@ async def run(options: argparse.Namespace) -> None:
     port = sock.getsockname()[1]
     tokens = Tokens() if options.no_token else Tokens.drawn()
     access = rules(options.host, port, options.name, tokens)
+    phones, told = _phones(options, tokens)
     simulation = Simulation()
     hub = Hub(simulation)
     cameras = CameraStreams(simulation, hub.clients.watched)
@@ -59,15 +68,38 @@ async def run(options: argparse.Namespace) -> None:
     ended = simulation.ended
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     await simulation.open(options.fd)
-    simulation.send(serving(access, options.host, port))
+    door = phones.door if phones else None
+    about = {"phone": door.address if door else None, "told": told}
+    simulation.send(serving(access, options.host, port) | about)
     if options.pictures_fd is not None:
         await cameras.open(options.pictures_fd)
     telling = asyncio.ensure_future(cameras.keep_telling())
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
-    app = make_app(access, hub, cameras, StaticFiles())
-    await serve(make_server(app), sock, _after(closing))
+    files, over = StaticFiles(), _after(closing)
+    serves = [serve(make_server(make_app(access, hub, cameras, files, door)), sock, over)]
+    if phones:
+        app = make_app(phones.access, hub, cameras, files, door)
+        serves.append(serve(make_server(app, phones.certificate), phones.sock, over))
+    await asyncio.gather(*serves)
     telling.cancel()
     simulation.close()
+
+
+def _phones(options: argparse.Namespace, tokens: Tokens) -> tuple[PhoneListener | None, list[str]]:
+    """The listener for phones, and what people should know of it.
+
+    Without a certificate all else goes on.
+    """
+    if options.phones_port is None:
+        return None, []
+    from dva_sim.console.web.phone_listener import listen_for_phones  # late: start-up
+
+    where = options.phones_host, options.phones_port
+    try:
+        listener = listen_for_phones(*where, options.name, tokens, options.certificates)
+    except NoCertificate as error:
+        return None, [f"no address for phones: {error}"]
+    return listener, list(listener.told)
 
 
 async def _close_when(ended: asyncio.Event, hub: Hub, cameras: CameraStreams) -> None:
@@ -85,23 +117,11 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """What the simulation is told first: where this console is, and its secrets."""
-    shown = own_address(host) if access.any_address else host.strip("[]")
-    base = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/"
+    base = address_of(own_address(host) if access.any_address else host.strip("[]"), port)
     drive, look = (
         f"{base}?token={t}" if t else base for t in (access.tokens.drive, access.tokens.look)
     )
     return {"do": "serving", "port": port, "base": base, "drive": drive, "look": look}
-
-
-def own_address(host: str) -> str:
-    """Where others find this machine, if it listens on all its addresses; else itself alone."""
-    family, far, local = socket.AF_INET, "192.0.2.1", "127.0.0.1"  # RFC 5737: nobody has it
-    if ":" in host:
-        family, far, local = socket.AF_INET6, "2001:db8::1", "::1"  # RFC 3849: likewise
-    with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as sock:
-        sock.connect((far, 9))  # of a datagram socket that sends nothing: it chooses a way
-        return str(sock.getsockname()[0])
-    return local
 
 
 if __name__ == "__main__":

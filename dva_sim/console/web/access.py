@@ -24,29 +24,40 @@ _HOST = re.compile(
 
 
 class Role(IntEnum):
-    """What a client may do; who may drive may look, too."""
+    """What a client may do; each may do what those before it may.
+
+    A phone drives its own robot, or is a guard's; whoever may drive changes the link, too.
+    """
 
     NOBODY = 0
     LOOK = 1
-    DRIVE = 2
+    PHONE = 2
+    DRIVE = 3
+
+    @property
+    def acts(self) -> bool:
+        """Whether it may do anything but look."""
+        return self >= Role.PHONE
 
 
 @dataclass(frozen=True)
 class Tokens:
-    """The secrets of the two roles; none of them where everybody may drive.
+    """The secrets of the roles; none of them where everybody may drive.
 
     Attributes:
         look: Opens pages and pictures.
         drive: Lets robots move, too.
+        phone: For phones: what a phone may, and no more.
     """
 
     look: str = ""
     drive: str = ""
+    phone: str = ""
 
     @classmethod
     def drawn(cls) -> Tokens:
         """New ones, of 192 random bits each."""
-        return cls(secrets.token_urlsafe(24), secrets.token_urlsafe(24))
+        return cls(*(secrets.token_urlsafe(24) for _ in range(3)))
 
     @property
     def are_asked(self) -> bool:
@@ -58,9 +69,16 @@ class Tokens:
         if not self.are_asked:
             return Role.DRIVE
         given = shown.encode("utf-8", "replace")
-        drives = hmac.compare_digest(given, self.drive.encode())
-        looks = hmac.compare_digest(given, self.look.encode())
-        return Role.DRIVE if drives else Role.LOOK if looks else Role.NOBODY
+        fits = [
+            role
+            for role in (Role.DRIVE, Role.PHONE, Role.LOOK)
+            if hmac.compare_digest(given, self.of(role).encode()) and given
+        ]
+        return fits[0] if fits else Role.NOBODY
+
+    def of(self, role: Role) -> str:
+        """The token of a role."""
+        return {Role.DRIVE: self.drive, Role.PHONE: self.phone}.get(role, self.look)
 
 
 @dataclass(frozen=True)
@@ -96,12 +114,14 @@ class Entrance:
         names: Under which it is served, in lower case.
         any_address: Whether it is served on all addresses of the machine: then each IP address
             may be asked for. An address cannot be made to lead elsewhere, as a name can.
+        secure: Whether it is served over https: then its cookie goes nowhere else.
     """
 
     tokens: Tokens
     cookie: str
     names: Collection[str] = field(default=LOCAL)
     any_address: bool = False
+    secure: bool = False
 
     def refusal(self, asked: Asked) -> tuple[int, str] | None:
         """Status and reason why a request is not answered, whoever asks; None if it may be."""
@@ -145,12 +165,17 @@ class Entrance:
 
     def cookie_for(self, role: Role) -> str:
         """The header that gives a browser its role."""
-        token = self.tokens.drive if role is Role.DRIVE else self.tokens.look
-        return f"{self.cookie}={token}; HttpOnly; SameSite=Strict; Path=/"
+        secure = "; Secure" if self.secure else ""
+        return f"{self.cookie}={self.tokens.of(role)}; HttpOnly; SameSite=Strict; Path=/{secure}"
 
 
 def rules(
-    host: str, port: int, names: Collection[str] = (), tokens: Tokens | None = None
+    host: str,
+    port: int,
+    names: Collection[str] = (),
+    tokens: Tokens | None = None,
+    *,
+    secure: bool = False,
 ) -> Entrance:
     """The rules of a console that listens on an address.
 
@@ -159,6 +184,7 @@ def rules(
         port: Where.
         names: More names under which it is asked for.
         tokens: New ones are drawn if there are none.
+        secure: Whether it listens by https.
     """
     known = {name.lower().strip("[]") for name in (*names, host)}
     everywhere = is_address(host) and ipaddress.ip_address(host.strip("[]")).is_unspecified
@@ -167,7 +193,8 @@ def rules(
         known.update(LOCAL)
     if everywhere:
         known.add(socket.gethostname().lower())
-    return Entrance(tokens or Tokens.drawn(), f"dva_sim_{port}", frozenset(known), everywhere)
+    cookie = f"dva_sim_{port}"
+    return Entrance(tokens or Tokens.drawn(), cookie, frozenset(known), everywhere, secure)
 
 
 def name_in(host: str) -> str | None:

@@ -1,24 +1,36 @@
-"""What clients may ask for, read with suspicion: known words, numbers in range, nothing else."""
+"""What clients may ask for, read with suspicion: known actions, and who may ask for them."""
 
 from __future__ import annotations
 
 import json
-import math
 import re
-from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Any
 
+from dva_sim.console.web.access import Role
+from dva_sim.console.web.checks import (
+    BadMessage,
+    Check,
+    Labels,
+    flag,
+    maybe,
+    number,
+    one_of,
+    robot,
+    robots,
+    robots_or_all,
+    several,
+    text,
+    whole,
+    word,
+)
+
 MOST_BYTES = 16 * 1024  # of a message or a body
-MOST_ROBOTS = 64  # in one request
+MOST_SAMPLES = 64  # in one message
+FAR = 1e6  # of the origin: no site is so large [m]
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,64}")
-_NAME = re.compile(r"[A-Za-z0-9_.:/-]{1,200}")
 
-Labels = Mapping[str, int]
-Check = Callable[[Any, Labels], Any]
-
-
-class BadMessage(ValueError):
-    """What was asked for makes no sense; the message is one line for whoever asked."""
+Known = dict[str, tuple[dict[str, Check], tuple[str, ...]]]
 
 
 def read(text: str | bytes) -> dict[str, Any]:
@@ -40,65 +52,6 @@ def _no_number(word: str) -> float:
     raise ValueError(word)
 
 
-def number(low: float, high: float) -> Check:
-    """A number within limits."""
-
-    def check(value: Any, _: Labels) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise BadMessage(f"should be a number from {low:g} to {high:g}")
-        if not low <= value <= high or not math.isfinite(value):
-            raise BadMessage(f"should be a number from {low:g} to {high:g}")
-        return value
-
-    return check
-
-
-def whole(low: int, high: int) -> Check:
-    """A whole number within limits."""
-
-    def check(value: Any, _: Labels) -> int:
-        if type(value) is not int or not low <= value <= high:
-            raise BadMessage(f"should be a whole number from {low} to {high}")
-        return value
-
-    return check
-
-
-def flag(value: Any, _: Labels) -> bool:
-    """Yes or no."""
-    if not isinstance(value, bool):
-        raise BadMessage("should be true or false")
-    return value
-
-
-def word(value: Any, _: Labels) -> str:
-    """A name."""
-    if not isinstance(value, str) or not _NAME.fullmatch(value):
-        raise BadMessage("should be a name")
-    return value
-
-
-def robot(value: Any, labels: Labels) -> int:
-    """A robot, by its index in the scene or by its label."""
-    if isinstance(value, str) and value in labels:
-        return labels[value]
-    if type(value) is int and value in labels.values():
-        return value
-    raise BadMessage("should be a robot of this run")
-
-
-def robots(value: Any, labels: Labels) -> list[int]:
-    """Some robots."""
-    if not isinstance(value, list) or len(value) > MOST_ROBOTS:
-        raise BadMessage("should be a list of robots")
-    return list(dict.fromkeys(robot(one, labels) for one in value))
-
-
-def robots_or_all(value: Any, labels: Labels) -> list[int] | str:
-    """Some robots, or `all`."""
-    return "all" if value == "all" else robots(value, labels)
-
-
 _LINK = {
     "delay_s": number(0, 60),
     "jitter_s": number(0, 60),
@@ -107,8 +60,42 @@ _LINK = {
     "processing_s": number(0, 60),
 }
 
+_AXES = several(number(-1000, 1000), 3, 3)  # of an acceleration [m/s^2]
+_PLACE = {"x_m": number(-FAR, FAR), "y_m": number(-FAR, FAR)}
+_LABEL = text(1, 64)
+_REGISTER = {
+    "server": text(1, 64),
+    "port": whole(1, 65_535),
+    "label": _LABEL,
+    "type": one_of("Robot", "Remote Control", "Teleoperation"),
+}
+_PERMISSION = {"device": word, "level": one_of("teleoperation", "missions", "both")}
+_CALIBRATE = {
+    "reference_mps2": maybe(_AXES),
+    "speed_step_mps2": number(0.001, 100),
+    "turn_step_mps2": number(0.001, 100),
+    "max_delay_s": number(0.02, 5),
+    "pipeline": one_of("dissertation", "default"),
+    "filter": maybe(word),
+    "mapping": one_of("absolute", "differential", "leaky"),
+    "ios": flag,
+}
+_SAMPLES = {
+    "n": whole(0, 2**53),
+    "at": several(number(0, 1e13), 1, MOST_SAMPLES),
+    "xyz": several(_AXES, 1, MOST_SAMPLES),
+    "hand": flag,
+    "orientation": one_of(0, 90, 180, 270),
+}
+_REPORT = {
+    "kind": one_of("fire", "gas_leak", "flood"),
+    "severity": one_of("low", "medium", "high", "critical"),
+    **_PLACE,
+}
+_SAYINGS = ("departed", "arrived", "confirmed", "refuted", "contained", "help")
+
 # What may be asked: its arguments, and those of them that have to be there.
-ACTIONS: dict[str, tuple[dict[str, Check], tuple[str, ...]]] = {
+ACTIONS: Known = {
     "take": ({"robots": robots}, ("robots",)),
     "release": ({}, ()),
     "start": ({}, ()),
@@ -121,9 +108,19 @@ ACTIONS: dict[str, tuple[dict[str, Check], tuple[str, ...]]] = {
     "refute": ({}, ()),
     "decline": ({}, ()),
     "tour": ({}, ()),
+    "phone_register": (_REGISTER, tuple(_REGISTER)),
+    "phone_devices": ({}, ()),
+    "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
+    "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key != "ios")),
+    "guard_join": ({"guard": _LABEL}, ("guard",)),
+    "guard_leave": ({}, ()),
+    "guard_answer": ({"accept": flag, "reason": text(0, 200)}, ("accept", "reason")),
+    "guard_say": ({"what": one_of(*_SAYINGS)}, ("what",)),
+    "guard_place": (_PLACE, tuple(_PLACE)),
+    "guard_report": (_REPORT, tuple(_REPORT)),
 }
 # Those that have no answer.
-SILENT: dict[str, tuple[dict[str, Check], tuple[str, ...]]] = {
+SILENT: Known = {
     "input": (
         {
             "n": whole(0, 2**53),
@@ -133,8 +130,23 @@ SILENT: dict[str, tuple[dict[str, Check], tuple[str, ...]]] = {
         },
         ("n", "speed", "turn", "held"),
     ),
+    "samples": (_SAMPLES, tuple(_SAMPLES)),
     "gone": ({}, ()),
 }
+# A phone changes nothing for others, but that it stops a robot.
+NOT_BY_PHONE = ("take", "link", "pattern", "pace", "tour")
+
+
+def check_role(role: Role, name: Any) -> None:
+    """Whether somebody may ask for an action at all.
+
+    Raises:
+        BadMessage: not by this address.
+    """
+    if not role.acts:
+        raise BadMessage("this address may only look")
+    if role is Role.PHONE and name in NOT_BY_PHONE:
+        raise BadMessage(f"a phone's address may not {name}; the address for driving may")
 
 
 def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dict[str, Any]:
@@ -166,9 +178,24 @@ def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dic
             asked[key] = checks[key](value, labels)
         except BadMessage as error:
             raise BadMessage(f"{name}: {key} {error}") from None
+    if name == "samples":
+        _check_times(asked)
     if name == "emergency":
         asked.setdefault("robots", "all")
     return asked
+
+
+def _check_times(asked: dict[str, Any]) -> None:
+    """A time for each sample, and each later than the one before.
+
+    Raises:
+        BadMessage: it is otherwise.
+    """
+    at = asked["at"]
+    if len(at) != len(asked["xyz"]):
+        raise BadMessage("samples: at and xyz should be equally long")
+    if any(later <= one for one, later in pairwise(at)):
+        raise BadMessage("samples: at should rise")
 
 
 def id_of(value: Any) -> str:

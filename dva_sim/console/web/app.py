@@ -21,7 +21,8 @@ from starlette.websockets import WebSocket
 from dva_sim.console.web.access import Asked, Entrance, Role
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
-from dva_sim.console.web.rest import NOT_KEPT, Rest, TooStrange, problem
+from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
+from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.web.streaming import PictureStream
 
@@ -39,12 +40,14 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 OPEN = "/healthz"
-_ROLE = "dva_sim.role"
+# Pages that people open, each with the file that is shown.
+PAGES = {"/": "index.html", "/phone": "phone.html", "/guard": "guard.html"}
 _WORDS = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>dva-sim console</title></head>
 <body><h1>This console asks for its token</h1>
 <p>Open the address that <code>dva-sim console</code> printed on the line that begins with
-<code>Console:</code>. It ends with <code>?token=</code> and the token.</p>
+<code>Console:</code>, or scan the code below the line that begins with <code>Phone:</code>.
+The address ends with <code>?token=</code> and the token.</p>
 <p>If you have just done so: <a href="/">go on</a>.</p></body></html>
 """
 _NO_PAGE = "<!doctype html><title>dva-sim console</title><p>The pages are not installed.</p>"
@@ -88,8 +91,8 @@ class Doorkeeper:
         told = self._access.refusal(_asked(scope, headers))
         if told is not None:
             return PlainTextResponse(told[1] + "\n", told[0], headers=NOT_KEPT)
-        scope[_ROLE] = role = self._access.role(headers, asking.query_params)
-        if role is Role.NOBODY and scope["path"] != OPEN:
+        scope[ROLE] = role = self._access.role(headers, asking.query_params)
+        if role is Role.NOBODY and scope["path"] not in (OPEN, *UNGUARDED):
             return _unknown(scope["path"])
         return None
 
@@ -113,12 +116,12 @@ def _asked(scope: Scope, headers: Any) -> Asked:
         mode=headers.get("sec-fetch-mode", "").lower(),
         scheme="https" if scope.get("scheme") in ("https", "wss") else "http",
         changes=not is_http or scope["method"] not in ("GET", "HEAD"),
-        is_page=scope["path"] == "/",
+        is_page=scope["path"] in PAGES or scope["path"] == "/trust",
     )
 
 
 def _unknown(path: str) -> Response:
-    if path == "/":
+    if path in PAGES:
         return HTMLResponse(_WORDS, 401, headers=NOT_KEPT)
     if path.startswith("/api/"):
         return problem(401, "this console asks for its token")
@@ -142,15 +145,17 @@ class Pages:
         self._files = files
 
     async def index(self, request: Request) -> Response:
-        """`GET /`; a token in the address becomes a cookie and leaves the address."""
-        token = request.query_params.get("token")
-        if token is not None:
-            answer = RedirectResponse("/", 303, headers=NOT_KEPT)
-            role = self._access.tokens.role_of(token)
+        """`GET /` and others; a token in the address becomes a cookie and leaves the address."""
+        path, token = request.url.path, request.query_params.get("token")
+        if path == "/" and request.scope[ROLE] is Role.PHONE:
+            path = "/phone"
+        if token is not None or path != request.url.path:
+            answer = RedirectResponse(path, 303, headers=NOT_KEPT)
+            role = self._access.tokens.role_of(token or "")
             if self._access.tokens.are_asked and role is not Role.NOBODY:
                 answer.headers["Set-Cookie"] = self._access.cookie_for(role)
             return answer
-        found = self._files.find("index.html")
+        found = self._files.find(PAGES[path])
         return HTMLResponse(found.data if found else _NO_PAGE, headers=NOT_KEPT)
 
     async def file(self, request: Request) -> Response:
@@ -206,30 +211,52 @@ async def _status(_: Request, error: Exception) -> Response:
     return PlainTextResponse(text, error.status_code, headers=dict(error.headers or {}) | NOT_KEPT)
 
 
-def _for_drivers(endpoint: Any) -> Any:
-    """An endpoint that acts, for those who may."""
+def _for(least: Role, endpoint: Any) -> Any:
+    """An endpoint for those who may do so much."""
 
     async def guarded(request: Request) -> Response:
-        if request.scope[_ROLE] is not Role.DRIVE:
-            return problem(403, "this token may only look")
+        if request.scope[ROLE] < least:
+            role = request.scope[ROLE]
+            return problem(403, f"this token may only {_ONLY.get(role, 'look')}")
         answer: Response = await endpoint(request)
         return answer
 
     return guarded
 
 
-def make_app(access: Entrance, hub: Hub, cameras: CameraStreams, files: StaticFiles) -> ASGIApp:
-    """The whole application."""
-    pages, rest = Pages(access, hub, cameras, files), Rest(hub)
+_ONLY = {Role.PHONE: "drive by phone"}
+
+
+def make_app(
+    access: Entrance,
+    hub: Hub,
+    cameras: CameraStreams,
+    files: StaticFiles,
+    door: PhoneDoor | None = None,
+) -> ASGIApp:
+    """The whole application.
+
+    Args:
+        access: Its rules.
+        hub: Of all pages, whatever they were opened by.
+        cameras: Pictures.
+        files: Of the pages.
+        door: Where phones come in, if they do.
+    """
+    pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
 
     async def see(ws: WebSocket) -> None:
-        await hub.see(ws, ws.scope[_ROLE])
+        await hub.see(ws, ws.scope[ROLE])
 
     async def drive(ws: WebSocket) -> None:
-        await hub.drive(ws, ws.scope[_ROLE])
+        await hub.drive(ws, ws.scope[ROLE])
 
     routes = [
-        Route("/", pages.index),
+        *(Route(path, pages.index) for path in PAGES),
+        Route("/trust", phones.trust),
+        Route(AUTHORITY, phones.authority),
+        Route("/api/phones", _for(Role.DRIVE, phones.about)),
+        Route("/api/phones.svg", _for(Role.DRIVE, phones.code)),
         Route("/static/{name:path}", pages.file),
         Route(OPEN, pages.health),
         Route("/camera/{label:path}.mjpg", pages.stream),
@@ -237,8 +264,8 @@ def make_app(access: Entrance, hub: Hub, cameras: CameraStreams, files: StaticFi
         Route("/api/state", rest.state),
         Route("/api/site", rest.site),
         Route("/api/story", rest.story),
-        Route("/api/actions", _for_drivers(rest.action), methods=["POST"]),
-        Route("/api/emergency", _for_drivers(rest.emergency), methods=["POST"]),
+        Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
+        Route("/api/emergency", _for(Role.PHONE, rest.emergency), methods=["POST"]),
         WebSocketRoute("/ws/state", see),
         WebSocketRoute("/ws/drive", drive),
     ]

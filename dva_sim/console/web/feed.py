@@ -14,7 +14,7 @@ from dva_sim.console.web.state import LATEST, RunState, Versioned, body_of
 OWN_KEPT = 64  # lines for one page alone that may wait
 
 Sources = tuple[str, ...]
-SOURCES: Sources = ("seat", "d", *LATEST, "story", "others")
+SOURCES: Sources = ("seat", "guard", "d", *LATEST, "story", "others")
 
 
 class PageFeed:
@@ -72,7 +72,8 @@ class PageFeed:
         self._have = {kind: known.version for kind, known in state.latest.items()}
         self._have_places, self._have_story = state.place_version, state.told
         self._have_seats = {seat: known.version for seat, known in state.seats_short.items()}
-        self._have.pop("seat", None)
+        for own in ("seat", "guard"):
+            self._have.pop(own, None)
         return state.snapshot()
 
     def _from(self, source: str) -> str | None:
@@ -84,6 +85,8 @@ class PageFeed:
             return self._others()
         if source == "seat":
             return self._newer("seat", self._state.seats.get(self._seat))
+        if source == "guard":
+            return self._newer("guard", self._state.guards.get(self._seat))
         return self._newer(source, self._state.latest.get(source))
 
     def _newer(self, kind: str, known: Versioned | None) -> str | None:

@@ -15,7 +15,8 @@ from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import BadMessage, Bucket, asked_of, id_of, read, robots
+from dva_sim.console.web.actions import SILENT, Bucket, asked_of, check_role, id_of, read
+from dva_sim.console.web.checks import BadMessage, robots
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say, wire_of
@@ -91,7 +92,7 @@ class Hub:
         """A page is gone: its robots stop, and after a while others may have them."""
         self.clients.leave(client)
         self.watching()
-        if client.role is Role.DRIVE:
+        if client.role.acts:
             self.simulation.send({"client": client.name, "do": "gone"})
         task = asyncio.ensure_future(self._forget(client))
         self._later.add(task)
@@ -99,18 +100,19 @@ class Hub:
 
     async def _forget(self, client: Client) -> None:
         await asyncio.sleep(REMEMBERED)
-        if self.clients.forget(client) and client.role is Role.DRIVE:
-            self.simulation.send(
-                {"id": f"bye-{client.name}", "client": client.name, "do": "release"}
-            )
-            self.simulation.state.forget_seat(client.name)
+        if self.clients.forget(client) and client.role.acts:
+            state = self.simulation.state
+            for what in ("release", "guard_leave")[: 1 + (client.name in state.guards)]:
+                key = f"bye-{what}-{client.name}"
+                self.simulation.send({"id": key, "client": client.name, "do": what})
+            state.forget_seat(client.name)
 
     # --- driving -------------------------------------------------------------------------
 
     async def drive(self, ws: WebSocket, role: Role) -> None:
         """Serve a driving socket until it closes; then its robots stop."""
         client = self.clients.find(ws.query_params.get("client", ""))
-        if role is not Role.DRIVE or client is None or client.role is not Role.DRIVE:
+        if not role.acts or client is None or client.role is not role:
             why = "may only look" if role is Role.LOOK else "no page of that name is open"
             await ws.send_denial_response(PlainTextResponse(why, 403))
             return
@@ -144,11 +146,14 @@ class Hub:
         said = read(text)
         name, key = said.pop("do", None), said.pop("id", None)
         try:
+            check_role(client.role, name)
             asked = asked_of(name, said, self.simulation.labels, silent=True)
             asked["client"] = client.name
-            if name in ("input", "gone"):
+            if name in SILENT:
                 self.simulation.send(asked)
                 return
+            if client.role is Role.PHONE and "robots" not in said:
+                asked.pop("robots", None)  # an emergency is for its own robot
             asked["id"] = id_of(key)
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
         except BadMessage as error:

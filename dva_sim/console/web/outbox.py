@@ -8,6 +8,7 @@ from typing import Any
 
 URGENT = ("emergency", "gone")
 MOST = 64  # actions that may wait, of each kind
+MOST_BATCHES = 8  # of samples that may wait, of a phone: at 40 ms each, as long as a drive lasts
 
 Asked = dict[str, Any]
 
@@ -15,7 +16,8 @@ Asked = dict[str, Any]
 class OutgoingLines:
     """Lines to the simulation that have not been written yet.
 
-    Of inputs and of watched robots only the newest waits, for each client.
+    Of inputs and of watched robots only the newest waits, for each client. Of a phone's samples
+    all count, in their order; if too many wait, the oldest are lost, which their numbers tell.
 
     Attributes:
         refused: How many actions found no room.
@@ -25,6 +27,7 @@ class OutgoingLines:
         self._urgent: deque[Asked] = deque()
         self._actions: deque[Asked] = deque()
         self._newest: dict[tuple[str, str], Asked] = {}
+        self._samples: dict[str, deque[Asked]] = {}
         self.refused = 0
 
     def put(self, asked: Asked) -> bool:
@@ -33,8 +36,12 @@ class OutgoingLines:
         if kind in ("input", "watch"):
             self._newest[client, kind] = asked
             return True
+        if kind == "samples":
+            self._samples.setdefault(client, deque(maxlen=MOST_BATCHES)).append(asked)
+            return True
         if kind == "gone":
             self._newest.pop((client, "input"), None)
+            self._samples.pop(client, None)
         queue = self._urgent if kind in URGENT else self._actions
         if len(queue) >= MOST:
             self.refused += 1
@@ -50,6 +57,17 @@ class OutgoingLines:
             asked = self._actions.popleft()
         elif self._newest:
             asked = self._newest.pop(next(iter(self._newest)))
+        elif self._samples:
+            asked = self._next_samples()
         else:
             return None
         return json.dumps(asked, separators=(",", ":")).encode() + b"\n"
+
+    def _next_samples(self) -> Asked:
+        """Of each phone in turn."""
+        client = next(iter(self._samples))
+        waiting = self._samples.pop(client)
+        asked = waiting.popleft()
+        if waiting:
+            self._samples[client] = waiting
+        return asked

@@ -9,12 +9,14 @@ from typing import Any
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
-from dva_sim.console.web.actions import MOST_BYTES, BadMessage, asked_of, id_of, read
+from dva_sim.console.web.actions import MOST_BYTES, asked_of, check_role, id_of, read
+from dva_sim.console.web.checks import BadMessage
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.state import RunState
 from dva_sim.worlds.geo import GeoFrame
 
 NOT_KEPT = {"Cache-Control": "no-store"}
+ROLE = "dva_sim.role"  # what is known of who asks, in a request's scope
 PROGRAM = "rest"  # the client of all requests that come from no page
 
 
@@ -116,9 +118,12 @@ class Rest:
         """`POST /api/actions`."""
         try:
             said = await body_of_request(request)
-            if said.get("action") == "gone":
+            name = said.get("action")
+            if name == "gone":
                 return self._gone(said)
-            asked = asked_of(said.get("action"), said.get("arguments", {}), self._simulation.labels)
+            if problem_of := _not_by(request, name):
+                return problem_of
+            asked = asked_of(name, said.get("arguments", {}), self._simulation.labels)
             return await self._do(asked, said)
         except BadMessage as error:
             return problem(400, str(error))
@@ -128,6 +133,8 @@ class Rest:
         try:
             said = await body_of_request(request)
             said.setdefault("id", secrets.token_hex(8))
+            if not self._is_here(said.get("client")):
+                said.pop("client", None)  # whose socket has just broken may still stop a robot
             given = {"robots": said.get("robots", "all")}
             return await self._do(asked_of("emergency", given, self._simulation.labels), said)
         except BadMessage as error:
@@ -145,9 +152,12 @@ class Rest:
             BadMessage: no such page.
         """
         name = said.get("client", PROGRAM)
-        if name != PROGRAM and (not isinstance(name, str) or self._hub.clients.find(name) is None):
+        if name != PROGRAM and not self._is_here(name):
             raise BadMessage("client: no page of that name is open")
         return str(name)
+
+    def _is_here(self, name: Any) -> bool:
+        return isinstance(name, str) and self._hub.clients.find(name) is not None
 
     async def _do(self, asked: dict[str, Any], said: dict[str, Any]) -> Response:
         """Ask the simulation, and wait until it has answered."""
@@ -156,6 +166,15 @@ class Rest:
         line = await self._simulation.answer(asked)
         body = {"id": line["id"], "ok": bool(line.get("ok")), "text": line.get("text", "")}
         return JSONResponse(body, 504 if line.get("late") else 200, headers=NOT_KEPT)
+
+
+def _not_by(request: Request, name: Any) -> Response | None:
+    """The answer to an address that may not ask for this; None if it may."""
+    try:
+        check_role(request.scope[ROLE], name)
+    except BadMessage as error:
+        return problem(403, str(error))
+    return None
 
 
 async def body_of_request(request: Request) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import contextlib
 import logging
 import socket
 from collections.abc import Iterator
+from pathlib import Path
 
 import uvicorn
 from starlette.types import ASGIApp
@@ -57,13 +58,14 @@ class Server(uvicorn.Server):
         yield
 
 
-def make_server(app: ASGIApp) -> Server:
-    """The server of an application."""
+def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
+    """The server of an application; by https where it has a certificate, with its key."""
     logger = logging.getLogger("uvicorn.error")
     logger.handlers, logger.propagate = [_Complaints()], False
     logger.setLevel(logging.WARNING)
     config = uvicorn.Config(
         app,
+        ssl_certfile=certificate,
         http="h11",
         ws=WireProtocol,
         ws_max_size=MOST_BYTES,

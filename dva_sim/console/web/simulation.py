@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.console.web.actions import Labels
+from dva_sim.console.web.checks import Labels
 from dva_sim.console.web.outbox import Asked
 from dva_sim.console.web.pipes import Lines, PipeEnd
 from dva_sim.console.web.state import RunState

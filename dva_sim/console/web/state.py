@@ -46,6 +46,7 @@ class RunState:
         latest: The newest line by its kind.
         places: Where everybody is, by index: a row of `pos`.
         seats: What each seat's holder knows, and what others may.
+        guards: What each page of a guard knows.
     """
 
     def __init__(self) -> None:
@@ -63,6 +64,7 @@ class RunState:
         self.told = 0
         self.seats: dict[str, Versioned] = {}
         self.seats_short: dict[str, Versioned] = {}
+        self.guards: dict[str, Versioned] = {}
         self._deltas: dict[int, str] = {}
         self._snapshot: tuple[int, str] = -1, ""
 
@@ -78,6 +80,8 @@ class RunState:
             self._take_places(line)
         elif kind == "seat":
             self._take_seat(line)
+        elif kind == "guard":
+            self._take_guard(line)
         elif kind == "story":
             self.told += 1
             self.story.append(line)
@@ -115,8 +119,15 @@ class RunState:
         if known is None or known.body != short:
             self.seats_short[seat] = Versioned(self.version, short)
 
+    def _take_guard(self, line: Line) -> None:
+        seat = str(line["seat"])
+        if seat not in self.guards and len(self.guards) >= MOST_SEATS:
+            del self.guards[next(iter(self.guards))]
+        self.guards[seat] = Versioned(self.version, body_of(line))
+
     def forget_seat(self, seat: str) -> None:
         """Whoever had it is gone for good."""
+        self.guards.pop(seat, None)
         self.seats.pop(seat, None)
         self.seats_short.pop(seat, None)
 

@@ -1,0 +1,35 @@
+"""Under which addresses and names this machine is found."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections.abc import Iterable
+
+HERE = ("localhost", "127.0.0.1", "::1")
+
+
+def own_address(host: str) -> str:
+    """Where others find this machine, if it listens on all its addresses; else itself alone."""
+    family, far, local = socket.AF_INET, "192.0.2.1", "127.0.0.1"  # RFC 5737: nobody has it
+    if ":" in host:
+        family, far, local = socket.AF_INET6, "2001:db8::1", "::1"  # RFC 3849: likewise
+    with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as sock:
+        sock.connect((far, 9))  # of a datagram socket that sends nothing: it chooses a way
+        return str(sock.getsockname()[0])
+    return local
+
+
+def own_hosts(given: Iterable[str]) -> list[str]:
+    """Names and addresses of this machine, as far as it knows them, and others that are given."""
+    name = socket.gethostname()
+    found = [*HERE, name, f"{name.partition('.')[0]}.local", own_address("0.0.0.0"), *given]
+    found.append(own_address("::"))
+    with contextlib.suppress(OSError):
+        found += [str(entry[4][0]) for entry in socket.getaddrinfo(name, None)]
+    return list(dict.fromkeys(found))
+
+
+def address_of(host: str, port: int, scheme: str = "http") -> str:
+    """The address of a page's root."""
+    return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}/"

@@ -1,0 +1,65 @@
+"""The second listener: https, for phones."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from dva_sim.console.web.access import Entrance, Tokens, rules
+from dva_sim.console.web.addresses import address_of, own_address, own_hosts
+from dva_sim.console.web.certificate_files import certificates, data_folder
+from dva_sim.console.web.certificates import Hosts
+from dva_sim.console.web.phones import PhoneDoor
+from dva_sim.console.web.server import listen
+
+
+class PhoneListener(NamedTuple):
+    """All that phones are served with.
+
+    Attributes:
+        sock: Where it listens.
+        access: Its rules.
+        certificate: File with key and certificate.
+        door: What the console says of it.
+        told: What was renewed, for people, a line each.
+    """
+
+    sock: socket.socket
+    access: Entrance
+    certificate: Path
+    door: PhoneDoor
+    told: tuple[str, ...]
+
+
+def listen_for_phones(
+    host: str, port: int, names: Sequence[str], tokens: Tokens, folder: Path | None = None
+) -> PhoneListener:
+    """Listen, with a certificate of this machine.
+
+    Args:
+        host: Address of this machine, or one that means all.
+        port: 0 for any that is free.
+        names: More names of this machine.
+        tokens: Of all roles.
+        folder: Where certificates are kept; else in the user's data folder.
+
+    Raises:
+        ConfigError: the address is not of this machine, or taken.
+        NoCertificate: none can be kept.
+    """
+    sock = listen(host, port)
+    try:
+        port = sock.getsockname()[1]
+        access = rules(host, port, (*names, *own_hosts(())), tokens, secure=True)
+        shown = own_address(host) if access.any_address else host.strip("[]")
+        known = Hosts.of(own_hosts([*names, shown]))
+        kept = certificates(folder or data_folder() / "phones", known)
+    except BaseException:
+        sock.close()
+        raise
+    base = address_of(shown, port, "https")
+    token = tokens.phone
+    door = PhoneDoor(f"{base}?token={token}" if token else f"{base}phone", kept.authority.der)
+    return PhoneListener(sock, access, kept.leaf, door, kept.told)
