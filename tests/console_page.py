@@ -1,4 +1,7 @@
-"""A console's world without real time: pulses come by virtual time, so that nothing has to wait."""
+"""A console's world and what a page would do with it.
+
+Over modelled links without real time: pulses come by virtual time, so that nothing has to wait.
+"""
 
 import time
 
@@ -30,11 +33,15 @@ class VirtualPace(PacedClock):
 class Page:
     """What a page would do, and what it is told."""
 
-    def __init__(self, monkeypatch, scenario="hands-on", seed=1, client="c1", **changes):
+    def __init__(
+        self, monkeypatch, scenario="hands-on", seed=1, client="c1", sockets=None, **changes
+    ):
         document = load(scenario) if isinstance(scenario, str) else scenario
         changes = {key.replace("__", "."): value for key, value in changes.items()}
-        self.world = ConsoleWorld(build(document, changes), "a test", seed, VirtualPace())
-        monkeypatch.setattr(time, "monotonic", lambda: self.world.clock.now)
+        clock = VirtualPace() if sockets is None else PacedClock()
+        self.world = ConsoleWorld(build(document, changes), "a test", seed, clock, sockets)
+        if sockets is None:
+            monkeypatch.setattr(time, "monotonic", lambda: self.world.clock.now)
         self.lines, self.frames, self.client = [], [], client
         self.world.tell = lambda line, key="": self.lines.append(line)
         self.world.show = lambda line, key="": self.frames.append(line)

@@ -28,6 +28,7 @@ from dva_sim.cli.options import (
 from dva_sim.cli.verbosity import loudness
 
 _MOST_PORT = 64_999
+LINKS = "modelled", "real"
 
 
 @takes(api.episode)
@@ -143,6 +144,12 @@ def console(
     host: Annotated[
         str, Option(metavar="HOST", help="Address of this machine to listen on.")
     ] = "127.0.0.1",
+    links: Annotated[
+        str, choice(*LINKS, help="As the scenario models them, or sockets that others join.")
+    ] = "modelled",
+    dva_port: Annotated[
+        int, count("With real links: port of the DVA; 0: any.", metavar="PORT", most=_MOST_PORT)
+    ] = 0,
     phones: Annotated[
         bool, Option("--phones", help="An address for phones, by https, with a QR code.")
     ] = False,
@@ -169,6 +176,7 @@ def console(
         dva-sim console  # two robots, two guards, a fire and a leak
         dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
+        dva-sim console --links real  # over sockets, which other devices may join
         dva-sim console --phones  # prints an address to be scanned by a phone
     """
     from dva_sim.console.options import ConsoleOptions  # late: start-up
@@ -186,6 +194,8 @@ def console(
         phones=phones,
         phones_host=phones_host,
         phones_port=phones_port,
+        links=links,
+        dva_port=dva_port,
         open=not no_open,
         record=record,
         overwrite=overwrite,

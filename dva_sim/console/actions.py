@@ -242,6 +242,8 @@ class Actions:
 
     def _pace(self, _: str, line: Line, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
+        if self._world.run.is_real:
+            raise Refused("the links are real: time goes by as it does outside")
         if factor is not None and not _is_share(factor, 1.0, FASTEST):
             raise Refused(f"factor should be a number from 1 to {FASTEST:g}")
         if paused is not None and not isinstance(paused, bool):

@@ -132,7 +132,7 @@ class Feed:
             "set_speed_mps": round(point.speed, 3) if now < point.until else 0.0,
             "set_turn_rate_radps": round(point.turn_rate, 3) if now < point.until else 0.0,
             "queue": len(robot.inbox),
-            "lost": sum(link.lost + link.dropped for link in run.links[id_tag]),
+            "lost": sum(link.lost + link.dropped for link in run.links.get(id_tag, ())),
             "commands_hz": self._commands_hz.get(id_tag, 0.0),
             "refused": robot.refused,
             "timeouts": 0 if drive is None else drive.timeouts,

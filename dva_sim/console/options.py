@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from dva_sim.console.real_links import ConsoleSockets, MakeSockets
+from dva_sim.console.web.addresses import own_address
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import either
 from dva_sim.recordings.writing import check_target
 from dva_sim.simulation.scenario import Scenario, build, load
 
+LINKS = "modelled", "real"
 DEFAULT, DEFAULT_PORT, PHONES_PORT = "hands-on", 8765, 8766
 
 
@@ -27,6 +32,8 @@ class ConsoleOptions:
         phones: Whether phones have an address of their own, by https.
         phones_host: Address to listen on for them.
         phones_port: 0: any that is free.
+        links: `modelled` as in a study, or `real`: sockets, which others may join.
+        dva_port: Port of the DVA on real links; 0: any that is free.
         open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
         overwrite: What is there may be replaced.
@@ -41,9 +48,18 @@ class ConsoleOptions:
     phones: bool = False
     phones_host: str = "0.0.0.0"
     phones_port: int = PHONES_PORT
+    links: str = "modelled"
+    dva_port: int = 0
     open: bool = True
     record: Path | None = None
     overwrite: bool = False
+
+    def sockets(self) -> MakeSockets | None:
+        """What makes the sockets of real links."""
+        if self.links == "modelled":
+            return None
+        host = own_address(self.host) if self.host in ("0.0.0.0", "::") else self.host
+        return partial(ConsoleSockets, host=host, port=self.dva_port)
 
     def read(self) -> Scenario:
         """The scenario.
@@ -51,6 +67,8 @@ class ConsoleOptions:
         Raises:
             ConfigError: it cannot be run before people's eyes, or not recorded as wanted.
         """
+        if self.links not in LINKS:
+            raise ConfigError(f"--links {self.links!r} should be {either(LINKS)}")
         document, changes = load(self.scenario), parse_changes(self.changes)
         model = document.data.get("model", "full")
         if model != "full":
@@ -61,6 +79,8 @@ class ConsoleOptions:
             scenario = build(document, changes)
         except ConfigError as error:
             raise set_by(self.changes, error) from None
+        if self.links == "real" and scenario.zeromq.conflate != "none":
+            raise ConfigError("zeromq.conflate: only on modelled links, since messages have parts")
         if self.record is not None:
             check_target(self.record, self.overwrite)
         return scenario

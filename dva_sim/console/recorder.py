@@ -51,6 +51,11 @@ class ConsoleRecorder(Recorder):
         if self.kept is not None:
             self.kept.message(source, payload, sent=True)
 
+    def message_taken(self, node: str, payload: bytes) -> None:
+        """A device of ours takes a message over a real link: one of others is kept."""
+        if self.kept is not None:
+            self.kept.message(node, payload, sent=False)
+
     def command_applied(self, drive: DriveLog, *about: Any, **more: Any) -> None:
         """See `Recorder`."""
         super().command_applied(drive, *about, **more)

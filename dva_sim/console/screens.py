@@ -60,10 +60,11 @@ class Screens:
         self._held = robots
         self._subscribe()
 
-    def arrived(self, robot: str, frame: CameraFrame) -> None:
+    def arrived(self, robot: str, came: CameraFrame | bytes) -> None:
         """A frame has come over the link."""
         taken = self._taken.get(robot)
-        if robot not in self._watched or taken is None:
+        frame = came if isinstance(came, CameraFrame) else CameraFrame.unpack(came)
+        if robot not in self._watched or taken is None or frame is None:
             return
         tick, now = frame.observation.tick, self._run.clock.now
         known = taken.get(tick)

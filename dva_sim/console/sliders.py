@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from dva_sim.console.link import changed, read, with_link
+from dva_sim.console.real_links import TITLE
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import Scenario, mean_processing_s
 
@@ -26,16 +28,18 @@ class LinkSliders:
 
     def line(self) -> dict[str, Any]:
         """What it is like, for pages."""
-        link = self.link
-        usual = mean_processing_s(self._run.scenario)
+        link, run = self.link, self._run
+        processing = self._wanted.get("processing_s", mean_processing_s(run.scenario))
+        if run.is_real:
+            return {"kind": "real", "processing_s": processing}
         return {
+            "kind": "modelled",
             "delay_s": link.delay_s,
             "jitter_s": link.jitter_s,
             "jitter_wanted_s": self._wanted.get("jitter_s", link.jitter_s),
             "loss": link.loss,
             "rate_bps": link.rate_bps,
-            "processing_s": self._wanted.get("processing_s", usual),
-            "kind": "modelled",
+            "processing_s": processing,
             "trace": link.trace_up or link.trace_down or link.delay_log,
             "rate_trace": link.trace_up or link.trace_down,
         }
@@ -47,6 +51,8 @@ class LinkSliders:
             ConfigError: what cannot be.
         """
         run, wanted = self._run, read(given)
+        if run.is_real and wanted.keys() - {"processing_s"}:
+            raise ConfigError(TITLE)
         self.link = changed(run.scenario.link, self._wanted | wanted)
         self._wanted |= wanted
         now = run.clock.now

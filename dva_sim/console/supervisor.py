@@ -55,7 +55,7 @@ class ConsoleSupervisor:
         """
         options = self._options
         scenario = options.read()
-        world = ConsoleWorld(scenario, options.scenario, options.seed)
+        world = ConsoleWorld(scenario, options.scenario, options.seed, sockets=options.sockets())
         keeper, outlet = None, None
         if options.record is not None:
             keeper = Keeper(options.record, world.scenario, options.seed)
@@ -67,6 +67,8 @@ class ConsoleSupervisor:
             self._run(world)
         finally:
             self._end_all()
+            if world.sockets is not None:
+                world.sockets.close()
             if outlet is not None:
                 world.recorder.tidy()
                 outlet.close()
@@ -96,6 +98,8 @@ class ConsoleSupervisor:
             if options.token:
                 self._say(f"Look only: {serving['look']}")
             self._say_of_phones(serving)
+            if world.sockets is not None:
+                self._say(f"DVA: {world.sockets.dva}")
             self._open_browser(str(serving["drive"]))
             if not ending.is_asked:
                 world.clock.go()

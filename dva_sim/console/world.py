@@ -19,11 +19,13 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
+from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders
+from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
@@ -50,9 +52,11 @@ class ConsoleWorld:
         name: Of the scenario.
         seed: Decides all luck.
         clock: Its time; default: real time.
+        sockets: Makes what carries the messages; default: the link that the scenario models.
 
     Attributes:
         clock: Virtual time, at its pace.
+        sockets: What carries the messages, if the links are real.
         run: The run.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
@@ -62,7 +66,12 @@ class ConsoleWorld:
     """
 
     def __init__(
-        self, scenario: Scenario, name: str, seed: int, clock: PacedClock | None = None
+        self,
+        scenario: Scenario,
+        name: str,
+        seed: int,
+        clock: PacedClock | None = None,
+        sockets: MakeSockets | None = None,
     ) -> None:
         if scenario.transport == "zeromq" and scenario.network_depth == "auto":
             # A later link may lose or delay anything: only the segments are right for all.
@@ -70,8 +79,14 @@ class ConsoleWorld:
         self.scenario, self.name, self.seed = scenario, name, seed
         self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
-        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, keeps=False)
-        self.run = Run(scenario, seed, watched=watched)
+        self.sockets = sockets(scenario, self.clock, self.recorder) if sockets else None
+        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, False, self.sockets)
+        try:
+            self.run = Run(scenario, seed, watched=watched)
+        except DvaSimError:
+            if self.sockets is not None:
+                self.sockets.close()
+            raise
         self.feed, self.lag = Feed(self.run), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Tell = lambda *_: None
@@ -84,6 +99,8 @@ class ConsoleWorld:
         self.client_of: dict[int, str] = {}
         self.person(0)
         self.feed.add(DVA, "dva", "dva")
+        if self.sockets is not None:
+            self.sockets.join("console", SCREEN)
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )

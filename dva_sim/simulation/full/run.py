@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
@@ -25,6 +25,7 @@ from dva_sim.network.link import (
     part_links,
 )
 from dva_sim.network.link.link import Reception, make_link
+from dva_sim.network.messaging import Transport
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.control_room import add_dva, add_operator, at_event_m
 from dva_sim.simulation.full.disturbance import Disturbance
@@ -83,6 +84,23 @@ def rehearse(scenario: Scenario, seed: int) -> None:
     Run(scenario, seed)
 
 
+class RealLinks(Protocol):
+    """Sockets that carry the messages of a run, in place of the modelled network."""
+
+    @property
+    def network(self) -> Transport:
+        """What carries the messages."""
+
+    def join(self, kind: str, number: int) -> str:
+        """Open the sockets of a device by its kind and number: its address."""
+
+    def time_of_day(self) -> tuple[float, bool]:
+        """See `AgentDevice`."""
+
+    def watch(self, audit: SafetyAudit) -> None:
+        """Tell of each message that is sent or arrives."""
+
+
 @dataclass(frozen=True)
 class Watched:
     """How a run goes that somebody else lets pass, and where people may take part.
@@ -93,6 +111,7 @@ class Watched:
         cameras: Where the robots' pictures are.
         seats: So many operators are people, the last ones.
         keeps: Whether all that happens is kept to be measured; without, a run may last for ever.
+        real: What carries the messages; None: the network that the scenario models.
     """
 
     clock: Clock
@@ -100,10 +119,11 @@ class Watched:
     cameras: Cameras = OVER_ZMQ
     seats: int = 0
     keeps: bool = True
+    real: RealLinks | None = None
 
 
 class Run:
-    """Everybody in place on the virtual network, at time zero.
+    """Everybody in place on the network, at time zero.
 
     Args:
         scenario: What the run consists of.
@@ -122,12 +142,11 @@ class Run:
         watched = watched or Watched(Clock(), Recorder(keep_traffic))
         self.scenario, self.clock, self.recorder = scenario, watched.clock, watched.recorder
         self._listeners: tuple[SafetyAudit, ...] = ()  # the audit, once all are in place
-        self.network = VirtualNetwork(
-            self.clock, self._link_between, self._sent, connector_of(scenario), self._delivered
-        )
-        self.stage = Stage(scenario, seed, self.network, self.recorder, cameras=watched.cameras)
+        self._connector = connector_of(scenario)
+        self.network, self.stage = self._connected(seed, watched)
         check_partitions(scenario.link.partitions, self.stage.labels.values())
-        self.links = self._make_links()
+        self.is_real = watched.real is not None
+        self.links = {} if self.is_real else self._make_links()
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
         self._lan = lan, lan
         self.dva = add_dva(self.stage, keep_events=watched.keeps)
@@ -152,11 +171,27 @@ class Run:
             tick=PHYSICS_TICK,
         )
         self._listeners = (self.audit,)
+        if watched.real is not None:
+            watched.real.watch(self.audit)
         Disturbance(self.stage, self.dva, self.field)
         self.dva.start()
         self.clock.every(WATCH_PERIOD, self._watch)
         if watched.keeps:
             self.clock.every(FILM_PERIOD if keep_traffic else WATCH_PERIOD, self._sample)
+
+    def _connected(self, seed: int, watched: Watched) -> tuple[Transport, Stage]:
+        """What carries the messages, and the stage on it."""
+        scenario, real = self.scenario, watched.real
+        if real is None:
+            network: Transport = VirtualNetwork(
+                self.clock, self._link_between, self._sent, self._connector, self._delivered
+            )
+            return network, Stage(scenario, seed, network, self.recorder, cameras=watched.cameras)
+        time_of_day, join = real.time_of_day(), real.join
+        stage = Stage(
+            scenario, seed, real.network, self.recorder, join, time_of_day, cameras=watched.cameras
+        )
+        return real.network, stage
 
     def run(self) -> Recording:
         """Let time pass until all is settled or the horizon is reached."""
@@ -186,7 +221,7 @@ class Run:
             robots=field.robots,
             links=self.links,
             people=self._people(),
-            depth=self.network.connector.deepest,
+            depth=self._connector.deepest,
         )
 
     def _people(self) -> list[PersonLog]:

@@ -32,6 +32,12 @@ export const clock = computed(
   () => rows.value?.clock ?? { factor: 1, paused: false, lag_s: 0, held_by_lag: false },
 );
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
+/** Whether the link is that of a study, with sliders, and not one of sockets. */
+export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
+/** How long a command takes at least [ms], as far as it is known. */
+export const floorMs = computed(
+  () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),
+);
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );

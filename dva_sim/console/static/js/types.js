@@ -12,8 +12,8 @@
  * @typedef {{name: string, extent_m: number[], rooms: Room[], walls_m: number[][],
  *   solids_m: number[][][], doors_m: number[][], exits_m: number[][], raster?: Raster}} Site
  *
- * @typedef {{delay_s: number, jitter_s: number, loss: number, rate_bps: number | null,
- *   processing_s: number, jitter_wanted_s?: number, kind?: string, trace?: string | null,
+ * @typedef {{processing_s: number, delay_s?: number, jitter_s?: number, loss?: number,
+ *   rate_bps?: number | null, jitter_wanted_s?: number, kind?: string, trace?: string | null,
  *   rate_trace?: string | null}} LinkSetting
  * @typedef {{robots: number[], goals_m: number[][], radius_m: number, length_m: number,
  *   side_rad: number}} TourPlan

@@ -1,6 +1,6 @@
 /** Take, start, drive, stop, release; and what the robot is doing. */
 import { html, useEffect, useRef } from '../../vendor/preact.js';
-import { clock, connection, link, mayDrive, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
+import { clock, connection, floorMs, mayDrive, maySteer, modeOf, rowOf, rows, seat } from '../store.js';
 import { act } from '../net/actions.js';
 import { DriveSliders } from './drive_sliders.js';
 import { gamepad } from './gamepad.js';
@@ -88,7 +88,7 @@ function Hint({ holds }) {
   if (interrupted.value) return `${interrupted.value} The robot was stopped: press Start, then take hold again.`;
   if (!holds) return heldByOther() || 'Take control of the robot first.';
   const phase = seat.value?.phase ?? 'free';
-  const wait = link.value ? Math.round(1000 * (link.value.delay_s + link.value.processing_s)) : 0;
+  const wait = Math.round(floorMs.value);
   if (phase === 'starting') return `Starting: the robot answers after ${2 * wait} ms at the earliest.`;
   if (isOnItsWay()) return `Your hand is on its way: the robot hears of it after ${wait} ms at the earliest.`;
   if (held.value && phase === 'held') return 'Let go and press Start, then take hold again: the robot does not listen yet.';

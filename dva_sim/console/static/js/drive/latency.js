@@ -1,6 +1,6 @@
 /** How late everything is: commands, answers, pictures; for each robot that is driven. */
 import { html, useEffect, useMemo } from '../../vendor/preact.js';
-import { driveOf, link, rowOf } from '../store.js';
+import { driveOf, floorMs, isModelled, rowOf } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { Chart } from '../charts/chart.js';
 import { History } from '../charts/history.js';
@@ -71,10 +71,8 @@ function sample(histories, robots) {
 
 /** What no pattern can be faster than. */
 function Floor() {
-  const setting = link.value;
-  if (!setting) return null;
-  const floor = 1000 * (setting.delay_s + setting.processing_s);
-  return html`<span class="count">a command takes at least ${msText(floor)}</span>`;
+  const how = isModelled.value ? 'takes' : 'is processed for';
+  return html`<span class="count">a command ${how} at least ${msText(floorMs.value)}</span>`;
 }
 
 /**

@@ -1,6 +1,6 @@
 /** The link that one chooses, and how fast the world runs. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
-import { clock, link, maySteer, scene } from '../store.js';
+import { clock, isModelled, link, maySteer, scene } from '../store.js';
 import { act } from '../net/actions.js';
 import { Slider } from '../ui/slider.js';
 import { rateText } from '../ui/words.js';
@@ -34,6 +34,7 @@ const KNOBS = [
 
 /** @param {{heading?: string}} props */
 export function LinkPanel({ heading = 'The link you choose' }) {
+  if (!isModelled.value) return html`<${RealLink} />`;
   return html`<section class="panel link-panel" aria-label="What lies between">
     <h2>${heading}</h2>
     <${Presets} />
@@ -41,6 +42,17 @@ export function LinkPanel({ heading = 'The link you choose' }) {
       ${KNOBS.map((knob) => html`<${LinkSlider} key=${knob.key} knob=${knob} />`)}
       <${Bandwidth} /><${TimeFactor} /><${JitterNote} />
     </div>
+  </section>`;
+}
+
+/** Of sockets nothing can be chosen; the robots' computers are models all the same. */
+function RealLink() {
+  const knob = KNOBS[KNOBS.length - 1];
+  return html`<section class="panel link-panel" aria-label="What lies between">
+    <h2>A real link</h2>
+    <p class="soft">Messages go through sockets, and time goes by as outside: delay, jitter and loss are
+      what the network makes them.</p>
+    <div class="knobs"><${LinkSlider} knob=${knob} /></div>
   </section>`;
 }
 

@@ -1,6 +1,6 @@
 /** What is always in sight: time, link, age of the data, alarms, who one is, emergency stop. */
 import { html } from '../../vendor/preact.js';
-import { clock, connection, link, maySteer, you } from '../store.js';
+import { clock, connection, isModelled, link, maySteer, you } from '../store.js';
 import { act, emergencyStop } from '../net/actions.js';
 import { roundTrip } from '../net/round_trip.js';
 import { pageAge, worldNow } from '../net/world_time.js';
@@ -35,7 +35,8 @@ function Time() {
   return html`<span class="item time" title="Time of the world, and how fast it runs">
     <span class="figure">${clockText(worldNow())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
-    <button type="button" class="plain" disabled=${!maySteer.value} aria-label=${name} title=${name}
+    <button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
+      aria-label=${name} title=${isModelled.value ? name : 'Over real links time goes by as outside'}
       onClick=${() => act('pace', { paused: !paused })}>
       <${Icon} name=${paused ? 'play' : 'pause'} /></button>
   </span>`;
@@ -43,13 +44,16 @@ function Time() {
 
 function Link() {
   const setting = link.value;
-  const modelled = (setting?.kind ?? 'modelled') === 'modelled';
-  const delay = setting ? `${Math.round(1000 * setting.delay_s)} ms` : '–';
+  if (!isModelled.value) {
+    return html`<span class="item link" role="status" aria-label="Link"
+      title="Sockets lie between the console and the robots, not a model">real</span>`;
+  }
+  const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
   const trace = setting?.trace ? `, ${setting.trace}` : '';
   const loss = setting?.loss ? `, ${Number((100 * setting.loss).toFixed(1))} % lost` : '';
-  return html`<span class=${modelled ? 'item link modelled' : 'item link'} role="status"
+  return html`<span class="item link modelled" role="status"
     aria-label="Link" title="The link that lies between the console and the robots, one way">
-    ${modelled ? 'modelled' : 'real'} ${delay}${loss}${trace}</span>`;
+    modelled ${delay}${loss}${trace}</span>`;
 }
 
 function Age() {

@@ -3,7 +3,7 @@
  * in the end the person's own two times.
  */
 import { html, useEffect } from '../../vendor/preact.js';
-import { maySteer, robots, rowOf } from '../store.js';
+import { isModelled, maySteer, robots, rowOf } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { Icon } from '../ui/icon.js';
 import { useEvery } from '../ui/every.js';
@@ -16,7 +16,7 @@ const AHEAD = 0.2; // [rad]
 
 /** The tour's button, where there are two robots for one. */
 export function TourButton() {
-  if (robots.value.length < 2 || progress.value) return null;
+  if (robots.value.length < 2 || progress.value || !isModelled.value) return null;
   return html`<button type="button" class="tour-button" disabled=${!maySteer.value} onClick=${takeTour}>
     <${Icon} name="flag" />Take the tour</button>`;
 }

@@ -1,0 +1,105 @@
+"""A console's world over sockets: driven as over the modelled link, and open to other devices."""
+
+from dataclasses import replace
+
+import pytest
+from console_page import Page
+from patience import PATIENCE_S
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.real_links import TITLE, ConsoleSockets
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.sockets import NetworkError, SocketNetwork
+from dva_sim.simulation.full.stage import DVA, Stage, id_of
+
+
+@pytest.fixture
+def page(monkeypatch):
+    page = Page(monkeypatch, sockets=ConsoleSockets, guard__count=0, bystander__count=0)
+    page.world.clock.go()
+    yield page
+    page.world.sockets.close()
+
+
+def becomes(page, true):
+    """Let real time go by until something is so."""
+    end = page.world.clock.now + PATIENCE_S
+    while not true():
+        assert page.world.clock.now < end
+        page.let(0.02)
+
+
+def drive(page):
+    """Begin to drive, again and again where this machine does much else and holds the robot."""
+
+    def moves():
+        if page.robot().controller.mode is not Mode.TELEOPERATION:
+            page.do("start", within=PATIENCE_S)
+        return page.robot().body.speed > 0.2
+
+    assert page.do("take", robots=[0], within=PATIENCE_S)[0]
+    page.want(0.5)
+    becomes(page, moves)
+
+
+def test_a_robot_is_driven_and_shown_and_no_rule_is_broken(page):
+    page.actions.take({"client": "c1", "do": "watch", "robots": [0]})
+    drive(page)
+    becomes(page, lambda: any(line["k"] == "frame" for line in page.frames))
+    becomes(page, lambda: page.drive()["command_age_ms"] is not None)
+    assert page.do("emergency", robots="all", within=PATIENCE_S)[0]
+    becomes(page, lambda: page.robot().controller.mode is Mode.IDLE)
+    recorder = page.world.recorder
+    assert recorder.counters["messages"] > 50
+    assert not recorder.violations
+
+
+def test_a_robot_with_a_slack_watchdog_is_found_out_over_sockets_too(page):
+    controller = page.robot().controller
+    controller.limits = replace(controller.limits, watchdog=60.0)
+    drive(page)
+    becomes(page, lambda: page.world.recorder.violations)
+    assert set(page.world.recorder.violations) == {"S1"}
+
+
+@pytest.mark.parametrize(
+    ("what", "about", "why"),
+    [
+        ("link", {"delay_s": 0.1}, TITLE),
+        ("link", {"loss": 0.1, "processing_s": 0.1}, TITLE),
+        ("pace", {"factor": 2}, "the links are real: time goes by as it does outside"),
+        ("pace", {"paused": True}, "the links are real: time goes by as it does outside"),
+    ],
+)
+def test_nothing_of_a_real_link_can_be_chosen(page, what, about, why):
+    assert page.do(what, **about) == (False, why)
+
+
+def test_how_long_a_robots_computer_takes_can_be_chosen_all_the_same(page):
+    assert page.do("link", processing_s=0.2)[0]
+    becomes(page, lambda: page.told("rows")[-1]["link"]["processing_s"] == 0.2)
+    assert page.told("rows")[-1]["link"] == {"kind": "real", "processing_s": 0.2}
+
+
+def test_another_device_joins_over_the_network(page):
+    world = page.world
+    network = SocketNetwork(world.clock)
+    stage = Stage(
+        *(world.scenario, 1, network, Recorder()),
+        lambda kind, number: network.join(id_of(kind, number)),
+    )
+    network.introduce(DVA, world.sockets.dva)
+    newcomer = stage.device("operator", 9)
+    newcomer.register()
+    becomes(page, lambda: newcomer.id_tag in world.run.dva.desk.registry.entries)
+    network.close()
+
+
+def test_a_port_that_is_taken_is_told_in_a_line(page, monkeypatch):
+    port = int(page.world.sockets.dva.rpartition(":")[2])
+
+    def taken(scenario, clock, recorder):
+        return ConsoleSockets(scenario, clock, recorder, port=port)
+
+    with pytest.raises(NetworkError, match=f"cannot listen on 127.0.0.1, ports {port} and"):
+        Page(monkeypatch, sockets=taken)
