@@ -24,7 +24,7 @@ WIDE, NARROW = (0.45, 0.3), (0.15,)  # room on both sides of a robot, beside its
 BASE = 1.0  # so near where it stands, a robot has room anyway [m]
 
 
-class Way(NamedTuple):
+class FreeWay(NamedTuple):
     """A straight way from where a robot stands.
 
     Attributes:
@@ -58,13 +58,14 @@ def tour_of(run: Run, numbers: Mapping[str, int]) -> dict[str, Any] | None:
     return None
 
 
-def way_of(site: Site, robots: tuple[RobotAgent, ...]) -> Way | None:
+def way_of(site: Site, robots: tuple[RobotAgent, ...]) -> FreeWay | None:
     """The longest way that all of them have: with room beside it and with a turn, if it can be."""
     for rooms, turned in product((WIDE, NARROW), (True, False)):
         for room in rooms:
             sides = [side for side in _sides() if (abs(side) >= TURNED) is turned]
             ways = [
-                Way(min(_free(site, robot, side, room) for robot in robots), side) for side in sides
+                FreeWay(min(_free(site, robot, side, room) for robot in robots), side)
+                for side in sides
             ]
             best = max(ways, key=lambda way: way.length)
             if best.length >= LEAST:
@@ -76,7 +77,7 @@ def _sides() -> list[float]:
     return [number * TURN for number in range(-11, 13)]
 
 
-def _ahead(robot: RobotAgent, way: Way) -> tuple[float, float]:
+def _ahead(robot: RobotAgent, way: FreeWay) -> tuple[float, float]:
     pose = robot.body.pose()
     angle = pose.heading + way.side
     return pose.x + way.length * math.cos(angle), pose.y + way.length * math.sin(angle)
@@ -86,7 +87,7 @@ def _free(site: Site, robot: RobotAgent, side: float, room: float) -> float:
     """How far a robot gets on a straight line to a side [m]."""
     way = 0.0
     while way + STEP <= FAR + 1e-9:
-        x, y = _ahead(robot, Way(way + STEP, side))
+        x, y = _ahead(robot, FreeWay(way + STEP, side))
         if not site.is_free(x, y, robot.body.radius + room if way > BASE else 0.0):
             break
         way += STEP
