@@ -144,6 +144,7 @@ def test_a_port_that_is_taken_is_told_in_a_line(programs, console):
         (("--set", "robot.count=99"), "robot.count"),
         (("--record", "run.avi"), "should end in .mcap"),
         (("--port", "70000"), "--port"),
+        (("--links", "imagined"), "--links 'imagined' should be modelled or real"),
     ],
 )
 def test_a_mistake_is_told_before_anything_starts(programs, words, told):
@@ -154,10 +155,11 @@ def test_a_mistake_is_told_before_anything_starts(programs, words, told):
     assert program.said == ""
 
 
-def test_what_was_driven_and_recorded_holds_every_rule(programs, tmp_path):
-    console = running(programs, "--record", tmp_path / "run.mcap")
+@pytest.mark.parametrize("links", ["modelled", "real"])
+def test_what_was_driven_and_recorded_holds_every_rule(programs, tmp_path, links):
+    console = running(programs, "--record", tmp_path / "run.mcap", "--links", links)
     with client(address_of(console)) as page:
-        assert page.do("link", delay_s=0.1)[0]
+        assert page.do("link", delay_s=0.1)[0] is (links == "modelled")
         assert page.do("take", robots=[0, 1])[0]
         # On a machine that lags nobody may start: again and again, until it does not.
         wait_until(lambda: page.do("start")[0], "is driven")

@@ -1,4 +1,4 @@
-"""The program itself: 500 ms, a drive by keyboard to the fire, confirmed; its recording holds."""
+"""The program itself: a drive over 500 ms to the fire, whose recording holds; a real link."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from driving_by_keys import Driver
 from patience import PATIENCE_S, becomes
 from playwright.sync_api import expect
-from programs import Programs, all_gone_after
+from programs import Program, Programs, all_gone_after
 
 DELAY_S = 0.5
 NEAR_M = 2.5  # of the fire: there it can be seen
@@ -22,13 +22,35 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
     yield from all_gone_after(tmp_path)
 
 
+def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
+    """A console, and its address."""
+    console = programs.start("console", "--no-open", "--port", "0", *words)
+    console.wait_to_say("Console:")
+    return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
+
+
+def test_of_a_real_link_nothing_can_be_chosen_but_the_robots_computers(
+    visit, programs: Programs
+) -> None:
+    _, address = started(programs, "--links", "real")
+    page = visit.open(address, "network")
+
+    expect(page.get_by_role("status", name="Link")).to_have_text("real")
+    expect(page.get_by_role("slider")).to_have_count(1)
+    expect(page.get_by_role("slider", name="Processing time")).to_be_enabled()
+    expect(page.get_by_role("button", name="Pause")).to_be_disabled()
+    expect(page.get_by_role("button", name="Take the tour")).to_have_count(0)
+    page.get_by_role("link", name="Drive").click()
+    page.get_by_role("button", name="Take control").click()
+    expect(page.get_by_role("button", name="Release control")).to_be_enabled()
+    expect(page.locator(".picture-age")).to_contain_text("old")
+
+
 def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(
     tmp_path: Path, visit, programs: Programs
 ) -> None:
     record = tmp_path / "drive.mcap"
-    console = programs.start("console", "--no-open", "--port", "0", "--record", record)
-    console.wait_to_say("Console:")
-    address = re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
+    console, address = started(programs, "--record", record)
     page = visit.open(address, "drive")
     base = address.partition("?")[0]
     page.get_by_role("slider", name="Delay").fill(str(1000 * DELAY_S))
