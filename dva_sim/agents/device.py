@@ -70,6 +70,7 @@ class AgentDevice:
     time_of_day: tuple[float, bool] = (NOON, False)
     silent: bool = False
     outbox: Outbox = field(init=False)
+    _has_left: bool = False
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
@@ -94,7 +95,27 @@ class AgentDevice:
         self._register(then)
         self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
 
+    def register_once(
+        self, on_reply: Callable[[m.Reply], object], on_failure: Callable[[], object]
+    ) -> None:
+        """Ask the DVA once; only if it agrees does the device stay registered from then on."""
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code == m.OK:
+                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing)
+                self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
+            on_reply(reply)
+
+        self.ask(self.dva, self._registration, answered, on_failure)
+
+    def leave(self) -> None:
+        """Send nothing more, for good: the DVA finds out as of any device that falls silent."""
+        self.silent = self._has_left = True
+
     def _register(self, then: Callable[[], object]) -> None:
+        if self._has_left:
+            return
+
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 then()
@@ -332,8 +353,9 @@ class AgentDevice:
         """The name of a device for people."""
         return self.labels.get(id_tag, id_tag)
 
-    def _heartbeat(self) -> None:
+    def _heartbeat(self) -> bool:
         self.publish(HEARTBEAT, m.Heartbeat())
+        return not self._has_left
 
     def _bad_message(self, error: ProtocolError) -> bytes:
         body = m.Reply(0, error.code, error.reason[:256])

@@ -8,9 +8,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.phone_actions import PhoneActions
+from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
@@ -21,18 +23,8 @@ from dva_sim.network.realtime import FASTEST
 Line = dict[str, Any]
 
 
-class Said(Protocol):
-    """Whoever waits for the answer to an action."""
-
-    def __call__(self, ok: bool, text: str, /, **more: Any) -> object:
-        """Told whether it was done, what there is to say of it, and what was asked for."""
-
-
+BYE = "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
-
-
-class Refused(Exception):
-    """An action that cannot be done, and why, in a line."""
 
 
 class Actions:
@@ -45,6 +37,7 @@ class Actions:
     def __init__(self, world: ConsoleWorld) -> None:
         self._world = world
         self._seats, self._answers = Seats(), Answers()
+        self._phones = PhoneActions(world, self._seats, self._robot, self._stop_one)
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)
         self._doers: dict[str, Callable[[str, Line, Said], object]] = {
@@ -60,6 +53,7 @@ class Actions:
             "refute": lambda client, _, said: self._person(client).report("refuted", said),
             "decline": self._decline,
             "tour": self._tour,
+            **self._phones.doers,
         }
 
     def take(self, line: Line) -> None:
@@ -67,6 +61,8 @@ class Actions:
         what, client = line.get("do"), str(line.get("client", ""))
         if what == "input":
             self._input(client, line)
+        elif what == "samples":
+            self._phones.samples(client, line)
         elif what == "gone":
             self._gone(client)
         elif what == "watch":
@@ -124,15 +120,25 @@ class Actions:
 
         person.take(robots, answered)
 
-    def _release(self, client: str, _: Line, said: Said) -> None:
+    def _release(self, client: str, line: Line, said: Said) -> None:
+        if str(line["id"]).startswith(BYE):
+            self._phones.forget(client)
+            self._hold()
+        if client not in self._seats.taken:
+            said(True, "released")
+            return
         person = self._person(client)
         person.release(said)
         self._leave(client)
 
     def _leave(self, client: str) -> None:
+        if self._phones.sits(client):  # its device stays, as long as its page
+            self._person(client).attended = True
+            self._hold()
+            return
         number = self._seats.stand_up(client)
         if number is not None:
-            self._world.persons[number].attended = False
+            self._world.person(number).attended = False
             self._world.client_of.pop(number, None)
             self._world.free_seat(client)
         self._hold()
@@ -175,8 +181,10 @@ class Actions:
         self._person(client).stop(said)
 
     def _emergency(self, client: str, line: Line, said: Said) -> None:
-        robots = self._robots(line)
         seat = self._seats.taken.get(client)
+        if "robots" not in line and seat is not None:
+            line = {"robots": list(self._world.person(seat.number).robots)}
+        robots = self._robots(line)
         # Who drives a robot from here learns of its end at once, whoever pressed the button.
         own = self._world.person(0 if seat is None else seat.number)
         for person in self._world.persons:
@@ -188,6 +196,8 @@ class Actions:
         """What a person wants now; what is no number wants to stand."""
         speed, turn, number = line.get("speed"), line.get("turn"), line.get("n")
         held = line.get("held") is True
+        if not held and self._phones.is_tilted(client):
+            return  # a stick that nobody touches does not take a tilted phone's place
         if not (held and _is_share(speed, 0.0) and _is_share(turn, -1.0)):
             speed = turn = 0.0
         if self._seats.heard(client, time.monotonic(), held):

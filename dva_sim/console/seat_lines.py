@@ -9,6 +9,7 @@ from typing import Any
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.feed import Feed
+from dva_sim.console.phone_seat import PhoneSeat
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
@@ -25,12 +26,19 @@ class SeatLines:
         feed: About it.
         persons: By the numbers of their seats.
         client_of: Who sits there, by the same numbers.
+        phones: By their clients.
     """
 
     def __init__(
-        self, run: Run, feed: Feed, persons: list[PersonAgent], client_of: dict[int, str]
+        self,
+        run: Run,
+        feed: Feed,
+        persons: dict[int, PersonAgent],
+        client_of: dict[int, str],
+        phones: dict[str, PhoneSeat],
     ) -> None:
         self._run, self._feed, self._persons, self._client_of = run, feed, persons, client_of
+        self._phones = phones
         self._acted: dict[str, Line] = {}  # by robot: of the newest command that has taken effect
 
     def applied(self, drive: DriveLog) -> None:
@@ -47,7 +55,7 @@ class SeatLines:
             acted["loop_ms"] = round(1000 * (command.time - given.time), 1)
 
     def _held(self, drive: DriveLog) -> HeldRobot | None:
-        for person in self._persons:
+        for person in self._persons.values():
             held = person.robots.get(drive.robot)
             if held is not None and held.log is drive:
                 return held
@@ -55,13 +63,25 @@ class SeatLines:
 
     def waiting_order(self) -> Line | None:
         """An order for a seat in which nobody sits yet."""
-        orders = [p.order for p in self._persons if p.order is not None and not p.attended]
+        persons = self._persons.values()
+        orders = [p.order for p in persons if p.order is not None and not p.attended]
         return self._order(orders[0]) if orders else None
 
     def lines(self) -> Iterator[tuple[str, Line]]:
         """A line for each client that sits somewhere."""
         for number, client in self._client_of.items():
-            yield client, self._line(client, self._persons[number])
+            yield client, self._line(client, self._persons[number]) | self._phone(client)
+        for client in self._phones.keys() - self._client_of.values():
+            yield client, self._of_nobody(client) | self._phone(client)
+
+    def _phone(self, client: str) -> Line:
+        phone = self._phones.get(client)
+        return {"phone": None if phone is None else phone.line(time.monotonic())}
+
+    def _of_nobody(self, client: str) -> Line:
+        """Of a phone that has not registered yet."""
+        line = {"k": "seat", "t": self._feed.now_ms, "seat": client, "label": ""}
+        return line | {"phase": "free", "order": None, "alert": "", "drives": []}
 
     def _line(self, client: str, person: PersonAgent) -> Line:
         held = list(person.robots.values())

@@ -48,6 +48,10 @@ class Seats:
             self.taken[client] = TakenSeat(free)
         return free
 
+    def sit_at(self, client: str, number: int) -> None:
+        """A client takes a seat that is its own."""
+        self.taken[client] = TakenSeat(number)
+
     def stand_up(self, client: str) -> int | None:
         """A client leaves: the seat it had."""
         seat = self.taken.pop(client, None)

@@ -19,6 +19,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
+from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.scene import scene_of
@@ -95,7 +96,8 @@ class ConsoleWorld:
         self._console = Console(
             setup=self._setup(scenario), phone=phone_profile(scenario), reach=self.run.stage.reach
         )
-        self.persons: list[PersonAgent] = []
+        self._persons: dict[int, PersonAgent] = {}
+        self.phones = Phones(self.run, self.clock, lambda: self._console)
         self.client_of: dict[int, str] = {}
         self.person(0)
         self.feed.add(DVA, "dva", "dva")
@@ -104,7 +106,9 @@ class ConsoleWorld:
         self.screens = Screens(
             self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
         )
-        self.seat_lines = SeatLines(self.run, self.feed, self.persons, self.client_of)
+        self.seat_lines = SeatLines(
+            self.run, self.feed, self._persons, self.client_of, self.phones.by_client
+        )
         self.recorder.on_applied = self.seat_lines.applied
         self.hazards = HazardFeed(self.run)
         self._newest: dict[str, Any] = {}
@@ -120,6 +124,7 @@ class ConsoleWorld:
         """Tell the scene, and from then on what changes."""
         scene = scene_of(self.run, self.feed.things, self.name, self.seed)
         scene["link"] = self.sliders.line()
+        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
         self.tell(scene)
         self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
@@ -135,18 +140,35 @@ class ConsoleWorld:
         for number, when in self.run.field.contained.items():
             self.show({"k": "contain", "t": round(1000 * when), "n": number})
 
+    @property
+    def persons(self) -> list[PersonAgent]:
+        """Those of all seats, with or without somebody in them."""
+        return list(self._persons.values())
+
     def person(self, number: int) -> PersonAgent:
-        """The person of a seat, by its number from 0; new ones register first."""
-        while len(self.persons) <= number:
-            device = self.run.stage.device("console", len(self.persons) + 1)
+        """The person of a seat, by its number; new ones of the console, from 0, register first."""
+        while number < FIRST_SEAT and number not in self._persons:
+            place = sum(1 for known in self._persons if known < FIRST_SEAT)
+            device = self.run.stage.device("console", place + 1)
             person = PersonAgent(device, self._console)
             person.on_robot = self._watch_robot
             device.register()
             for robot in self.run.field.robots:
                 device.connect(robot)  # an emergency does not wait for a connection
             self.feed.add(device.id_tag, device.label, "operator")
-            self.persons.append(person)
-        return self.persons[number]
+            self._persons[place] = person
+        return self._persons[number]
+
+    def let_in(self, number: int, person: PersonAgent) -> None:
+        """A phone takes part, with a seat of its own."""
+        person.on_robot = self._watch_robot
+        self._persons[number] = person
+
+    def see_off(self, number: int) -> None:
+        """A phone takes part no more; its robots are given back first."""
+        person = self._persons.pop(number)
+        person.release(lambda *_: None)
+        self.phones.retire(number, person.device)
 
     def _setup(self, scenario: Scenario) -> OperatorSetup:
         stage = self.run.stage
@@ -246,7 +268,7 @@ class ConsoleWorld:
     def free_seat(self, client: str) -> None:
         """A client sits nowhere any more, and is told so."""
         empty = {"k": "seat", "t": self.feed.now_ms, "seat": client, "phase": "free"}
-        self.tell(empty | {"order": None, "alert": "", "drives": []}, client)
+        self.tell(empty | {"order": None, "alert": "", "drives": [], "phone": None}, client)
         self._newest.pop(f"seat {client}", None)
 
     def change_pattern(self, robot: str, name: str, said: Callable[[bool, str], object]) -> None:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from dva_sim.agents.device import HOLDER, AgentDevice, command_topic
 from dva_sim.agents.operator.refusals import Refusals
-from dva_sim.agents.tilt import TiltApp, TiltCommand
+from dva_sim.agents.tilt import TiltApp, TiltCommand, TiltSources
 from dva_sim.kernel.plugins import FAILURES, said
 from dva_sim.kernel.recorder import DriveLog, Issued
 from dva_sim.network.messaging import Requester, Subscription
@@ -55,7 +55,7 @@ class CommandSender:
         pattern: Pattern,
         drive: DriveLog,
         session: int,
-        phone: TiltApp,
+        phone: TiltApp | TiltSources,
         rate_hz: float,
         timeout: float,
         attempts: int,

@@ -16,7 +16,8 @@ from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.operator.handheld import Console, Input, Said
 from dva_sim.agents.operator.supervision import BLIND_AFTER
-from dva_sim.agents.tilt import GivenTilt
+from dva_sim.agents.tilt import GivenTilt, TiltSources
+from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.kernel.recorder import DriveLog, Shown
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
@@ -33,6 +34,7 @@ class HeldRobot:
         device: The person's.
         robot: By its id.
         console: What the person works with by now.
+        tilt: Gives what makes commands of what the person wants, for the next drive.
         alert: Told what the person has to know.
         let_go: Told that the robot is in these hands no longer.
 
@@ -44,6 +46,8 @@ class HeldRobot:
         arrived: When it did [s].
         event: What the next drives are for; 0: no event.
         last: The newest input.
+        level: Of the permission that was asked for.
+        app: Makes the commands of the newest drive.
     """
 
     def __init__(
@@ -51,6 +55,7 @@ class HeldRobot:
         device: AgentDevice,
         robot: str,
         console: Callable[[], Console],
+        tilt: Callable[[], GivenTilt | TiltSources],
         alert: Callable[[str], object],
         let_go: Callable[[HeldRobot], object],
     ) -> None:
@@ -62,7 +67,9 @@ class HeldRobot:
         self.frame: CameraFrame | None = None
         self.arrived = 0.0
         self.last = Input(0, 0.0, 0.0, 0.0)
-        self.app = GivenTilt(console().phone)
+        self._tilt, self.app = tilt, tilt()
+        self.level = "teleoperation"
+        self._wished = self.last
         self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
         self._sender: CommandSender | None = None
         self._picture: Subscription | None = None
@@ -81,8 +88,9 @@ class HeldRobot:
 
     # --- permission ----------------------------------------------------------------------
 
-    def ask(self, said: Said) -> None:
-        """Ask the DVA for the robot."""
+    def ask(self, said: Said, level: str = "teleoperation") -> None:
+        """Ask the DVA for the robot, to do with it what the level says."""
+        self.level = level
 
         def answered(reply: m.Reply) -> None:
             if self.phase == "gone":
@@ -101,7 +109,7 @@ class HeldRobot:
             self._be_gone()
             said(False, f"{self.label}: the DVA does not answer")
 
-        body = m.PermissionRequest(self.robot, "teleoperation")
+        body = m.PermissionRequest(self.robot, level)
         self.device.ask(self.device.dva, body, answered, unreachable)
 
     def give_back(self) -> None:
@@ -165,6 +173,9 @@ class HeldRobot:
         if self.phase != "held":
             said(False, f"{self.label}: {_NOT_NOW.get(self.phase, self.phase)}")
             return
+        if self.level not in DRIVES:
+            said(False, f"{self.label}: the permission is for {self.level}, not for teleoperation")
+            return
         now = self.device.clock.now
         self.phase = "starting"
         self.log = log = DriveLog(self.robot, self.device.id_tag, self.event, now)
@@ -201,6 +212,7 @@ class HeldRobot:
             device.progress(self.event, "departed")
         device.tell(f"drives {self.label}", "drive")
         self._inputs.clear()
+        self.app = self._tilt()
         self._sender = CommandSender(
             device,
             pattern=setup.pattern(self.robot),
@@ -217,17 +229,29 @@ class HeldRobot:
             heeds=setup.heeds,
         )
         self._sender.start()
-        if device.clock.now - self.last.time < STILL_WANTED:
-            self.want(self.last.number, self.last.speed, self.last.turn)
+        if device.clock.now - self._wished.time < STILL_WANTED:
+            self.want(self._wished.number, self._wished.speed, self._wished.turn)
         device.clock.every(1.0, lambda: self._look_at_picture(log), start=device.clock.now + 1.0)
 
     def want(self, number: int, speed: float, turn: float) -> None:
         """What the person wants from now on, as shares of what the robot can do."""
         now, reach = self.device.clock.now, self._console().reach(self.robot)
-        self.last = Input(number, now, speed, turn)
+        self._wished = Input(number, now, speed, turn)
+        self.steered(self._wished)
         if self.phase == "driving":
-            self._inputs.append(self.last)
             self.app.ask(now, speed * reach.speed, turn * reach.turn_rate)
+
+    def tilted(self, number: int, at: float) -> None:
+        """So many samples of the person's phone have come, the newest taken at a time [s]."""
+        reach, (level, turn) = self._console().reach(self.robot), self.app.shown
+        speed = level * SPEED_PER_LEVEL / reach.speed
+        self.steered(Input(number, at, speed, math.radians(turn) / reach.turn_rate))
+
+    def steered(self, given: Input) -> None:
+        """An input has come: it is remembered until it acts."""
+        self.last = given
+        if self.phase == "driving":
+            self._inputs.append(given)
 
     def acted(self, made: float, sample_age: float) -> Input | None:
         """The newest input behind a command made then [s], of samples so old on average [s]."""
@@ -270,7 +294,7 @@ class HeldRobot:
     def _lost(self, why: str) -> None:
         """Nobody answers: whatever still gets through shall stop the robot."""
         self.end("lost link")
-        self._alert(f"{self.label}: the link counts as lost: {why}")
+        self._alert(f"{self.label}: link lost: {why}")
         self.device.ask(self.robot, m.Emergency(), session=self.session)
 
     def _refused(self, why: str) -> None:
@@ -292,6 +316,7 @@ class HeldRobot:
 
 
 FOUND = ("confirmed", "refuted")
+DRIVES = ("teleoperation", "both")  # levels of permission
 _NOT_NOW = {
     "asking": "the DVA has not answered yet",
     "starting": "it is being started",

@@ -15,6 +15,7 @@ from dva_sim.agents.operator.handheld import Console, Gathered, Said
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.operator import RECALLED
 from dva_sim.agents.operator.steps import ask_emergency
+from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.protocol import messages as m
 
 MOST_ROBOTS = 2  # that one person drives by the same input
@@ -28,6 +29,8 @@ class PersonAgent:
     Args:
         device: Who it is on the wire.
         console: What it works with.
+        tilt: Gives what makes commands of what the person wants, for the next drive; if not given,
+            what is wanted enters as tilt.
 
     Attributes:
         console: As given; another counts from the next drive on.
@@ -38,8 +41,14 @@ class PersonAgent:
         on_robot: Told of each robot that is taken, to be watched.
     """
 
-    def __init__(self, device: AgentDevice, console: Console) -> None:
+    def __init__(
+        self,
+        device: AgentDevice,
+        console: Console,
+        tilt: Callable[[], GivenTilt | TiltSources] | None = None,
+    ) -> None:
         self.device, self.console = device, console
+        self._tilt = tilt or (lambda: GivenTilt(self.console.phone))
         self.attended = False
         self.order: m.Order | None = None
         self.robots: dict[str, HeldRobot] = {}
@@ -64,8 +73,8 @@ class PersonAgent:
         """Somebody takes the seat."""
         self.attended, self.alert = True, ""
 
-    def take(self, robots: Sequence[str], said: Said) -> None:
-        """Ask for robots: all of them, or none is kept."""
+    def take(self, robots: Sequence[str], said: Said, level: str = "teleoperation") -> None:
+        """Ask for robots, with one level of permission: all of them, or none is kept."""
         wanted = [robot for robot in robots if robot not in self.robots]
         if len(self.robots) + len(wanted) > MOST_ROBOTS:
             said(False, f"one person drives {MOST_ROBOTS} robots at most")
@@ -76,7 +85,7 @@ class PersonAgent:
         answers = Gathered(len(wanted), said)
         taken = []
         for robot in wanted:
-            held = HeldRobot(self.device, robot, lambda: self.console, self._alert, self._let_go)
+            held = self._hold(robot)
             held.on_frame = self._on_frame
             self.robots[robot] = held
             self.device.connect(robot)
@@ -90,7 +99,11 @@ class PersonAgent:
         answers.failed = give_all_back
         for held in taken:
             self._note_event(held)
-            held.ask(answers)
+            held.ask(answers, level)
+
+    def _hold(self, robot: str) -> HeldRobot:
+        console, tilt = lambda: self.console, self._tilt
+        return HeldRobot(self.device, robot, console, tilt, self._alert, self._let_go)
 
     def release(self, said: Said) -> None:
         """Stop what is driven, give everything back, and leave the seat."""

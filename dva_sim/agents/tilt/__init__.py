@@ -12,6 +12,8 @@ from dva_sim.agents.tilt.given import GivenTilt
 from dva_sim.agents.tilt.hand import Hand
 from dva_sim.agents.tilt.mappings import Mapping, known_mappings, load_mapping
 from dva_sim.agents.tilt.phone import Phone, PhoneProfile, TiltCommand, try_phone
+from dva_sim.agents.tilt.phone_clock import PhoneClock
+from dva_sim.agents.tilt.sources import TiltSources
 
 __all__ = [
     "Accelerometer",
@@ -22,9 +24,11 @@ __all__ = [
     "Hand",
     "Mapping",
     "Phone",
+    "PhoneClock",
     "PhoneProfile",
     "TiltApp",
     "TiltCommand",
+    "TiltSources",
     "known_filters",
     "known_mappings",
     "load_filter",

@@ -225,5 +225,6 @@ class TiltApp:
         reading = self._filter.value()
         self._stems_from = self._sampled_at - self._filter.age * self._period
         self._captured = self._trail.captured()
-        self.shown = self._mapping.command(*reading, at - self._taken_at)
+        # A real phone's samples may come after the moment until which a value stood.
+        self.shown = self._mapping.command(*reading, max(0.0, at - self._taken_at))
         self._taken_at, self._due, self._fresh = at, at + self._app.max_delay, 0

@@ -29,7 +29,7 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
-_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5}
+_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5, "phone": 6}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -57,7 +57,7 @@ def label_of(kind: str, number: int) -> str:
 
 def address_of(kind: str, number: int) -> str:
     """Its address in the registration, where nobody has a real one."""
-    return f"192.168.{_ROOMS[kind] or 1}.{number % 250 + 1}"
+    return f"192.168.{_ROOMS[kind]}.{number % 250 + 1}"
 
 
 TYPES = {
@@ -67,6 +67,7 @@ TYPES = {
     "operator": OPERATOR,
     "detector": DETECTOR,
     "console": OPERATOR,
+    "phone": OPERATOR,
 }
 
 

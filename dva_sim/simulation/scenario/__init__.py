@@ -10,7 +10,13 @@ from dva_sim.simulation.scenario.contradictions import (
     time_out_s,
 )
 from dva_sim.simulation.scenario.loading import FOLDER, build, check_policy, load, locate_files
-from dva_sim.simulation.scenario.parts import AccessConfig, DispatchConfig, EventConfig, RobotConfig
+from dva_sim.simulation.scenario.parts import (
+    AccessConfig,
+    DispatchConfig,
+    EventConfig,
+    PhoneConfig,
+    RobotConfig,
+)
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
     bystander_profile,
@@ -27,6 +33,7 @@ __all__ = [
     "AccessConfig",
     "DispatchConfig",
     "EventConfig",
+    "PhoneConfig",
     "RobotConfig",
     "Scenario",
     "build",

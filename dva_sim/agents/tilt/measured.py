@@ -1,0 +1,33 @@
+"""A phone whose samples are measured by a part of its own: they come when they come."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from dva_sim.agents.tilt.accelerometer import Triple
+from dva_sim.agents.tilt.app import TiltApp
+from dva_sim.agents.tilt.calibration import Reading
+
+SOONEST: Final = 0.005  # from one look to the next, while a batch is late [s]
+
+
+class MeasuredTilt(TiltApp):
+    """An app that is fed by `sample` alone.
+
+    What a sample does is what it does in any phone. The difference is that a batch that should be
+    complete may not be, as its last samples are still on their way.
+    """
+
+    def sample(self, at: float, acceleration: Triple) -> None:
+        """See `TiltApp`; what was taken before the drive began does not count in it."""
+        if at >= self._sampled_at:
+            self.followed(at)
+            super().sample(at, acceleration)
+
+    def reading(self, acceleration: Triple) -> Reading:
+        """What the calibration reads from a sample, without limits: level, turn [deg/s]."""
+        return self._app.reading(*acceleration)
+
+    def next_look(self, now: float, rate_hz: float) -> float:
+        """See `TiltApp`; never now."""
+        return max(super().next_look(now, rate_hz), now + SOONEST)

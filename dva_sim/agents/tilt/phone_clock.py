@@ -1,0 +1,50 @@
+"""When a phone's samples were taken, by our clock: the phone's own times, set by what came soonest.
+
+A phone tells its times by a clock of its own, which began some time and goes a little fast or slow.
+Samples come late by the network, never early. So the offset between the clocks is at most what the
+soonest sample shows, and that one holds. If the phone's clock is slow the true offset grows: ours
+may grow after it, by `DRIFT` at most, which a burst of late samples cannot pull along.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+DRIFT: Final = 300e-6  # by how much the offset may grow in a second; crystals keep within 100 ppm
+ANEW: Final = 2.0  # who tells times so far back has begun to count anew, as after a reload [s]
+
+
+class PhoneClock:
+    """Sets the times of one phone.
+
+    Attributes:
+        offset: Of our time against the phone's [s]; infinite before the first sample.
+    """
+
+    def __init__(self) -> None:
+        self.offset = math.inf
+        self._told, self._came, self._last = -math.inf, -math.inf, -math.inf
+
+    def is_old(self, told: float) -> bool:
+        """Whether what was told for a time [s] has been overtaken: it says nothing any more."""
+        return self._told - ANEW < told <= self._told
+
+    def times_of(self, told: Sequence[float], came: float) -> list[float]:
+        """When samples were taken, by our clock [s]: not in the future, nor before earlier ones.
+
+        Args:
+            told: When, by the phone, rising [s]; at least one.
+            came: When they came, together, by our clock [s]; not before earlier ones.
+        """
+        if told[-1] <= self._told - ANEW:
+            self.offset = math.inf
+        grown = self.offset + DRIFT * (came - self._came)
+        self.offset = min(came - told[-1], grown)
+        self._told, self._came = told[-1], came
+        return [self._set(one, came) for one in told]
+
+    def _set(self, told: float, came: float) -> float:
+        self._last = max(self._last, min(came, told + self.offset))
+        return self._last

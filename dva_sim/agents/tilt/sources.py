@@ -1,0 +1,99 @@
+"""A phone that a person holds: tilted itself, or steered by stick, keys or gamepad on its screen.
+
+Both go through an app of the same profile. The newest source acts, whole: what the other one has
+left in its filter is forgotten. Samples come all the time; they act unless somebody holds a stick.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from dva_sim.agents.tilt.accelerometer import Triple
+from dva_sim.agents.tilt.app import TiltApp, TiltCommand
+from dva_sim.agents.tilt.calibration import Reading
+from dva_sim.agents.tilt.given import GivenTilt
+from dva_sim.agents.tilt.measured import MeasuredTilt
+from dva_sim.agents.tilt.profile import PhoneProfile
+
+STICK_HOLDS: Final = 0.3  # after what came from a stick samples do not act for so long [s]
+
+
+class TiltSources:
+    """What makes commands of whatever a person steers with.
+
+    Args:
+        profile: How it reads, filters, maps and sends.
+        reference: What the phone's part measures in the pose that means nothing [m/s^2].
+        period: Mean time between two samples of that part [s].
+        given_hz: How often what is steered by stick is sampled [Hz].
+
+    Raises:
+        ConfigError: the filter or the mapping cannot be had.
+    """
+
+    def __init__(
+        self, profile: PhoneProfile, reference: Triple, period: float, given_hz: float
+    ) -> None:
+        self._measured = MeasuredTilt(profile, reference, period)
+        self._given = GivenTilt(profile.model_copy(update={"sample_rate_hz": given_hz}))
+        self._acting: TiltApp = self._measured
+        self._given_at = -math.inf
+        self.pick_up(0.0)
+
+    def pick_up(self, now: float) -> None:
+        """See `TiltApp`."""
+        self._measured.pick_up(now)
+        self._given.pick_up(now)
+
+    def sample(self, at: float, acceleration: Triple) -> None:
+        """See `TiltApp`."""
+        if self._acting is not self._measured and at - self._given_at > STICK_HOLDS:
+            self._measured.pick_up(at)
+            self._acting = self._measured
+        self._measured.sample(at, acceleration)
+
+    def ask(self, now: float, speed: float, turn_rate: float) -> None:
+        """See `GivenTilt`."""
+        if self._acting is not self._given:
+            self._given.pick_up(now)
+            self._acting = self._given
+        self._given_at = now
+        self._given.ask(now, speed, turn_rate)
+
+    def next_look(self, now: float, rate_hz: float) -> float:
+        """See `TiltApp`."""
+        return self._acting.next_look(now, rate_hz)
+
+    def look(self, now: float) -> TiltCommand | None:
+        """See `TiltApp`."""
+        return self._acting.look(now)
+
+    def reading(self, acceleration: Triple) -> Reading:
+        """What the calibration reads from a sample, without limits: level, turn [deg/s]."""
+        return self._measured.reading(acceleration)
+
+    @property
+    def is_tilted(self) -> bool:
+        """Whether the phone itself is what acts."""
+        return self._acting is self._measured
+
+    @property
+    def keeps_alive(self) -> bool:
+        """See `TiltApp`."""
+        return self._acting.keeps_alive
+
+    @property
+    def shown(self) -> Reading:
+        """The command on the display: level, turn [deg/s]."""
+        return self._acting.shown
+
+    @property
+    def samples(self) -> int:
+        """See `TiltApp`."""
+        return self._acting.samples
+
+    @property
+    def values(self) -> int:
+        """See `TiltApp`."""
+        return self._acting.values

@@ -1,0 +1,229 @@
+"""What people with phones ask for: to be registered, a robot, a calibration, and where they tilt.
+
+A phone is there from the first word of its page until that is gone for good. One phone holds one
+robot. What ends a drive ends it at once, and for good.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.phone_input import samples_of, settings_of
+from dva_sim.console.phone_seat import PhoneSeat
+from dva_sim.console.phones import TYPES
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.seats import Seats
+from dva_sim.console.world import ConsoleWorld
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.errors import ProtocolError
+
+Line = dict[str, Any]
+LEVELS = ("teleoperation", "missions", "both")
+LIFTED = "stopped: the thumb was lifted"
+TURNED = "stopped: the phone's screen has turned"
+MOST_LETTERS = 64  # of a label or a server's name
+
+
+class PhoneActions:
+    """Does what phones ask for.
+
+    Args:
+        world: In which.
+        seats: Who sits where.
+        robot: Gives the id of a robot by what a line calls it.
+        stop: Ends the drive of a client, and says why.
+    """
+
+    def __init__(
+        self,
+        world: ConsoleWorld,
+        seats: Seats,
+        robot: Callable[[Any], str],
+        stop: Callable[[str, str], object],
+    ) -> None:
+        self._world, self._seats, self._robot, self._stop = world, seats, robot, stop
+        self._phones = world.phones
+        self.doers: Mapping[str, Callable[[str, Line, Said], object]] = {
+            "phone_register": self._register,
+            "phone_devices": self._devices,
+            "phone_permission": self._permission,
+            "phone_calibrate": self._calibrate,
+        }
+
+    def sits(self, client: str) -> bool:
+        """Whether a page has the seat of a phone, and none of the console."""
+        phone = self._phones.by_client.get(client)
+        return phone is not None and phone.person is not None
+
+    def is_tilted(self, client: str) -> bool:
+        """Whether a page is that of a phone that is steered by tilt now."""
+        phone = self._phones.by_client.get(client)
+        return phone is not None and phone.tilts
+
+    def samples(self, client: str, line: Line) -> None:
+        """Samples of a phone have come; what makes no sense counts as silence."""
+        said, phone = samples_of(line), self._phones.seat(client)
+        if said is None or phone is None:
+            return
+        now = time.monotonic()
+        if phone.driven is not None and not said.hand:
+            self._stop(client, LIFTED)
+        elif phone.driven is not None and said.orientation != phone.orientation:
+            self._stop(client, TURNED)
+        phone.turn(said.orientation)
+        self._seats.heard(client, now, said.hand)
+        phone.take(said, now)
+
+    def forget(self, client: str) -> None:
+        """Its page is gone for good: the device leaves."""
+        phone = self._phones.by_client.pop(client, None)
+        if phone is not None:
+            self._retire(client, phone)
+            self._world.free_seat(client)
+
+    # --- who it is -------------------------------------------------------------------------
+
+    def _register(self, client: str, line: Line, said: Said) -> None:
+        label, kind, address = _identity(line)
+        seat = self._seats.taken.get(client)
+        if seat is not None and not self.sits(client):
+            raise Refused("this page has a seat of the console: release it first")
+        phone = self._phone(client)
+        self._retire(client, phone)
+        number = self._phones.new_person(phone, label, kind, address)
+        if number is None:
+            raise Refused("too many phones have come and gone: try again in two minutes")
+        person = phone.person
+        assert person is not None
+        self._world.let_in(number, person)
+        self._seats.sit_at(client, number)
+
+        def answered(reply: m.Reply) -> None:
+            if phone.person is not person:
+                said(False, "another registration has taken its place")
+            elif reply.code == m.OK:
+                phone.registered = True
+                self._world.client_of[number] = client
+                for robot in self._world.run.field.robots:
+                    person.device.connect(robot)  # an emergency does not wait for a connection
+                said(True, f"{label} is registered", phone=phone.identity())
+            else:
+                self._retire(client, phone)
+                said(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+
+        def unreachable() -> None:
+            if phone.person is person:
+                self._retire(client, phone)
+            said(False, f"no DVA answers at {address}")
+
+        try:
+            person.device.register_once(answered, unreachable)
+        except ProtocolError as error:
+            self._retire(client, phone)
+            raise Refused(error.reason) from None
+
+    def _phone(self, client: str) -> PhoneSeat:
+        phone = self._phones.seat(client)
+        if phone is None:
+            raise Refused("there are as many phones as there may be")
+        return phone
+
+    def _retire(self, client: str, phone: PhoneSeat) -> None:
+        """Whatever device a phone had is no more."""
+        if phone.person is None:
+            return
+        phone.person, phone.registered = None, False
+        number = self._seats.stand_up(client)
+        if number is not None:
+            self._world.client_of.pop(number, None)
+            self._world.see_off(number)
+
+    def _device(self, client: str) -> tuple[PhoneSeat, PersonAgent]:
+        phone = self._phones.by_client.get(client)
+        if phone is None or phone.person is None or not phone.registered:
+            raise Refused("this phone is not registered yet")
+        return phone, phone.person
+
+    # --- what it asks of the DVA ---------------------------------------------------------------
+
+    def _devices(self, client: str, _: Line, said: Said) -> None:
+        device = self._device(client)[1].device
+
+        def answered(reply: m.Reply) -> None:
+            if not isinstance(reply.content, m.DeviceList):
+                said(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+                return
+            found = [_shown(one) for one in reply.content.devices]
+            said(True, f"{len(found)} devices", devices=found)
+
+        device.ask(device.dva, m.GetDeviceList(), answered, lambda: said(False, NO_ANSWER))
+
+    def _permission(self, client: str, line: Line, said: Said) -> None:
+        _, person = self._device(client)
+        level = line.get("level")
+        if level not in LEVELS:
+            raise Refused(f"level should be one of {', '.join(LEVELS)}")
+        robot = self._asked(line.get("device"))
+        held = person.robots.get(robot)
+        if held is not None and held.level == level:
+            said(True, f"{held.label} is yours already")
+            return
+        for other in list(person.robots.values()):
+            other.give_back()
+        person.alert = ""
+
+        def answered(ok: bool, text: str) -> None:
+            held = {robot for one in self._world.persons for robot in one.robots}
+            self._world.screens.hold(held)
+            said(ok, text)
+
+        person.take([robot], answered, level)
+
+    def _asked(self, given: Any) -> str:
+        """The id that is asked for: also of what is no robot, so that the DVA can say so.
+
+        Raises:
+            Refused: it is no device that anybody knows.
+        """
+        if isinstance(given, str) and given in self._world.run.stage.labels:
+            return given
+        return self._robot(given)
+
+    def _calibrate(self, client: str, line: Line, said: Said) -> None:
+        phone = self._phone(client)
+        phone.calibrate(settings_of(line))
+        later = " from the next drive on" if phone.driven is not None else ""
+        said(True, f"calibrated{later}")
+
+
+NO_ANSWER = "the DVA does not answer"
+
+
+def _identity(line: Line) -> tuple[str, str, str]:
+    """Label, type and the address of the DVA that a registration names.
+
+    Raises:
+        Refused: one of them makes no sense.
+    """
+    server, port, label, kind = (line.get(key) for key in ("server", "port", "label", "type"))
+    if not isinstance(server, str) or not 1 <= len(server.strip()) <= MOST_LETTERS:
+        raise Refused(f"server should be an address of 1 to {MOST_LETTERS} characters")
+    if not isinstance(port, int) or isinstance(port, bool) or not 1 <= port <= 65_535:
+        raise Refused("port should be a whole number from 1 to 65535")
+    if not isinstance(label, str) or not 1 <= len(label) <= MOST_LETTERS:
+        raise Refused(f"label should have 1 to {MOST_LETTERS} characters")
+    if kind not in TYPES:
+        raise Refused(f"type should be one of {', '.join(TYPES)}")
+    return label, str(kind), f"{server.strip()}:{port}"
+
+
+def _shown(device: m.Device) -> Line:
+    return {
+        "id": device.id_tag,
+        "label": device.label,
+        "type": device.device_type,
+        "address": device.address,
+    }

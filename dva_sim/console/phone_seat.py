@@ -1,0 +1,202 @@
+"""A real phone at the console: how it is calibrated, and what comes of the samples it sends.
+
+On the wire it is a device of the modelled network, as that of any operator. Its samples go through
+the app that simulated phones run, at the times at which they were taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.agents.tilt import PhoneClock, PhoneProfile, TiltSources
+from dva_sim.agents.tilt.accelerometer import Triple
+from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
+from dva_sim.agents.tilt.device_axes import to_tilt_axes
+from dva_sim.console.phone_input import PhoneSettings, Samples
+from dva_sim.network.realtime import PacedClock
+
+Line = dict[str, Any]
+USUAL_HZ = 60.0  # of a phone's browser, until its own rate is known
+RATED_BY = 64  # samples, by which the rate is told
+LEAST_RATED = 8
+FRESH = 1.0  # a rate is told for so long after the newest sample [s]
+MOST_GAP = 10**6  # of what is counted as lost at once
+
+
+class PhoneSeat:
+    """One phone, from the first word of its page on.
+
+    Args:
+        clock: The run's.
+        profile: The profile that settings lead to.
+        given_hz: How often what is steered by stick is sampled [Hz].
+        attempts: How often a command is sent before the link counts as lost.
+
+    Attributes:
+        person: Who it is on the wire; None before it registers.
+        registered: Whether the DVA has agreed.
+        settings: How it is calibrated.
+        orientation: Of its screen [deg].
+        tilt: Makes commands: those of the drive that goes on, or else what its screen shows.
+        samples: How many have come.
+        lost: How many have not, by their numbers.
+        kept: Told of each message's samples, if the person agreed that they are written down.
+    """
+
+    def __init__(
+        self,
+        clock: PacedClock,
+        profile: Callable[[PhoneSettings], PhoneProfile],
+        given_hz: float,
+        attempts: int,
+    ) -> None:
+        self._clock, self._profile_of, self._given_hz = clock, profile, given_hz
+        self._attempts = attempts
+        self.person: PersonAgent | None = None
+        self.registered = False
+        self.settings, self.orientation = PhoneSettings(), 0
+        self._profile = profile(self.settings)
+        self.samples = self.lost = 0
+        self.kept: Callable[[Samples], object] = lambda _: None
+        self._times = PhoneClock()
+        self._told: deque[float] = deque(maxlen=RATED_BY)
+        self._next, self._at, self._came = 0, 0.0, -math.inf
+        self._newest: Triple | None = None
+        self.tilt = self.new_tilt()
+
+    @property
+    def driven(self) -> HeldRobot | None:
+        """The robot that is driven with it."""
+        held = self.person.robots.values() if self.person is not None else ()
+        return next((each for each in held if each.is_driven), None)
+
+    @property
+    def tilts(self) -> bool:
+        """Whether it is steered by tilt, and not by a stick on its screen."""
+        return self.tilt.is_tilted
+
+    # --- what it is told ---------------------------------------------------------------------
+
+    def calibrate(self, settings: PhoneSettings) -> None:
+        """From the next drive on it works so.
+
+        Raises:
+            ConfigError: no phone could.
+        """
+        self._profile = self._profile_of(settings)
+        self.settings = settings
+        self._show_anew()
+
+    def new_tilt(self) -> TiltSources:
+        """What makes the commands of the next drive."""
+        settings = self.settings
+        reference = to_tilt_axes(settings.reference, self.orientation, settings.ios)
+        period = 1.0 / (self.rate_hz or USUAL_HZ)
+        self.tilt = TiltSources(self._profile, reference, period, self._given_hz)
+        self.tilt.pick_up(self._clock.now)
+        return self.tilt
+
+    def turn(self, orientation: int) -> None:
+        """Its screen is turned."""
+        if orientation != self.orientation:
+            self.orientation = orientation
+            self._show_anew()
+
+    def _show_anew(self) -> None:
+        if self.driven is None:
+            self.new_tilt()
+
+    def take(self, said: Samples, came: float) -> None:
+        """Samples have come.
+
+        Args:
+            said: Which.
+            came: When, real time [s].
+        """
+        fresh = [pair for pair in zip(said.at, said.xyz, strict=True) if not self._is_old(pair[0])]
+        self._count(said, len(fresh))
+        if not fresh:
+            return
+        told = [at for at, _ in fresh]
+        for at, (_, xyz) in zip(self._times.times_of(told, came), fresh, strict=True):
+            # What was so long ago in real time was as long ago here, times the pace.
+            self._at = max(self._at, self._clock.now - (came - at) * self._clock.factor)
+            self._newest = to_tilt_axes(xyz, self.orientation, self.settings.ios)
+            self.tilt.sample(self._at, self._newest)
+        self._told.extend(told)
+        self._came = came
+        driven = self.driven
+        if driven is not None and self.tilts:
+            driven.tilted(said.first + len(said.at) - 1, self._at)
+        elif driven is None:
+            self.tilt.look(self._clock.now)  # the screen shows what would be sent
+        self.kept(said)
+
+    def _is_old(self, told: float) -> bool:
+        return self._times.is_old(told)
+
+    def _count(self, said: Samples, fresh: int) -> None:
+        gap = said.first - self._next
+        if self.samples and gap > 0:
+            self.lost += min(gap, MOST_GAP)
+        self.samples += fresh
+        self._next = said.first + len(said.at)
+        if self._told and said.at[-1] < self._told[-1]:
+            self._told.clear()
+
+    # --- what it tells -----------------------------------------------------------------------
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Samples per second by the phone's own clock; None: too few are known."""
+        if len(self._told) < LEAST_RATED:
+            return None
+        return (len(self._told) - 1) / (self._told[-1] - self._told[0])
+
+    def line(self, now: float) -> Line:
+        """The phone's part of a seat's line.
+
+        Args:
+            now: Real time [s].
+        """
+        person, settings, (level, turn) = self.person, self.settings, self.tilt.shown
+        held = next(iter(person.robots.values()), None) if person is not None else None
+        profile, rate = self._profile, self.rate_hz
+        fresh = rate is not None and now - self._came < FRESH
+        return {
+            **self.identity(),
+            "registered": self.registered,
+            "device": None if held is None else held.robot,
+            "level": None if held is None or not held.session else held.level,
+            "calibrated": settings.calibrated,
+            "pipeline": settings.pipeline,
+            "filter": profile.filter,
+            "mapping": profile.mapping,
+            "radius_deg": int(turn),
+            "speed_mps": round(level * SPEED_PER_LEVEL, 3),
+            "reading": self._reading(),
+            "sensor_hz": round(rate, 1) if rate is not None and fresh else None,
+            "samples": self.samples,
+            "samples_lost": self.lost,
+            "attempts": self._attempts,
+        }
+
+    def identity(self) -> Line:
+        """Who it is on the wire."""
+        device = None if self.person is None else self.person.device
+        return {
+            "id": "" if device is None else device.id_tag,
+            "label": "" if device is None else device.label,
+            "address": "" if device is None else device.address,
+        }
+
+    def _reading(self) -> list[float] | None:
+        if self._newest is None:
+            return None
+        level, turn = self.tilt.reading(self._newest)
+        return [round(level, 2), round(turn, 1)]

@@ -1,0 +1,121 @@
+"""The phones of a console: who registers gets a device of the modelled network, for as long as
+its page is there.
+
+Numbers, and with them ids, are given out again only when the DVA has forgotten who had them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.operator.handheld import Console
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.agents.tilt import PhoneProfile, known_filters, known_mappings
+from dva_sim.console.phone_input import DELAYS, PIPELINES, STEPS, PhoneSettings
+from dva_sim.console.phone_seat import PhoneSeat
+from dva_sim.core.registry import FORGET_AFTER, OPERATOR, REMOTE, ROBOT
+from dva_sim.network.realtime import PacedClock
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, address_of
+from dva_sim.simulation.scenario import PhoneConfig, phone_profile
+
+Line = dict[str, Any]
+DVA_PORT: Final = 5555  # at which the modelled DVA is said to listen
+NOBODY: Final = "02:00:00:00:FF:FF"  # who listens at any other address
+MOST_PHONES: Final = 64
+MOST_IDS: Final = 250
+FIRST_SEAT: Final = 1000  # number of the seat of the first phone
+RESTS: Final = FORGET_AFTER + 60.0  # from the end of a phone until its id is given out again [s]
+TYPES: Final = {"Robot": ROBOT, "Remote Control": REMOTE, "Teleoperation": OPERATOR}
+"""What a device calls itself on the wire, by the word on the screen."""
+
+
+class Phones:
+    """All phones of a console.
+
+    Args:
+        run: In which.
+        clock: Its own.
+        console: What persons work with by now.
+
+    Attributes:
+        by_client: The phones by their pages.
+    """
+
+    def __init__(self, run: Run, clock: PacedClock, console: Callable[[], Console]) -> None:
+        self._run, self._clock, self._console = run, clock, console
+        self.by_client: dict[str, PhoneSeat] = {}
+        self._used: set[int] = set()
+
+    @property
+    def address(self) -> str:
+        """Where the modelled DVA listens."""
+        return f"{address_of('dva', 1)}:{DVA_PORT}"
+
+    def seat(self, client: str) -> PhoneSeat | None:
+        """The phone of a page, from its first word on; None: there are too many."""
+        if client not in self.by_client:
+            if len(self.by_client) >= MOST_PHONES:
+                return None
+            setup, hz = self._console().setup, self._console().phone.sample_rate_hz
+            seat = PhoneSeat(self._clock, self.profile, hz, setup.attempts)
+            self.by_client[client] = seat
+        return self.by_client[client]
+
+    def profile(self, settings: PhoneSettings) -> PhoneProfile:
+        """What a phone is that is calibrated so.
+
+        Raises:
+            ConfigError: no phone could work so.
+        """
+        phone = PhoneConfig(profile=settings.pipeline, **settings.changes)
+        return phone_profile(self._run.scenario.model_copy(update={"phone": phone}))
+
+    def offer(self) -> Line:
+        """What a phone's page may choose from."""
+        default = self.profile(PhoneSettings())
+        return {
+            "pipelines": {
+                name: self.profile(PhoneSettings(pipeline=name)).model_dump(mode="json")
+                for name in PIPELINES
+            },
+            "filters": known_filters(),
+            "mappings": known_mappings(),
+            "speed_step_mps2": default.speed_step_mps2,
+            "turn_step_mps2": default.turn_step_mps2,
+            "max_delay_s": default.max_delay_s,
+            "limits": {"step_mps2": list(STEPS), "max_delay_s": list(DELAYS)},
+        }
+
+    # --- devices -----------------------------------------------------------------------------
+
+    def new_person(self, seat: PhoneSeat, label: str, kind: str, address: str) -> int | None:
+        """A device for a phone, that knows a DVA at an address; the number of its seat.
+
+        None: too many have come and gone lately.
+        """
+        number = next((n for n in range(1, MOST_IDS + 1) if n not in self._used), None)
+        if number is None:
+            return None
+        self._used.add(number)
+        device = self._run.stage.device("phone", number)
+        device.label = device.labels[device.id_tag] = label
+        device.device_type = TYPES[kind]
+        device.dva = DVA if address == self.address else NOBODY
+        seat.person = PersonAgent(device, self._console(), seat.new_tilt)
+        seat.person.sit_down()
+        return FIRST_SEAT + number
+
+    def retire(self, number: int, device: AgentDevice) -> None:
+        """A phone is there no more; what it said last still goes out."""
+        device.leave()
+        self._clock.call_after(RESTS, self._forget, number - FIRST_SEAT, device)
+
+    def _forget(self, number: int, device: AgentDevice) -> None:
+        for peer in (DVA, NOBODY, *self._run.field.robots):
+            device.forget(peer)
+        self._run.stage.devices.remove(device)
+        device.labels.pop(device.id_tag, None)
+        self._used.discard(number)
