@@ -29,9 +29,10 @@ from dva_sim.experiments.study.registration import Preregistration, departures, 
 from dva_sim.experiments.study.study import FOLDER, Study, Version
 from dva_sim.experiments.study.tuning import TunedValues
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, Document, KeyPath, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario, model_of
 from dva_sim.simulation.scenario import Scenario
