@@ -363,7 +363,8 @@ class Config(BaseModel):
     Numbers are numbers: neither `true` nor `"2"` is one, and `2.0` is no whole number.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    # A schema is built when it is first needed: few programs need all of them.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         """What is otherwise than by default, so that a whole scenario fits a screen."""
