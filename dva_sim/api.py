@@ -86,7 +86,7 @@ def episode(
     asked = locals().copy()
     from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
     from dva_sim.experiments.report.notebook import episode_of  # late: start-up
-    from dva_sim.testing.file_kinds import mistakes_of  # late: start-up
+    from dva_sim.testing.scenario_mistakes import mistakes_of  # late: start-up
 
     request = EpisodeRequest.of(**asked)
     with mistakes_of(request.scenario, request.changes, seed):

@@ -9,7 +9,7 @@ from typing import Any
 
 from shapely import LineString, Point, Polygon, box, difference, get_parts, union_all
 
-from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.geojson import Feature, write_features
 

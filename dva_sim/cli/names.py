@@ -17,15 +17,17 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import dva_sim
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import parse_scalar
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import Plugins
 from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.yaml_files import parse_scalar
 from dva_sim.testing.promises import TRIALS, plural
+
+if TYPE_CHECKING:
+    from dva_sim.kernel.plugins import Plugins
 
 
 class ShippedNames(NamedTuple):
@@ -75,7 +77,7 @@ def _found(module: str, what: Any, body: list[ast.stmt] | None = None) -> tuple[
         return _found(f"{package}.{imported}", ast.Name(what.attr))
     if not isinstance(what, ast.Name):
         return module, what
-    for node in _source(module) if body is None else body:
+    for node in _statements(module, what.id) if body is None else body:
         match node:
             case ast.ClassDef(name=what.id):
                 return module, node
@@ -95,11 +97,18 @@ def _file(module: str, name: str = "") -> Path | None:
     return next((p for p in (path / "__init__.py", path.with_suffix(".py")) if p.is_file()), None)
 
 
+def _statements(module: str, name: str) -> Iterator[ast.stmt]:
+    """The statements of a module that may bind a name; to parse all of it takes much longer."""
+    binds = re.compile(rf"(class )?{name}\b|from dva_sim\b.*\b{name}\b", re.DOTALL)
+    return (ast.parse(text).body[0] for text in _texts(module) if binds.match(text))
+
+
 @cache
-def _source(module: str) -> list[ast.stmt]:
+def _texts(module: str) -> list[str]:
+    """The statements of a module as text: each begins at a line's first column."""
     file = _file(module)
     assert file is not None, module
-    return ast.parse(file.read_bytes()).body
+    return re.split(r"\n(?=[A-Za-z_@])", file.read_text(encoding="utf-8"))
 
 
 def kinds_of_plugins() -> dict[str, tuple[str, Plugins[Any]]]:
@@ -262,10 +271,16 @@ def _described(path: Path) -> str:
 
 
 def _plugins_of(there: ShippedNames) -> Iterator[NamedThing]:
-    told = {entry.name: f"of {entry.value}" for entry in entry_points(group=there.group)}
+    told = {entry.name: f"of {entry.value}" for entry in _installed().select(group=there.group)}
     for name, text in there.shipped.items():
         told[name] = _first(" ".join(text.partition("\n\n")[0].split())) or told.get(name, "")
     return (NamedThing(name, description) for name, description in sorted(told.items()))
+
+
+@cache
+def _installed() -> Any:
+    """What all installed packages offer: asked for once, as each question reads all of them."""
+    return entry_points()
 
 
 def _first(text: str) -> str:

@@ -5,18 +5,18 @@ A mistake in the words of a call is told in one line that says what would be rig
 
 from __future__ import annotations
 
-import inspect
+import gc
 import os
 import re
 import sys
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, ClassVar, NoReturn
 
 import typer
-from typer.core import TyperCommand, TyperGroup
 
 from dva_sim import __version__
 from dva_sim.cli import files, results, runs, site, studies
+from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
 from dva_sim.kernel.suggestions import hint
 
@@ -44,13 +44,6 @@ def in_a_line(error: Any) -> str:
     return told if told.endswith("?") else f"{told}; {more}"
 
 
-def name_of(param: Any) -> str:
-    """An option by its long name, an argument by the word in the usage."""
-    if param.param_type_name == "argument":
-        return str(param.metavar or param.name.upper())
-    return str(max(param.opts, key=len))
-
-
 def _help(param: Any) -> str:
     told = str(param.help or "").rstrip(".")
     return told[:1].lower() + told[1:]
@@ -62,79 +55,6 @@ def _options(error: Any, more: str) -> str:
     known = [opt for param in error.ctx.command.get_params(error.ctx) for opt in param.opts]
     near = hint(error.option_name, [opt for opt in known if opt.startswith("--")])
     return near if near.startswith("did you") else more
-
-
-HELP = {"help_option_names": ["-h", "--help"]}
-_EXAMPLES = "\nExamples:\n"
-
-
-class CommandWithExamples(TyperCommand):
-    """A command whose docstring ends in examples, each `call  # what it does`.
-
-    Attributes:
-        examples: The calls, with what they do.
-    """
-
-    def __init__(self, *args: Any, help: str | None = None, **others: Any) -> None:
-        text, _, examples = inspect.cleandoc(help or "").partition(_EXAMPLES)
-        super().__init__(*args, help=text.strip(), **others)
-        self.examples = [
-            (call.strip(), told.strip())
-            for call, _, told in (line.partition("  # ") for line in examples.splitlines())
-            if call.strip()
-        ]
-
-    def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Options, then what has to be given, and in brackets what may be."""
-        given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
-        names = [name_of(p) if p.required else f"[{name_of(p)}]" for p in given]
-        return ["[OPTIONS]", *names]
-
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Arguments by the words of the usage, then options."""
-        given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
-        if given:
-            with formatter.section("Arguments"):
-                formatter.write_dl([(name_of(p), getattr(p, "help", "")) for p in given])
-        records = [p.get_help_record(ctx) for p in self.get_params(ctx) if p not in given]
-        with formatter.section("Options"):
-            formatter.write_dl([record for record in records if record is not None])
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        """The examples as they are, since rewrapped ones cannot be copied."""
-        super().format_epilog(ctx, formatter)
-        if not self.examples:
-            return
-        with formatter.section("Examples"):
-            for call, told in self.examples:
-                if told:
-                    formatter.write(f"  # {told}\n")
-                formatter.write(f"  {call}\n")
-
-
-class PanelGroup(TyperGroup):
-    """A group whose commands stand under the headings of their panels."""
-
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """As ever; of a command that there is not, the nearest is named."""
-        name = args[0]
-        if not ctx.resilient_parsing and self.get_command(ctx, name) is None and name[0] != "-":
-            ctx.fail(f"{name!r} is no command; {hint(name, self.list_commands(ctx))}")
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """One list for each panel, in the order in which they were added."""
-        named = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        shown = [(name, command) for name, command in named if command and not command.hidden]
-        widest = max(len(name) for name, _ in shown)
-        panels: dict[str, list[tuple[str, str]]] = {}
-        for name, command in shown:
-            told = command.get_short_help_str(formatter.width - widest - 4)
-            title = getattr(command, "rich_help_panel", None) or "Commands"
-            panels.setdefault(title, []).append((name.ljust(widest), told))
-        for title, rows in panels.items():
-            with formatter.section(title):
-                formatter.write_dl(rows)
 
 
 class Stopped(DvaSimError):
@@ -149,8 +69,28 @@ class ReaderGone(DvaSimError):
     exit_code = ExitCode.READER_GONE
 
 
+class SiteGroup(PanelGroup):
+    """The commands about one site."""
+
+    panels: ClassVar[Panels] = {"Commands": {"show": site.show, "export": site.export}}
+
+
+def _named(*commands: Callable[..., None]) -> dict[str, Command]:
+    return {command.__name__.rstrip("_"): command for command in commands}
+
+
 class DvaSimProgram(PanelGroup):
     """The program itself, whose help ends with the exit codes."""
+
+    panels: ClassVar[Panels] = {
+        "Studies": _named(studies.demo, studies.run, studies.new, studies.register, studies.tune),
+        "Results": _named(results.report, results.show, results.export, results.compare),
+        "Single runs": _named(runs.episode, runs.replay, runs.live, runs.console, runs.keys),
+        "Names, files and evidence": {
+            **_named(files.list_, files.plugins, files.check, files.schema, files.validate),
+            "site": typer_of(SiteGroup, help="Draw a site, or write it as files to edit."),
+        },
+    }
 
     def invoke(self, ctx: Any) -> Any:
         """Tell who ended a command from outside; the parser would end the program by itself."""
@@ -165,32 +105,6 @@ class DvaSimProgram(PanelGroup):
         """What each number means that a command can end with."""
         with formatter.section("Exit codes"):
             formatter.write_dl([(str(int(code)), code.meaning) for code in ExitCode])
-
-
-_PANELS: dict[str, tuple[Callable[..., None], ...]] = {
-    "Studies": (studies.demo, studies.run, studies.new, studies.register, studies.tune),
-    "Results": (results.report, results.show, results.export, results.compare),
-    "Single runs": (runs.episode, runs.replay, runs.live, runs.console, runs.keys),
-    "Names, files and evidence": (
-        files.list_,
-        files.plugins,
-        files.check,
-        files.schema,
-        files.validate,
-    ),
-}
-
-
-def _typer(cls: type[PanelGroup], help: str) -> typer.Typer:
-    return typer.Typer(
-        cls=cls,
-        help=help,
-        no_args_is_help=True,
-        add_completion=cls is DvaSimProgram,
-        context_settings=HELP,
-        rich_markup_mode=None,  # a third of the time that help takes
-        pretty_exceptions_enable=False,
-    )
 
 
 def _print_version(wanted: bool) -> None:
@@ -210,23 +124,8 @@ def _program(
     """A test bench for surveillance teams of people and teleoperated robots."""
 
 
-def _assembled() -> typer.Typer:
-    program = _typer(DvaSimProgram, "")
-    program.callback()(_program)
-    for panel, commands in _PANELS.items():
-        for command in commands:
-            name = command.__name__.rstrip("_")
-            program.command(
-                name, cls=CommandWithExamples, rich_help_panel=panel, context_settings=HELP
-            )(command)
-    sites = _typer(PanelGroup, "Draw a site, or write it as files to edit.")
-    for command in (site.show, site.export):
-        sites.command(cls=CommandWithExamples, context_settings=HELP)(command)
-    program.add_typer(sites, name="site", rich_help_panel=panel)
-    return program
-
-
-app = _assembled()
+app = typer_of(DvaSimProgram, add_completion=True)
+app.callback()(_program)
 
 
 def call(words: Sequence[str] | None = None) -> int:
@@ -269,4 +168,6 @@ def _told(problem: object, code: int) -> int:
 
 def main() -> NoReturn:
     """Entry point: `dva-sim`."""
+    # What modules define stays: to look through it for garbage takes a twelfth of loading it.
+    gc.set_threshold(20_000, 20, 20)
     sys.exit(call())

@@ -74,8 +74,8 @@ def _open(name: str, changes: Sequence[str]) -> Site:
         ConfigError: it cannot be read, or takes no options.
     """
     from dva_sim.kernel import resources  # late: start-up
-    from dva_sim.kernel.config import load_yaml  # late: start-up
     from dva_sim.kernel.config_overrides import parse_changes  # late: start-up
+    from dva_sim.kernel.yaml_files import load_yaml  # late: start-up
     from dva_sim.worlds.site import load_site, map_site  # late: start-up
 
     options = parse_changes(changes)

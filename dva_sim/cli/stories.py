@@ -25,11 +25,10 @@ from dva_sim.experiments.report.episode import (
     open_recording,
     write_replay,
 )
-from dva_sim.experiments.report.figures.trial import name_and_unit
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import resolved
 from dva_sim.recordings.pictures import Wanted
-from dva_sim.recordings.pictures.moments import story
+from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
@@ -338,6 +337,8 @@ def _first_trials(trials: Sequence[Row]) -> Table:
 
 def _head(key: str) -> str:
     """A column of a condition as a head, with its unit."""
+    from dva_sim.experiments.report.figures.trial import name_and_unit  # late: start-up
+
     name, unit = name_and_unit(key)
     return f"{name}\n[{unit}]"
 

@@ -1,4 +1,4 @@
-"""Read YAML 1.2 and check it against a pydantic model; mistakes are told by line and column.
+"""Check what a file says against a pydantic model; mistakes are told by key.
 
 What pydantic finds is said in words without Python: what is wrong, and what would be right. An
 unknown key is answered with the one that was meant: beside it, elsewhere in the file, or by another
@@ -10,21 +10,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq, TaggedScalar
-from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either, guess, listed, plain_name, unknown
 from dva_sim.kernel.units import as_number
+from dva_sim.kernel.yaml_files import KeyPath
 
-KeyPath = tuple[str | int, ...]
 Scalar = bool | int | float | str | None
 
 _DEPTH = 4  # of keys in keys
@@ -368,7 +363,8 @@ class Config(BaseModel):
     Numbers are numbers: neither `true` nor `"2"` is one, and `2.0` is no whole number.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    # A schema is built when it is first needed: few programs need all of them.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         """What is otherwise than by default, so that a whole scenario fits a screen."""
@@ -384,149 +380,6 @@ class Config(BaseModel):
         schema = handler(source)
         _make_strict(schema)
         return schema
-
-
-MOST_VALUES = 20_000  # in one file
-
-
-@dataclass(frozen=True)
-class Document:
-    """A parsed file: plain data, and the place of every key.
-
-    Attributes:
-        data: Plain dictionaries, lists and scalars.
-        file: Where it was read.
-        places: Line and column (from 1) of each key path.
-    """
-
-    data: dict[str, Any]
-    file: Path
-    places: Mapping[KeyPath, tuple[int, int]] = field(default_factory=dict)
-
-    def error(self, problem: str, path: KeyPath = ()) -> ConfigError:
-        """The mistake at `path`, or at its nearest ancestor with a known place."""
-        while path and path not in self.places:
-            path = path[:-1]
-        line, column = self.places.get(path, (None, None))
-        return ConfigError(problem, self.file, line, column)
-
-
-def read_text(path: Path) -> str:
-    """The text of a file in UTF-8.
-
-    Raises:
-        ConfigError: unreadable, or a byte that such a text cannot have, with its place.
-    """
-    try:
-        data = path.read_bytes()
-        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    except OSError as error:
-        raise ConfigError(f"cannot be read: {error.strerror}", path) from error
-    except UnicodeDecodeError as error:
-        before = data[: error.start].decode("utf-8", "replace")
-        line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
-        raise ConfigError("is not text in UTF-8", path, line, column) from error
-
-
-def load_yaml(path: str | Path) -> Document:
-    """Read a mapping from a YAML file.
-
-    Raises:
-        ConfigError: unreadable, not YAML, a key twice, or not a mapping.
-    """
-    path = Path(path)
-    text = read_text(path)
-    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
-    try:
-        tree = _reader().load(text)
-        if not isinstance(tree, CommentedMap):
-            raise ConfigError("should be a mapping of keys to values", path, 1, 1)
-        return Document(_plain(tree, (), places), path, places)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        problem = (error.problem or "is not valid YAML").split("\n")[0]
-        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
-        raise ConfigError(problem, path, line, column) from error
-    except YAMLError as error:
-        raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error
-    except RecursionError:
-        raise ConfigError("is nested too deeply", path) from None
-    except _TooMuchError as error:
-        raise ConfigError(str(error), path) from None
-    except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
-        raise ConfigError(f"has a value that cannot be read: {error}", path) from error
-
-
-_OWN = "tag:yaml.org,2002:"
-_VALUES = frozenset(
-    f"{_OWN}{kind}"
-    for kind in ("str", "int", "float", "bool", "null", "map", "seq", "timestamp", "merge")
-)
-
-
-class _PlainKinds(RoundTripConstructor):
-    """Makes nothing but text, numbers, yes and no, lists and mappings.
-
-    Else a tag such as `!!python/object` makes something that nobody expects further on.
-    """
-
-    def construct_object(self, node: Any, deep: bool = False) -> Any:
-        """The value of a node."""
-        if str(node.tag) not in _VALUES:
-            tag = str(node.tag).replace(_OWN, "!!")[:64]
-            problem = f"{tag} makes no value that is known here; write the value without it"
-            raise ConstructorError(problem=problem, problem_mark=node.start_mark)
-        try:
-            return super().construct_object(node, deep)
-        except (ValueError, KeyError, IndexError, TypeError) as error:
-            # Such as the date 2001-13-32, a number of 5000 digits, or `!!bool maybe`.
-            problem = f"has a value that cannot be read: {error}"
-            raise ConstructorError(problem=problem, problem_mark=node.start_mark) from error
-
-
-def _reader() -> YAML:
-    """Reads YAML with its places."""
-    reader = YAML(typ="rt", pure=True)
-    reader.Constructor = _PlainKinds
-    return reader
-
-
-class _TooMuchError(ValueError):
-    """A few aliases of aliases can stand for more values than any memory holds."""
-
-
-def _plain(node: Any, path: KeyPath, places: dict[KeyPath, tuple[int, int]]) -> Any:
-    """Plain data without ruamel's types; records the place of every key on the way."""
-    if len(places) > MOST_VALUES:
-        raise _TooMuchError(f"has more than {MOST_VALUES} values, aliases counted")
-    if isinstance(node, CommentedMap):
-        out = {}
-        for key, value in node.items():
-            line, column, *_ = (node.lc.data or {}).get(key, (node.lc.line, node.lc.col))
-            places[(*path, str(key))] = (line + 1, column + 1)
-            out[str(key)] = _plain(value, (*path, str(key)), places)
-        return out
-    if isinstance(node, CommentedSeq):
-        for index in range(len(node)):
-            line, column = node.lc.item(index)
-            places[(*path, index)] = (line + 1, column + 1)
-        return [_plain(value, (*path, index), places) for index, value in enumerate(node)]
-    if isinstance(node, bool) or node is None:
-        return node
-    if isinstance(node, TaggedScalar):
-        return str(node.value)
-    for kind in (int, float, str):
-        if isinstance(node, kind):
-            return kind(node)
-    return node
-
-
-def parse_scalar(text: str) -> Any:
-    """What `text` would be as a value in YAML: `--set seed=3` gives the number 3."""
-    try:
-        return _plain(YAML(typ="safe", pure=True).load(text), (), {})
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise ConfigError(f"value {text[:80]!r} is not valid YAML") from error
 
 
 def validate(

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dva_sim.kernel.config import Document, Fail, M, parse_scalar, validate
+from dva_sim.kernel.config import Fail, M, validate
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, parse_scalar
 
 _SHOWN = 80  # characters of a setting
 

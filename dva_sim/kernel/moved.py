@@ -2,8 +2,11 @@
 
 import sys
 from collections.abc import Sequence
-from importlib.abc import MetaPathFinder
 from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    pass
 
 # What pages and examples have named, and whole rooms; names are relative to `dva_sim`.
 MOVED = {
@@ -45,7 +48,7 @@ MOVED = {
 }
 
 
-class MovedFinder(MetaPathFinder):
+class MovedFinder:
     """Asked last: a module that no other finder knows may have an earlier name."""
 
     def find_spec(

@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
 from dva_sim.kernel import config_overrides
-from dva_sim.kernel.config import Config, Document, Fail
+from dva_sim.kernel.config import Config, Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Columns, names_of
 from dva_sim.kernel.plugins import Plugins, stamp_of
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import Document
 from dva_sim.simulation import full, shift, task, transport
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import measures as of_full

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -29,9 +28,10 @@ from dva_sim.experiments.study.registration import Preregistration, departures, 
 from dva_sim.experiments.study.study import FOLDER, Study, Version
 from dva_sim.experiments.study.tuning import TunedValues
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, Document, KeyPath, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario, model_of
 from dva_sim.simulation.scenario import Scenario
@@ -174,24 +174,11 @@ def _quoted(document: Document, problem: str) -> KeyPath:
     return ()
 
 
-@contextmanager
-def mistakes_of(name: str, pairs: Sequence[str], seed: int) -> Iterator[None]:
-    """Tell a mistake in a scenario at its key or at the `--set` that makes it.
-
-    Args:
-        name: The scenario, by name or path.
-        pairs: `key=value` for each key that is changed.
-        seed: Of the run.
-
-    Raises:
-        ConfigError: what was raised inside, with its place.
-    """
-    try:
-        yield
-    except ConfigError as error:
-        if error.file is not None and not error.keys:
-            raise _of_other_kind(error, name) or error from None
-        raise _placed(error, name, pairs, seed) from None
+def placed_mistake(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> ConfigError:
+    """A mistake in a scenario with its place: see `scenario_mistakes.mistakes_of`."""
+    if error.file is not None and not error.keys:
+        return _of_other_kind(error, name) or error
+    return _placed(error, name, pairs, seed)
 
 
 def _of_other_kind(error: ConfigError, name: str) -> ConfigError | None:

@@ -12,9 +12,9 @@ from operator import or_
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.protocol.limits import schema_file
 from dva_sim.testing.messages import READ_BYTES, Problem, check_message, not_text
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.kernel.config import Document
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document
 from dva_sim.simulation.models import Model, Tables, model_of
 from dva_sim.testing.promises import Case, Outcome, broken_in, is_slow, kept, part_by_part
 

@@ -19,8 +19,8 @@ from dva_sim.experiments.execution import executors
 from dva_sim.experiments.execution.scheduling import run_all
 from dva_sim.experiments.report.figures.style import Drawn, finish
 from dva_sim.experiments.study.cell_grid import StudyJob
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.models import AnyScenario, Tables
 
 if TYPE_CHECKING:

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from shapely.geometry import mapping, shape
 
-from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.maps import segments
 from dva_sim.worlds.site_parts import (

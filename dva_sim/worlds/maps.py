@@ -13,7 +13,8 @@ import shapely
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.geo import Pose
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, 255

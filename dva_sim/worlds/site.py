@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.geojson import Feature, make_plan, read_features

@@ -24,9 +24,10 @@ from dva_sim.agents.people.evacuation import (
 )
 from dva_sim.agents.people.profiles import BystanderProfile, Occupant
 from dva_sim.agents.population import Trait
-from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.resources import find
 from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.worlds.hazards import CLEAR, Surroundings, make_hazard, pace_in_smoke, pace_in_water
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site

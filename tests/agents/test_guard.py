@@ -12,8 +12,9 @@ from pretended_dva import GUARD, POST, WALKER, PretendedDva
 from dva_sim.agents.people.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
 from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MOST_ANNOUNCED, GuardProtocol
 from dva_sim.agents.people.profiles import GuardProfile, Walker
-from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.resources import find
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.hazards import CLEAR, KINDS, Conditions, make_hazard
 

@@ -14,11 +14,11 @@ from typer.main import get_command
 
 from dva_sim import __version__
 from dva_sim.cli import app, call
-from dva_sim.cli.program import PanelGroup
+from dva_sim.cli.commands import PanelGroup
 from dva_sim.kernel.errors import ConfigError, ExitCode, RunsFailed
 
-COMMANDS = [c.name or c.callback.__name__.rstrip("_") for c in app.registered_commands]
-PATHS = [[name] for name in COMMANDS] + [["site"], ["site", "show"], ["site", "export"]]
+COMMANDS = get_command(app).list_commands(None)
+PATHS = [[name] for name in COMMANDS] + [["site", "show"], ["site", "export"]]
 WIDTH = 80
 
 
@@ -64,14 +64,14 @@ def test_examples_use_words_and_options_that_there_are(path):
         with program.make_context("dva-sim", words) as context:
             _, command, rest = program.resolve_command(context, words)
             while isinstance(command, PanelGroup):
-                command, rest = command.commands[rest[0]], rest[1:]
+                command, rest = command.get_command(context, rest[0]), rest[1:]
             command.make_context("x", rest, parent=context).close()
 
 
 def command_at(path):
     command = get_command(app)
     for name in path:
-        command = command.commands[name]
+        command = command.get_command(None, name)
     return command
 
 

@@ -6,9 +6,9 @@ from rich.console import Console
 from dva_sim.cli.stories import tell
 from dva_sim.experiments.report.episode import EpisodeRequest, Played
 from dva_sim.experiments.report.figures.trial import draw_trial, trial_figure
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import find
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.simulation.models import model_for
 from dva_sim.simulation.task import build, trace_of

@@ -10,9 +10,10 @@ import pytest
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams, derive_seed
+from dva_sim.kernel.yaml_files import load_yaml
 
 
 class Inner(Config):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from dva_sim.recordings.pictures.moments import decided_at, story, verdicts
+from dva_sim.recordings.pictures.run_endings import decided_at, story, verdicts
 from dva_sim.simulation.full import Ending
 
 

@@ -7,8 +7,8 @@ import pytest
 from lxml import etree
 
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.testing.files import schema_text
 
 ROOT = Path(__file__).parents[2]

@@ -14,8 +14,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 
 FOLDER = "experiments/validation"
 TARGETS, SPLIT = "operators", "operators-split"

@@ -12,7 +12,8 @@ from dva_sim.agents.robot.battery import BatteryProfile
 from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import KINDS, SensorConfig
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.drives import LONGEST_TICK, DriveSpec, load_drive
 
 FOLDER: Final = "agents/robots"

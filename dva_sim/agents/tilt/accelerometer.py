@@ -12,7 +12,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.yaml_files import load_yaml
 
 GRAVITY: Final = 9.80665  # [m/s^2]
 TICK: Final = 2.0**-12  # of the clock that tells when a sample is taken [s]

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.network.patterns import PATTERNS, Pattern, meaning_of
 
 RING = "°"  # marks on paper what the list explains

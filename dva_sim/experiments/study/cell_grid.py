@@ -27,11 +27,11 @@ from dva_sim.experiments.study.own_measures import names_of_own
 from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
-from dva_sim.kernel.config import Document, KeyPath
 from dva_sim.kernel.config_overrides import blame
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.kernel.suggestions import listed, unknown
+from dva_sim.kernel.yaml_files import Document, KeyPath
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import AnyScenario, model_for, model_of
 

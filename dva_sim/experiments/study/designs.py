@@ -27,9 +27,10 @@ from dva_sim.experiments.study.parts import (
     refuse_keys_of_the_design,
     says,
 )
-from dva_sim.kernel.config import MOST_VALUES, Config, Document, KeyPath, parse_scalar, read_text
+from dva_sim.kernel.config import Config
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
+from dva_sim.kernel.yaml_files import MOST_VALUES, Document, KeyPath, parse_scalar, read_text
 
 Row = dict[str, Level]
 

@@ -25,9 +25,10 @@ from dva_sim.experiments.study.designs import Row, ValueRange, keys_of, sample, 
 from dva_sim.experiments.study.parts import POINT, REPEATS, STRATEGY, Level, Range, RobustnessRule
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, KeyPath, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.yaml_files import KeyPath, load_yaml
 
 PEOPLE = "agents/people"
 PARAMETERS = "parameters"  # factor: which set of parameters

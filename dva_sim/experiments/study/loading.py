@@ -22,19 +22,12 @@ from dva_sim.experiments.study.designs import all_factors, read_table
 from dva_sim.experiments.study.registration import settled
 from dva_sim.experiments.study.study import FOLDER, SIZES, Study, Version
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import (
-    Config,
-    Document,
-    KeyPath,
-    load_yaml,
-    meant,
-    parse_scalar,
-    validate,
-)
+from dva_sim.kernel.config import Config, meant, validate
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml, parse_scalar
 from dva_sim.simulation.models import MODELS, model_of
 from dva_sim.simulation.scenario import load as load_scenario
 

@@ -22,10 +22,11 @@ from dva_sim.experiments.study.hashing import (
 )
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status, Study
-from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import REGISTRATION
 from dva_sim.kernel.streams import derive_seed
+from dva_sim.kernel.yaml_files import Document, load_yaml
 
 _OPEN = {"question", "seed"}  # keys that a registration does not fix
 _ANY_SEED = 0  # what is fixed must not depend on the seed that follows from it

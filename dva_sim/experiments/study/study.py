@@ -26,8 +26,9 @@ from dva_sim.experiments.study.parts import (
     StudyPart,
     Tuning,
 )
-from dva_sim.kernel.config import AlsoCalled, Config, Document, KeyPath
+from dva_sim.kernel.config import AlsoCalled, Config
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, KeyPath
 
 Version = Literal["quick", "full"]
 VERSIONS: tuple[Version, ...] = ("quick", "full")

@@ -13,8 +13,9 @@ from dva_sim.experiments.study import validation
 from dva_sim.experiments.study.parts import Level, Levels, Tuning
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 
 FOLDER = "tuned"  # beside the study
 # What a study asks for, and the study that tunes its values does not.

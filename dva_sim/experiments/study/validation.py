@@ -21,8 +21,8 @@ from dva_sim.experiments.study.parts import (
     refuse_keys_of_the_design,
 )
 from dva_sim.experiments.study.study import Study
-from dva_sim.kernel.config import KeyPath
 from dva_sim.kernel.suggestions import hint
+from dva_sim.kernel.yaml_files import KeyPath
 from dva_sim.simulation.models import measured_names
 
 Problem = tuple[str, KeyPath]

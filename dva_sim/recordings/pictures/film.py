@@ -25,7 +25,8 @@ from PIL import Image, ImageColor
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.colours import ROBOT
-from dva_sim.recordings.pictures.moments import Moments, pattern_name, verdicts
+from dva_sim.recordings.pictures.moments import Moments
+from dva_sim.recordings.pictures.run_endings import pattern_name, verdicts
 from dva_sim.recordings.pictures.scene import Scene
 from dva_sim.recordings.pictures.style import Sheet, heading_of
 from dva_sim.simulation.full import Playback

@@ -1,20 +1,15 @@
-"""A recorded run at any moment: who is where, what burns, what a camera sees.
-
-How runs ended, in a few words each: when all was confirmed, and how far ahead one of two was.
-"""
+"""A recorded run at any moment: who is where, what burns, what a camera sees."""
 
 from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from dva_sim.agents.people.bystander import DOWN
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
 from dva_sim.kernel.suggestions import unknown
-from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures.colours import ROBOT
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
@@ -164,100 +159,3 @@ def _shown(drive: DriveLog, time: float) -> float | None:
         return None
     shown = [frame for frame in drive.frames if frame.time <= time]
     return shown[-1].captured if shown and time - shown[-1].time < FRESH else None
-
-
-SAME = 0.05  # a shorter lead is none, as times are told [s]
-
-
-class RunVerdict(NamedTuple):
-    """How a run ended.
-
-    Attributes:
-        time: From when on that is so [s].
-        text: In words; empty if it is not known.
-        good: Whether every event was confirmed, and every false alarm refuted.
-        ahead: How much earlier than the other of two runs that was [s]; infinite if the other
-            never came to it, negative if this one was later.
-    """
-
-    time: float
-    text: str
-    good: bool
-    ahead: float = 0.0
-
-    @property
-    def told(self) -> str:
-        """The words, with the lead if there is one."""
-        if self.ahead == math.inf:
-            return f"{self.text}, the other not at all"
-        return f"{self.text}, {seconds(self.ahead)} ahead" if self.ahead > SAME else self.text
-
-
-def verdicts(runs: Sequence[Playback]) -> list[RunVerdict]:
-    """How each run ended; of two, the one that was ahead says by how much."""
-    found = [_verdict(run) for run in runs]
-    if len(found) != 2 or not all(verdict.text for verdict in found):
-        return found
-    times = [verdict.time if verdict.good else math.inf for verdict in found]
-    leads = _lead(*times), _lead(*reversed(times))
-    return [v._replace(ahead=lead) for v, lead in zip(found, leads, strict=True)]
-
-
-def decided_at(found: Sequence[RunVerdict]) -> float | None:
-    """The moment that shows what some runs differ in: when the first one had come to a good end."""
-    return min((verdict.time for verdict in found if verdict.good), default=None)
-
-
-def story(runs: Sequence[Playback]) -> list[str]:
-    """How runs under several patterns ended, a line for each."""
-    names = [pattern_name(run) for run in runs]
-    width = max(map(len, names))
-    return [f"{name:<{width}}  {v.told}" for name, v in zip(names, verdicts(runs), strict=True)]
-
-
-def pattern_name(run: Playback) -> str:
-    """The messaging pattern of a run, as reports call it."""
-    pattern = run.scenario.pattern
-    shipped = PATTERNS.get(pattern)
-    return shipped.title if shipped else pattern.rpartition(":")[2]
-
-
-def seconds(time: float) -> str:
-    """A span of time: whole seconds, but tenths of a short one."""
-    return f"{time:.0f} s" if time >= 10.0 else f"{time:.1f} s"
-
-
-def _lead(own: float, other: float) -> float:
-    return 0.0 if own == other else other - own
-
-
-def _verdict(run: Playback) -> RunVerdict:
-    """How a run ended, by itself."""
-    right = [
-        ending.outcome == ("refuted" if incident.false_alarm else "confirmed")
-        for incident, ending in zip(run.incidents, run.endings, strict=False)
-    ]
-    if not right:
-        return RunVerdict(run.duration, "", False)
-    good = all(right)
-    last = max(ending.time for ending in run.endings)
-    time = min(last, run.duration)
-    if len(right) == 1:
-        return RunVerdict(time, _of_one(run, good), good)
-    word = "settled" if any(i.false_alarm for i in run.incidents) else "confirmed"
-    if good:
-        all_of = "both" if len(right) == 2 else f"all {len(right)}"
-        return RunVerdict(time, f"{all_of} events {word} at {last:.1f} s", good)
-    text = f"{sum(right)} of {len(right)} events {word} within {time:.0f} s"
-    return RunVerdict(time, text, good)
-
-
-def _of_one(run: Playback, good: bool) -> str:
-    """How the only event of a run ended."""
-    ((outcome, time),) = run.endings
-    if math.isinf(time):
-        never = "reported" if outcome == "undetected" else "confirmed"
-        return f"not {never} within {run.duration:.0f} s"
-    wrong = {"confirmed": "wrongly confirmed", "refuted": "wrongly refuted"}
-    what = outcome if good else wrong.get(outcome, f"not confirmed, {outcome}")
-    return f"{what} at {time:.1f} s"

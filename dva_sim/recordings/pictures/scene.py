@@ -19,7 +19,8 @@ from dva_sim.kernel.recorder import Moment
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.colours import BYSTANDER, GUARD, ROBOT
 from dva_sim.recordings.pictures.layers import LAYER, DrawnBody, DrawnFields
-from dva_sim.recordings.pictures.moments import Moments, RunVerdict
+from dva_sim.recordings.pictures.moments import Moments
+from dva_sim.recordings.pictures.run_endings import RunVerdict
 from dva_sim.worlds.view import draw_site
 from dva_sim.worlds.view_marks import points_per_metre
 

@@ -28,7 +28,8 @@ from dva_sim.recordings.pictures.colours import (
     SMOKE,
     WATER,
 )
-from dva_sim.recordings.pictures.moments import Moments, pattern_name
+from dva_sim.recordings.pictures.moments import Moments
+from dva_sim.recordings.pictures.run_endings import pattern_name
 from dva_sim.simulation.full import Playback
 from dva_sim.worlds.view import limits, set_limits
 

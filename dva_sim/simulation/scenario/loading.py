@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from dva_sim.agents.tilt import try_phone
 from dva_sim.kernel import config_overrides, resources
-from dva_sim.kernel.config import Document, Fail, KeyPath, load_yaml
+from dva_sim.kernel.config import Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.simulation.scenario.contradictions import command_timeout_s, request_timeout_s
 from dva_sim.simulation.scenario.parts import EventConfig
 from dva_sim.simulation.scenario.scenario import (

@@ -13,19 +13,10 @@ from dva_sim.agents.population import Population
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import (
-    AlsoCalled,
-    Config,
-    Document,
-    Fail,
-    Key,
-    KeyPath,
-    M,
-    load_yaml,
-    validate,
-)
+from dva_sim.kernel.config import AlsoCalled, Config, Fail, Key, M, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.network.connections import Depth, TransportKind, ZeromqConfig
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.patterns import Pattern, load_pattern

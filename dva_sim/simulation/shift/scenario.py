@@ -14,9 +14,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dva_sim.kernel import config_overrides
-from dva_sim.kernel.config import Config, Document, Fail, Key, KeyPath
+from dva_sim.kernel.config import Config, Fail, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import Document, KeyPath
 from dva_sim.protocol.messages import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
 from dva_sim.simulation.shift.distributions import ZERO, Constant, Law

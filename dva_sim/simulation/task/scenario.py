@@ -17,8 +17,9 @@ from pydantic import Field, model_validator
 from dva_sim.agents.tilt.accelerometer import load_part
 from dva_sim.agents.tilt.filters import load_filter
 from dva_sim.kernel import config_overrides
-from dva_sim.kernel.config import Config, Document, Fail, Key, KeyPath
+from dva_sim.kernel.config import Config, Fail, Key
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, KeyPath
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.scenario.loading import check_strategy
 from dva_sim.simulation.scenario.parts import OperatorConfig

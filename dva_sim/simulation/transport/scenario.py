@@ -14,9 +14,10 @@ import numpy as np
 from pydantic import Field
 
 from dva_sim.kernel import config_overrides
-from dva_sim.kernel.config import Config, Document, Fail, Key
+from dva_sim.kernel.config import Config, Fail, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import names_of
+from dva_sim.kernel.yaml_files import Document
 from dva_sim.network.transports import Contest, ContestConfig, Fates, play
 from dva_sim.simulation import task
 from dva_sim.simulation.scenario.parts import OperatorConfig

@@ -15,9 +15,10 @@ from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, Document, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.simulation.shift import distributions
 from dva_sim.simulation.shift import scenario as timed
 from dva_sim.simulation.shift.scenario import TimedScenario

@@ -15,9 +15,10 @@ from typing import Annotated
 from pydantic import Field
 
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Config, load_yaml, validate
+from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.network.pattern_runs import CONDITION, Condition
 
 FOLDER = "experiments/validation"

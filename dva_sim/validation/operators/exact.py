@@ -32,8 +32,9 @@ from dva_sim.agents.population import Person, Population, median_person
 from dva_sim.agents.route_following import NEAREST_LOOK, Reach, Route, View
 from dva_sim.agents.tilt.filters import BATCH, Filter, load_filter
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import load_yaml, validate
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.streams import Streams
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.shift import scenario as timed
 from dva_sim.simulation.shift import simulate_timed
 from dva_sim.worlds.hazards import GROWTH_S, Fire, make_hazard

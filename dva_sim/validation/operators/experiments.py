@@ -16,8 +16,8 @@ import numpy as np
 
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.streams import Streams, derive_seed
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.models import Tables
 from dva_sim.simulation.task import TaskScenario, build, play
 from dva_sim.simulation.task.measures import fit_line

@@ -41,7 +41,7 @@ PACES = ((120.0, 1.0), (600.0, 2.0), (1800.0, 5.0), (math.inf, 20.0))
 LARGEST = 2.5  # what can be seen of a leak or flood never grows beyond this [m]; assumed
 
 
-class Hazard(Config):
+class Hazard(Config, defer_build=False):  # its signature, which tells the settings, is built too
     """A growing danger, as it would be in the open: what walls make of it, its field knows.
 
     What a scenario may set of a kind are the fields of its class, with their units, limits and

@@ -8,11 +8,11 @@ from small_study import STUDY, write_study
 from dva_sim.experiments.execution.dry_run import rehearse_all
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.config_overrides import build, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.scenario import Scenario
-from dva_sim.testing.file_kinds import mistakes_of
+from dva_sim.testing.scenario_mistakes import mistakes_of
 
 
 def played(request):

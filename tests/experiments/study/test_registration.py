@@ -10,8 +10,8 @@ from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study import cell_grid, registration
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.registration import load_registration, plan_of, register
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.testing.files import check_file
 
 CLAIMED = (

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, rehearse, simulate
 

@@ -10,7 +10,7 @@ import pytest
 from elsewhere import told_here_and_elsewhere
 
 from dva_sim.core.dispatch import known_policies
-from dva_sim.kernel.config import load_yaml
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.shift import TimedRecording, build, simulate_timed
 from dva_sim.worlds.hazards import make_hazard
 

@@ -1,8 +1,8 @@
 import pytest
 
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import load_yaml
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.task import build, rehearse
 
 SHIPPED = sorted(resources.available("experiments/scenarios/tasks"))

@@ -12,8 +12,8 @@ from dva_sim.cli.stories import tell
 from dva_sim.experiments.report.episode import Played
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel import resources
-from dva_sim.kernel.config import Document, load_yaml
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.simulation.models import model_of
 from dva_sim.simulation.transport import build, simulate_session, tables
 

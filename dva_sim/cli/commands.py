@@ -1,0 +1,184 @@
+"""How a command and a group of commands are made, read their words, and look in help.
+
+A call makes the one command that it names: to make all of them takes as long as to load Typer.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command, get_group
+
+from dva_sim.kernel.suggestions import hint
+
+Command = Callable[..., None] | typer.Typer
+Panels = Mapping[str, Mapping[str, Command]]
+"""Headings, and below each of them commands by name, or groups of such."""
+
+HELP = {"help_option_names": ["-h", "--help"]}
+_EXAMPLES = "\nExamples:\n"
+
+
+def name_of(param: Any) -> str:
+    """An option by its long name, an argument by the word in the usage."""
+    if param.param_type_name == "argument":
+        return str(param.metavar or param.name.upper())
+    return str(max(param.opts, key=len))
+
+
+class _PlainValue:
+    """Makes a value of what was typed for an option: words, paths, or what its parser makes.
+
+    Typer would load pydantic for that, which is half of what the quickest commands cost.
+
+    Args:
+        make: Makes one value of one word, or of a value that is one already.
+    """
+
+    def __init__(self, make: Callable[[Any], Any]) -> None:
+        self._make = make
+
+    def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
+        """The value of an option, a tuple or list of such if it may be given again."""
+        if param.multiple or param.nargs == -1:
+            return [self._make(each) for each in value or ()]
+        return None if value is None else self._make(value)
+
+
+def _read_plainly(params: Sequence[Any]) -> None:
+    """Spare pydantic where a type needs none; what Typer knows of others stays as it is."""
+    for param in params:
+        told = getattr(param, "type_descriptor", None)  # of the Typers that use pydantic
+        if told is not None:
+            kinds = {str: str, list[str]: str, bool: bool, Path: Path}
+            make = told.parameter_info.parser or kinds.get(told.annotation)
+            param._runtime_param = None if make is None else _PlainValue(make)
+
+
+HELP = {"help_option_names": ["-h", "--help"]}
+_EXAMPLES = "\nExamples:\n"
+
+
+class CommandWithExamples(TyperCommand):
+    """A command whose docstring ends in examples, each `call  # what it does`.
+
+    Attributes:
+        examples: The calls, with what they do.
+    """
+
+    def __init__(self, *args: Any, help: str | None = None, **others: Any) -> None:
+        text, _, examples = inspect.cleandoc(help or "").partition(_EXAMPLES)
+        super().__init__(*args, help=text.strip(), **others)
+        self.examples = [
+            (call.strip(), told.strip())
+            for call, _, told in (line.partition("  # ") for line in examples.splitlines())
+            if call.strip()
+        ]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As ever, without pydantic."""
+        _read_plainly(self.get_params(ctx))
+        return super().parse_args(ctx, args)
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Options, then what has to be given, and in brackets what may be."""
+        given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
+        names = [name_of(p) if p.required else f"[{name_of(p)}]" for p in given]
+        return ["[OPTIONS]", *names]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Arguments by the words of the usage, then options."""
+        given = [p for p in self.get_params(ctx) if p.param_type_name == "argument"]
+        if given:
+            with formatter.section("Arguments"):
+                formatter.write_dl([(name_of(p), getattr(p, "help", "")) for p in given])
+        records = [p.get_help_record(ctx) for p in self.get_params(ctx) if p not in given]
+        with formatter.section("Options"):
+            formatter.write_dl([record for record in records if record is not None])
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """The examples as they are, since rewrapped ones cannot be copied."""
+        super().format_epilog(ctx, formatter)
+        if not self.examples:
+            return
+        with formatter.section("Examples"):
+            for call, told in self.examples:
+                if told:
+                    formatter.write(f"  # {told}\n")
+                formatter.write(f"  {call}\n")
+
+
+class PanelGroup(TyperGroup):
+    """A group whose commands stand under headings; each is made when it is asked for.
+
+    Attributes:
+        panels: What it consists of.
+    """
+
+    panels: ClassVar[Panels] = {}
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names, panel by panel."""
+        return [name for commands in self.panels.values() for name in commands]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """One of them; None if there is none of that name."""
+        for commands in self.panels.values() if cmd_name not in self.commands else ():
+            if cmd_name in commands:
+                self.add_command(_made(cmd_name, commands[cmd_name]), cmd_name)
+        return super().get_command(ctx, cmd_name)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As ever, without pydantic."""
+        _read_plainly(self.get_params(ctx))
+        return super().parse_args(ctx, args)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """As ever; of a command that there is not, the nearest is named."""
+        name = args[0]
+        if not ctx.resilient_parsing and self.get_command(ctx, name) is None and name[0] != "-":
+            ctx.fail(f"{name!r} is no command; {hint(name, self.list_commands(ctx))}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """One list for each panel."""
+        widest = max(map(len, self.list_commands(ctx)))
+        for title, commands in self.panels.items():
+            with formatter.section(title):
+                room = formatter.width - widest - 4
+                rows = [(n.ljust(widest), _in_short(of, room)) for n, of in commands.items()]
+                formatter.write_dl(rows)
+
+
+def _in_short(command: Command, room: int) -> str:
+    """What it does, without its being made."""
+    text = command.info.help if isinstance(command, typer.Typer) else command.__doc__
+    return str(CommandWithExamples("", help=str(text)).get_short_help_str(room))
+
+
+def _made(name: str, command: Command) -> Any:
+    if isinstance(command, typer.Typer):
+        return get_group(command)
+    alone = typer_of(None)
+    alone.command(name, cls=CommandWithExamples, context_settings=HELP)(command)
+    return get_command(alone)
+
+
+def typer_of(
+    cls: type[PanelGroup] | None, help: str = "", add_completion: bool = False
+) -> typer.Typer:
+    """A Typer with our layout, of a group or of one command."""
+    return typer.Typer(
+        cls=cls,
+        help=help,
+        no_args_is_help=cls is not None,
+        add_completion=add_completion,
+        context_settings=HELP,
+        rich_markup_mode=None,  # a third of the time that help takes
+        pretty_exceptions_enable=False,
+    )
