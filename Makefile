@@ -9,7 +9,7 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak check same-bytes bench clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak check same-bytes bench goals clean
 
 # Two processes share the tests. Compiled files are kept whatever a shell says: without them each
 # run compiles all tests again, for half a minute.
@@ -63,7 +63,10 @@ check: $(DEV)  ## lint, format, types, import contracts
 same-bytes: $(DEV)  ## whether results are those of another version: make same-bytes AGAINST=COMMIT
 	@$(BIN)/python tests/same_bytes.py --against $(or $(AGAINST),HEAD)
 
-bench: $(BENCH)  ## the ratios that performance work is judged by
+bench: $(BENCH)  ## what the program costs, in instructions: make bench AGAINST=COMMIT ONLY=WORD
+	@$(BIN)/python tests/benchmarks/meter.py --against "$(AGAINST)" --only "$(ONLY)"
+
+goals: $(DEV)  ## what performance work aims at by the clock: crowds, memory, floods, the console
 	@$(BIN)/python -m pytest tests/benchmarks --benchmark-only --benchmark-disable-gc -p no:cacheprovider -s
 
 clean:  ## remove the environment and all caches, keep results

@@ -23,8 +23,8 @@ class VirtualPace(PacedClock):
 
     def run(self, until):
         while self.env.peek() <= round(until * US):
-            self.env.step()
-        self.env._now = max(self.env._now, round(until * US))
+            self.step()
+        self._set(max(self.env._now, round(until * US)))
 
     def _catch_up(self, end):
         pass

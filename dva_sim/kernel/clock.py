@@ -8,6 +8,7 @@ Callbacks are scheduled directly: a process per packet costs three times as much
 from __future__ import annotations
 
 from collections.abc import Callable
+from heapq import heappop, heappush
 from typing import Any
 
 import simpy
@@ -16,61 +17,76 @@ from simpy.events import NORMAL, Event
 US = 1_000_000
 
 
-class _Call(Event):
-    """A function due at some time: a bare event, without the list and dictionary of SimPy's own."""
-
-    __slots__ = ("action", "args", "callbacks")
-    _ok = True  # the kernel asks: nothing has failed
-
-    def __init__(self, action: Callable[..., object], args: tuple[Any, ...]) -> None:
-        self.action, self.args, self.callbacks = action, args, _RUN
-
-
 def _run(call: Any) -> None:
     call.action(*call.args)
 
 
-_RUN: Any = (_run,)  # one for all calls: the kernel replaces it, and never changes it
+class _Call(Event):
+    """A function due at some time: a bare event, without the list and dictionary of SimPy's own."""
+
+    __slots__ = ("action", "args")
+    _ok = True  # SimPy's own loop asks: nothing has failed
+    callbacks: Any = (_run,)  # what it calls
+
+    def __init__(self, action: Callable[..., object], args: tuple[Any, ...]) -> None:
+        self.action, self.args = action, args
 
 
 class Clock:
     """Virtual time of one run.
 
     Times are seconds [s] since the run's start; they are kept to the microsecond.
+
+    Attributes:
+        now: Seconds since the start [s].
     """
 
     def __init__(self) -> None:
         self.env = simpy.Environment(initial_time=0)
-
-    @property
-    def now(self) -> float:
-        """Seconds since the start [s]."""
-        return self.env._now / US
+        self.now = 0.0
 
     def call_at(self, time: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
-        env = self.env
-        delay = round(time * US) - env._now
-        env.schedule(_Call(action, args), NORMAL, delay if delay > 0 else 0)
+        self._put(round(time * US), _Call(action, args))
 
     def call_after(self, delay: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` after `delay` [s]."""
-        self.call_at(self.env._now / US + delay, action, *args)
+        self._put(round((self.now + delay) * US), _Call(action, args))
 
     def every(
         self, period: float, action: Callable[[], object], start: float | None = None
     ) -> None:
         """Run `action()` each `period` [s] until it returns `False`; first at `start` [s]."""
-        step = max(1, round(period * US))
-        first = self.env._now if start is None else round(start * US)
+        env, step = self.env, max(1, round(period * US))
 
         def tick() -> None:
             if action() is not False:
-                self.env.schedule(_Call(tick, ()), NORMAL, step)
+                self._put(env._now + step, call)
 
-        self.env.schedule(_Call(tick, ()), NORMAL, max(0, first - self.env._now))
+        call = _Call(tick, ())
+        self._put(env._now if start is None else round(start * US), call)
 
     def run(self, until: float) -> None:
-        """Let time pass up to `until` [s]."""
+        """Let time pass up to `until` [s]; what is due then happens when time goes on."""
+        end, queue = round(until * US), self.env._queue
         if until > self.now:
-            self.env.run(until=round(until * US))
+            while queue and queue[0][0] < end:
+                self.step()
+            self._set(end)
+
+    def step(self) -> None:
+        """Let the next event happen: what SimPy's own step does, without asking for failures."""
+        env = self.env
+        env._now, _, _, call = heappop(env._queue)
+        self.now = env._now / US
+        call.action(*call.args)  # type: ignore[attr-defined]
+
+    def _put(self, at: float, call: _Call) -> None:
+        """It is due at a time [us]: what SimPy's own `schedule` does, without its call."""
+        env = self.env
+        now = env._now
+        heappush(env._queue, (at if at > now else now, NORMAL, next(env._eid), call))
+
+    def _set(self, now: float) -> None:
+        """It is that time [us], and nothing before it is due."""
+        self.env._now, self.now = now, now / US

@@ -150,12 +150,12 @@ class LiveClock(Clock):
             if due > until:
                 break
             self.lateness = max(self.lateness, (real - due) / US)
-            env.step()
+            self.step()
             if not self._running:
                 return
             due = env.peek()
         # Never beyond the next event, whose own step would turn time back.
-        env._now = max(env._now, min(until, due))
+        self._set(max(env._now, min(until, due)))
 
     def _real(self) -> int:
         return time.monotonic_ns() // 1000 - self._origin
@@ -253,10 +253,10 @@ class PacedClock(LiveClock):
             if due > min(self._real(), end):
                 break
             self._look_behind(int(due))
-            env.step()
+            self.step()
             if not self._running:
                 return
-        env._now = max(env._now, min(self._real(), end, env.peek()))
+        self._set(max(env._now, min(self._real(), end, env.peek())))
 
     def _look_behind(self, due: int) -> None:
         """By how much an event comes too late that was due at a time."""

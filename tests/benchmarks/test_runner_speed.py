@@ -121,22 +121,3 @@ def test_ten_thousand_short_runs_fit_in_little_memory(
     assert total > 10_000
     goal("MB of the parent", after, most=500)
     benchmark(lambda: None)
-
-
-def test_help_is_there_at_once(tmp_path: Path, benchmark: Any) -> None:
-    """The best of several, by the wall clock; CPU time beside it."""
-
-    def call() -> float:
-        words = [sys.executable, "-m", "dva_sim.cli", "--help"]
-        begun = time.perf_counter()
-        subprocess.run(words, capture_output=True, cwd=tmp_path, env=ENVIRONMENT, check=True)
-        return time.perf_counter() - begun
-
-    begun = os.times()
-    took = min(call() for _ in range(10))
-    ended = os.times()
-    cpu = ((ended[2] - begun[2]) + (ended[3] - begun[3])) / 10
-    benchmark.extra_info.update(wall_s=round(took, 3), cpu_s=round(cpu, 3), machine=load())
-    print(f"\nhelp: {took:.2f} s at best, {cpu:.2f} CPU s on the average ({load()})")
-    goal("seconds of help", min(took, cpu), most=0.3)
-    benchmark(lambda: None)

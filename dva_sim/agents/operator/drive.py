@@ -7,7 +7,6 @@ its collision guard drives in close quarters for a while: slowly, step by step.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Callable
 from functools import partial
 
@@ -31,6 +30,7 @@ from dva_sim.agents.operator.strategies import (
 from dva_sim.agents.operator.supervision import REFUSED, Work
 from dva_sim.agents.population import Person
 from dva_sim.agents.route_following import Route
+from dva_sim.agents.tilt import Phone
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Planner
@@ -164,7 +164,7 @@ class Teleoperation(Work):
         self._stuck_after = STUCK_AFTER + 2.0 * seat.delay.value
         self._let_go_until = 0.0
         self._without_effect = 0
-        self._failures: Counter[str] = Counter()
+        self._failures: dict[str, int] = {}
         self._least_left, self._nearer_at = math.inf, 0.0
 
     def begin(self) -> None:
@@ -243,23 +243,22 @@ class Teleoperation(Work):
 
     def _count_failures(self) -> None:
         """Count what a plug-in of a user got wrong; tell of the first time."""
-        phone, strategy = self._seat.phone, self._strategy
-        line = f"holds a phone that fails: {phone.first_failure}"
-        self._note("a phone", phone.failures, line)
-        if (sender := self._sender) is not None:
-            line = f"loses commands, as its pattern fails: {sender.first_failure}"
-            self._note("a pattern", sender.failures, line)
-        if isinstance(strategy, Strategy):
-            line = f"lets go, as its strategy fails: {strategy.first_failure}"
-            self._note("an operator", strategy.failures, line)
+        self._note("a phone", self._seat.phone, "holds a phone that fails")
+        if self._sender is not None:
+            self._note("a pattern", self._sender, "loses commands, as its pattern fails")
+        if isinstance(self._strategy, Strategy):
+            self._note("an operator", self._strategy, "lets go, as its strategy fails")
 
-    def _note(self, whose: str, failures: int, line: str) -> None:
-        known, self._failures[whose] = self._failures[whose], failures
+    def _note(self, whose: str, plugged_in: Phone | CommandSender | Strategy, what: str) -> None:
+        known, failures = self._failures.get(whose, 0), plugged_in.failures
+        if failures == known:
+            return
+        self._failures[whose] = failures
         if failures > known:
             count = self._device.recorder.counters
             count[f"failed: an answer of {whose}"] += failures - known
             if not known:
-                self._device.tell(line, "drive")
+                self._device.tell(f"{what}: {plugged_in.first_failure}", "drive")
 
     def _steer(self, seen: Observation, delay: float, usual: Callable[[float], Intent]) -> Intent:
         """What to ask for; close quarters are for who knows that a guard holds the robot back.

@@ -164,9 +164,8 @@ class Shift:
 
     def _drain(self) -> None:
         """Let what is open be closed, as far as anybody will still do anything."""
-        env = self.clock.env
-        while (self.events or self.unnoticed) and env.peek() < math.inf:
-            env.step()
+        while (self.events or self.unnoticed) and self.clock.env.peek() < math.inf:
+            self.clock.step()
         check(self)
 
     def _close(self) -> TimedRecording:

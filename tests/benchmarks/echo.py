@@ -1,4 +1,7 @@
-"""What a command to a robot costs over sockets, against a bare echo of the same size."""
+"""What a command to a robot costs over sockets, against a bare echo of the same size.
+
+python tests/benchmarks/echo.py compare
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,10 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 import zmq
-from benchmarks.goals import goal
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.recorder import Recorder
@@ -26,9 +28,6 @@ from dva_sim.simulation.full.stage import DVA, Stage, id_of
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
 SESSION = 1425
 BLOCKS, ROUND_TRIPS = 30, 200  # in turns, so that noise hits both
-# Goal: 1.6. A loop that polls, with a ROUTER that does nothing, comes to that by itself; the rest
-# is the code that runs at both ends, each time after a sleep in which it has left the caches.
-MOST = 8.0
 TICK = 86_320  # [ms]
 COMMAND = m.SetTeleOp(0.1, 0.05, TICK)
 SETTINGS = {"robot.processing_s": 0, "robot.watchdog_s": 60, "robot.max_age_s": 120}
@@ -67,6 +66,7 @@ def be_an_echo() -> None:
         socket.send(data)
 
 
+@contextmanager
 def start(role: str) -> Iterator[str]:
     """The address of another process, which ends when this one is done with it."""
     command = [sys.executable, __file__, role]
@@ -139,43 +139,46 @@ def echo(socket: zmq.Socket[bytes], data: bytes, count: int) -> list[float]:
     return times
 
 
-@pytest.fixture
-def robot() -> Iterator[str]:
-    yield from start("robot")
+def compare() -> None:
+    """Tell what both take, and the ratio.
 
-
-@pytest.fixture
-def echo_socket() -> Iterator[zmq.Socket[bytes]]:
-    with zmq.Context() as context, context.socket(zmq.REQ) as socket:
+    Goal: 1.6. A loop that polls, with a ROUTER that does nothing, comes to that by itself; the rest
+    is the code that runs at both ends, each time after a sleep in which it has left the caches.
+    """
+    with (
+        start("robot") as robot,
+        start("echo") as address,
+        zmq.Context() as context,
+        context.socket(zmq.REQ) as socket,
+    ):
         socket.linger = 0
-        for address in start("echo"):
-            socket.connect(f"tcp://{address}")
-            yield socket
+        socket.connect(f"tcp://{address}")
+        phone = Phone(robot)
+        try:
+            phone.begin()
+            data = phone.message()
+            ours, bare = in_turns(phone, socket, data)
+        finally:
+            phone.network.close()
+    command, echoed = statistics.median(ours), statistics.median(bare)
+    print(
+        f"a live command over an echo of {len(data)} bytes: {command / echoed:.2f} "
+        f"({command * 1e6:.0f} us over {echoed * 1e6:.0f} us, by the clock)"
+    )
 
 
-def test_a_command_against_a_bare_echo(benchmark, robot, echo_socket):
-    phone = Phone(robot)
-    try:
-        phone.begin()
-        data = phone.message()
-        phone.drive(ROUND_TRIPS)  # connections are open, caches warm
-        echo(echo_socket, data, ROUND_TRIPS)
-        ours, bare = list[float](), list[float]()
-        for _ in range(BLOCKS):
-            ours += phone.drive(ROUND_TRIPS)
-            bare += echo(echo_socket, data, ROUND_TRIPS)
-        ratio = statistics.median(ours) / statistics.median(bare)
-        benchmark.extra_info.update(command_over_echo=round(ratio, 2))
-        print(
-            f"\na command and its reply: {statistics.median(ours) * 1e6:.0f} us; "
-            f"an echo of {len(data)} bytes: {statistics.median(bare) * 1e6:.0f} us; "
-            f"ratio {ratio:.2f}"
-        )
-        goal("a command over an echo", ratio, most=MOST)
-        benchmark.pedantic(phone.drive, args=(ROUND_TRIPS,), rounds=5)
-    finally:
-        phone.network.close()
+def in_turns(
+    phone: Phone, socket: zmq.Socket[bytes], data: bytes
+) -> tuple[list[float], list[float]]:
+    """How long each command and each echo took [s]."""
+    ours, bare = list[float](), list[float]()
+    phone.drive(ROUND_TRIPS)  # connections are open, caches warm
+    echo(socket, data, ROUND_TRIPS)
+    for _ in range(BLOCKS):
+        ours += phone.drive(ROUND_TRIPS)
+        bare += echo(socket, data, ROUND_TRIPS)
+    return ours, bare
 
 
 if __name__ == "__main__":
-    {"robot": be_a_robot, "echo": be_an_echo}[sys.argv[1]]()
+    {"robot": be_a_robot, "echo": be_an_echo, "compare": compare}[sys.argv[1]]()

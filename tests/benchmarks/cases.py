@@ -1,0 +1,315 @@
+"""The fixed list of what is counted.
+
+Each case is prepared once, done once to warm up, and then measured. What it imports is imported
+when it is prepared: a version that does not have it yet lacks this case alone.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+Work = Callable[[], float]
+"""Does it, and returns how many units it has done."""
+
+PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins")
+FAR = {"link.delay_s": 0.25}
+MAIN = "drive-to-event, latest-wins"
+SECOND, RUN, MESSAGE = "simulated s", "run", "message"
+MESSAGES, AT_ONCE = 1_000, 100
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is counted.
+
+    Attributes:
+        per: The unit that its work is told in.
+        prepare: Makes everything ready; returns the work.
+    """
+
+    per: str
+    prepare: Callable[[], Work]
+
+
+# --- runs --------------------------------------------------------------------------------------
+
+
+def built(scenario: str, changes: dict[str, Any]) -> Any:
+    from dva_sim.simulation import scenario as scenarios
+
+    return scenarios.build(scenarios.load(scenario), changes)
+
+
+def run(scenario: str, **changes: Any) -> Work:
+    """A run of the scenario whose site, files and plans are known already."""
+    from dva_sim.simulation.full import simulate
+
+    made = built(scenario, changes)
+    return lambda: simulate(made, 1).duration
+
+
+def new_seed(scenario: str, **changes: Any) -> Work:
+    """Runs of which each has a seed of its own, so that each has to plan."""
+    from dva_sim.simulation.full import simulate
+
+    made, seeds = built(scenario, changes), iter(range(1, 1000))
+    return lambda: simulate(made, next(seeds)).duration
+
+
+def replayed() -> Work:
+    """The same messages at the same moments by an operator who only repeats them."""
+    from replayed_operator import replay, taped
+
+    made = built("drive-to-event", {"pattern": "latest-wins", **FAR})
+    tape, _ = taped(made, 1)
+    return lambda: replay(made, 1, tape).duration
+
+
+def physics_and_control() -> Work:
+    """The same world and the same pursuit of a way ten times a second, and nothing else."""
+    from dva_sim.agents.observation import Observation
+    from dva_sim.agents.operator.strategies import Pursuit, Reach, View
+    from dva_sim.agents.population import Population, draw_person
+    from dva_sim.agents.route_following import Route
+    from dva_sim.simulation.full.physical_world import PHYSICS_TICK
+    from dva_sim.simulation.full.stage import planner_of
+    from dva_sim.worlds.drives import DriveSpec
+    from dva_sim.worlds.physics import World
+    from dva_sim.worlds.site import load_site
+
+    site, spec, goal = load_site("caparica"), DriveSpec(), (37.3, 22.5)
+    person = draw_person(Population(), 1, 0)
+
+    def drive() -> float:
+        world, now = World(site, PHYSICS_TICK), 0.0
+        robot = world.add_robot("robot", spec, site.robot_bases[0])
+        points = planner_of(site, spec.radius).path(robot.pose()[:2], goal)
+        assert points is not None
+        route = Route(points)
+        driver = Pursuit(person, Reach(spec.max_speed, spec.max_turn_rate))
+        while math.dist(robot.pose()[:2], goal) > 1.5:
+            world.advance_to(now)
+            seen = Observation(0, *robot.pose(), robot.speed, robot.turn_rate, ())
+            intent = driver.drive(route, View(now, seen, 0.1), 1.2)
+            robot.drive(intent.speed, intent.turn_rate, now + 1.0)
+            now += 0.1
+        return now
+
+    return drive
+
+
+def patrols(robots: int) -> Work:
+    """Robots on their rounds in a bare hall of 90 m by 90 m, and who else there is."""
+    import numpy as np
+    from PIL import Image
+
+    folder = Path(tempfile.mkdtemp(prefix="hall-"))
+    floor = np.full((600, 600), 254, np.uint8)
+    floor[:5] = floor[-5:] = floor[:, :5] = floor[:, -5:] = 0
+    Image.fromarray(floor).save(folder / "hall.pgm")
+    keys = "image: hall.pgm\nresolution: 0.15\norigin: [0, 0, 0]\nnegate: 0\n"
+    (folder / "hall.yaml").write_text(keys + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+    places = [(5.0 + 80 * ((7 * i) % 10) / 9, 5.0 + 80 * ((3 * i) % 10) / 9) for i in range(10)]
+    rounds = [
+        {"robot": f"robot-{i + 1}", "places": [places[i % 10], places[(i + 3) % 10]]}
+        for i in range(robots)
+    ]
+    changes = {"site.map": str(folder / "hall.yaml"), "robot.count": robots, "patrols": rounds}
+    changes |= {
+        "events": [{"kind": "fire", "at_s": 9.0}],
+        "control": "supervisory",
+        "operator.count": 1,
+        "horizon_s": 10.0,
+    }
+    return run("drive-to-event", **changes)
+
+
+def shift() -> Work:
+    """Alarms and three guards who look, without bodies, cameras and bytes: ten seeds."""
+    import dva_sim
+
+    return lambda: len([dva_sim.episode("small-shift", seed=seed) for seed in range(1, 11)])
+
+
+def pointing() -> Work:
+    """Three trials of pointing by tilt, 45 targets in all."""
+    import dva_sim
+
+    return lambda: len([dva_sim.episode("tasks/fitts-tilt", set={"trials": 3})])
+
+
+def report() -> Work:
+    """The main study's report, of 432 synthetic runs."""
+    import synthetic_study as synthetic
+
+    from dva_sim.experiments.report.report import write_report
+
+    runs = synthetic.drive_rows(12, 1)
+    tables = {
+        "runs": runs,
+        "events": synthetic.story_rows(12),
+        "tracks": synthetic.track_rows(),
+    }
+    folder = Path(tempfile.mkdtemp(prefix="report-"))
+    results = synthetic.write(folder, tables, synthetic.manifest(12, 1))
+    return lambda: len([write_report(results)])
+
+
+# --- messages ----------------------------------------------------------------------------------
+
+
+def published() -> Work:
+    """A message to its one subscriber, over a link with delay and rate."""
+    from dva_sim.kernel.clock import Clock
+    from dva_sim.kernel.streams import Streams
+    from dva_sim.network.connections import Connector
+    from dva_sim.network.link import ConstantRate, Link, LinkConfig
+    from dva_sim.network.virtual_network import VirtualNetwork
+
+    settings = LinkConfig(delay_s=0.01, rate_bps=1e9, queue_bytes=10_000_000)
+    streams = Streams(1)
+    out, back = (
+        Link(settings, ConstantRate(settings.rate_bps), streams, name) for name in ("a", "b")
+    )
+    links = lambda a, b: (out, back) if b == "robot" else (back, out)  # noqa: E731
+    net, taken = VirtualNetwork(Clock(), links, connector=Connector(depth="message")), list[int]()
+    net.subscribe("robot", "phone", "t|", taken.append)
+    net.clock.run(1.0)
+    return in_blocks(net.clock, lambda number: net.publish("phone", "t|", number, 500))
+
+
+def called() -> Work:
+    """A bare function at a later moment: the kernel's part of a message."""
+    from dva_sim.kernel.clock import Clock
+
+    clock, taken = Clock(), list[int]()
+    return in_blocks(clock, lambda number: clock.call_after(0.01, taken.append, number))
+
+
+def in_blocks(clock: Any, send: Callable[[int], object]) -> Work:
+    def work() -> float:
+        for _ in range(MESSAGES // AT_ONCE):
+            for number in range(AT_ONCE):
+                send(number)
+            clock.run(clock.now + 0.1)
+        return MESSAGES
+
+    return work
+
+
+def stored() -> Work:
+    """A put and a get of a `simpy.Store`, between two processes."""
+    import simpy
+
+    def work() -> float:
+        env = simpy.Environment()
+        shelf = simpy.Store(env)
+
+        def producer() -> Any:
+            for number in range(MESSAGES):
+                yield shelf.put(number)
+
+        def consumer() -> Any:
+            for _ in range(MESSAGES):
+                yield shelf.get()
+
+        env.process(producer())
+        env.process(consumer())
+        env.run()
+        return MESSAGES
+
+    return work
+
+
+def hop(kind: str, canonical: bool = True) -> Work:
+    """Encoded by one, validated and read by another: our form, or another allowed one."""
+    from dva_sim.protocol import codec
+    from dva_sim.protocol import messages as m
+
+    bodies: dict[str, Any] = {
+        "SetTeleOp": m.SetTeleOp(0.5, 0.56, 86320),
+        "RobotStatus": m.RobotStatus("Idle", m.Position(38.66, -9.2), 1.57, 0.5, 0.1, 86320),
+        "Heartbeat": m.Heartbeat(),
+    }
+    session = None if kind == "Heartbeat" else 1425
+    ids = "70:1A:04:F9:81:D6", 124, "56:2B:04:E4:56:D8", "12:30:56"
+    message, tail = m.Message(*ids, session, bodies[kind]), b"" if canonical else b"\n"
+
+    def work() -> float:
+        for _ in range(MESSAGES):
+            assert codec.decode(codec.encode(message) + tail) is not None
+        return MESSAGES
+
+    return work
+
+
+# --- beside others -----------------------------------------------------------------------------
+
+
+def circling(ours: bool) -> Work:
+    """Ten robots that drive circles between the walls of caparica, here or in ir-sim."""
+    from benchmarks import test_world_speed as worlds
+
+    from dva_sim.worlds.site import load_site
+
+    site = load_site("caparica")
+    starts = worlds.circles(site, 10)
+    if ours:
+        advance, _ = worlds.ours(site, starts)
+    else:
+        folder = Path(tempfile.mkdtemp(prefix="ir-sim-"))
+        advance, _ = worlds.theirs(site, starts, "contact", folder)
+    return lambda: advance(1.0) or 1.0
+
+
+CASES = {
+    **{
+        f"drive-to-event, {pattern}": Case(
+            SECOND, partial(run, "drive-to-event", pattern=pattern, **FAR)
+        )
+        for pattern in PATTERNS
+    },
+    "a drive's messages, repeated": Case(SECOND, replayed),
+    "physics and control alone": Case(SECOND, physics_and_control),
+    "drive-to-event, a new seed": Case(
+        SECOND, partial(new_seed, "drive-to-event", pattern="latest-wins", **FAR)
+    ),
+    "fire-drill": Case(SECOND, partial(run, "fire-drill", horizon_s=120.0)),
+    "campus-patrol": Case(SECOND, partial(run, "campus-patrol", horizon_s=30.0)),
+    "evacuation": Case(SECOND, partial(run, "evacuation", horizon_s=40.0)),
+    **{f"{robots} robots": Case(SECOND, partial(patrols, robots)) for robots in (10, 40, 200)},
+    "a shift": Case(RUN, shift),
+    "a task": Case(RUN, pointing),
+    "a message through the network": Case(MESSAGE, published),
+    "a call at a later moment": Case(MESSAGE, called),
+    "a Store's put and get": Case(MESSAGE, stored),
+    "a hop of SetTeleOp": Case(MESSAGE, partial(hop, "SetTeleOp")),
+    "a hop of SetTeleOp, by the parser": Case(MESSAGE, partial(hop, "SetTeleOp", False)),
+    "a hop of RobotStatus": Case(MESSAGE, partial(hop, "RobotStatus")),
+    "a hop of Heartbeat": Case(MESSAGE, partial(hop, "Heartbeat")),
+    "10 circling robots": Case(SECOND, partial(circling, True)),
+    "10 circling robots of ir-sim": Case(SECOND, partial(circling, False)),
+    "the main study's report": Case(RUN, report),
+}
+
+RATIOS = {
+    "an episode over its physics and control": (MAIN, "physics and control alone"),
+    "an episode over the same without its operator": (MAIN, "a drive's messages, repeated"),
+    "a new seed over a known one": ("drive-to-event, a new seed", MAIN),
+    "a message over a Store's put and get": (
+        "a message through the network",
+        "a Store's put and get",
+    ),
+    "ir-sim over ours": ("10 circling robots of ir-sim", "10 circling robots"),
+}
+
+
+def warm() -> None:
+    """What all drives need: the site is read, its planner made, modules imported."""
+    run("drive-to-event", pattern="latest-wins", **FAR)()

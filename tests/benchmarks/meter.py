@@ -1,0 +1,170 @@
+"""What the program costs: instructions, which noise does not reach, beside CPU time.
+
+    meter.py                      this version beside its parent
+    meter.py --against COMMIT     beside another one
+    meter.py --only WORD          cases whose name has the word, such as drive or start-up
+
+Both versions are measured by this list of cases and by the same interpreter. A case that one of
+them cannot do is told as such. Under callgrind a command's start is counted only where --only
+names it, since that takes minutes; its CPU time is always there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(1, str(ROOT / "tests"))
+
+from benchmarks import runner, startup  # noqa: E402
+from benchmarks.cases import CASES, RATIOS  # noqa: E402
+from benchmarks.counting import FOLDER, Callgrind, Nothing, available, pinned  # noqa: E402
+
+REPEATS = 5
+GIT = ["git", "-C", str(ROOT)]
+Figures = dict[str, dict[str, Any]]
+
+
+def parent() -> str:
+    """The commit that this version is made from."""
+    changed = subprocess.run([*GIT, "diff", "--quiet", "HEAD"], check=False).returncode
+    return "HEAD" if changed else "HEAD~1"
+
+
+@contextmanager
+def version(commit: str) -> Iterator[Path]:
+    """A commit as a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        other = Path(folder) / "other"
+        subprocess.check_call([*GIT, "worktree", "add", "--quiet", "--detach", str(other), commit])
+        try:
+            yield other
+        finally:
+            subprocess.check_call([*GIT, "worktree", "remove", "--force", str(other)])
+
+
+def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Figures:
+    """What cases cost in the version of a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        into = Path(folder) / "told"
+        into.touch()
+        under = Callgrind.words(Path(folder)) if counter == Callgrind.name else []
+        program = [sys.executable, runner.__file__, counter, str(repeats), str(into), *names]
+        environment = pinned() | {"PYTHONPATH": str(root), FOLDER: folder}
+        subprocess.run([*under, *program], env=environment, cwd=root, check=True)
+        return {told["case"]: told for told in runner.read(into)}
+
+
+def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[Figures]:
+    """What cases cost in each version: counted side by side if that takes long, timed in turns."""
+    if counter != Callgrind.name:
+        return [figures(root, names, counter, REPEATS) for root in roots]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        counted = list(pool.map(lambda root: figures(root, names, counter, 0), roots))
+    for known, root in zip(counted, roots, strict=True):
+        for name, timed in figures(root, names, Nothing.name, REPEATS).items():
+            known[name]["cpu_s"] = timed.get("cpu_s")
+    return counted
+
+
+def started(root: Path, names: Iterable[str], counter: str) -> Figures:
+    """What commands cost in the version of a folder."""
+    environment = pinned() | {"PYTHONPATH": str(root)}
+    told = [startup.measured(name, counter, root, environment) for name in names]
+    return {each["case"]: each for each in told}
+
+
+# --- told --------------------------------------------------------------------------------------
+
+UNITS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
+
+
+def count(number: float | None) -> str:
+    """A number of instructions, with three digits or more."""
+    if number is None:
+        return "-"
+    scale, letter = next(unit for unit in UNITS if number >= unit[0] or unit[0] == 1.0)
+    return f"{number / scale:.2f} {letter}".rstrip()
+
+
+def change(ours: float | None, theirs: float | None) -> str:
+    """By how much ours is more [%]."""
+    return f"{100 * (ours / theirs - 1):+.1f} %" if ours and theirs else ""
+
+
+def milliseconds(seconds: float | None) -> str:
+    return "-" if seconds is None else f"{1e3 * seconds:.3g}"
+
+
+def lines(ours: Figures, theirs: Figures) -> Iterator[str]:
+    """The table."""
+    head = ("per", "instructions", "before", "change", "CPU ms", "before")
+    yield f"{'':38}{head[0]:>13}" + "".join(f"{word:>13}" for word in head[1:])
+    for name, here in ours.items():
+        unit = CASES[name].per if name in CASES else "start"
+        if "error" in here:
+            yield f"{name:38}{unit:>13}  {here['error']}"
+            continue
+        there: Mapping[str, Any] = theirs.get(name, {})
+        counts = here["instructions"], there.get("instructions")
+        cells = count(counts[0]), count(counts[1]), change(*counts)
+        cells += milliseconds(here["cpu_s"]), milliseconds(there.get("cpu_s"))
+        yield f"{name:38}{unit:>13}" + "".join(f"{cell:>13}" for cell in cells)
+    for name, there in theirs.items():
+        if "error" in there:
+            yield f"before, {name}: {there['error']}"
+
+
+def ratios(found: Figures) -> Iterator[str]:
+    """What costs how many times as much as something else, in instructions or else in time."""
+    for what, names in RATIOS.items():
+        if all("cpu_s" in found.get(name, {}) for name in names):
+            above, below = (found[name]["instructions"] or found[name]["cpu_s"] for name in names)
+            yield f"{what}: {above / below:.2f}"
+
+
+def echo(root: Path) -> str:
+    """A command over sockets beside a bare echo; by the clock, since both wait for each other."""
+    program = [sys.executable, str(ROOT / "tests/benchmarks/echo.py"), "compare"]
+    environment = pinned() | {"PYTHONPATH": f"{root}{os.pathsep}{ROOT / 'tests'}"}
+    return subprocess.check_output(program, env=environment, text=True, cwd=root).strip()
+
+
+def main() -> int:
+    """Measure and tell; the exit code."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--against", metavar="COMMIT", default="")
+    parser.add_argument("--only", metavar="WORD", default="")
+    asked = parser.parse_args()
+    counter, why = available()
+    against = asked.against or parent()
+    print(f"Python {platform.python_version()} ({platform.python_compiler()}), {sys.executable}")
+    print(f"counted by {counter}" + (f"; {why}" if why else ""), flush=True)
+    names = [name for name in CASES if asked.only in name]
+    starts = [name for name in startup.COMMANDS if asked.only in startup.PREFIX + name]
+    by = counter if asked.only or counter != Callgrind.name else Nothing.name
+    with version(against) as other:
+        roots = ROOT, other
+        ours, theirs = measured(roots, names, counter) if names else ({}, {})
+        ours, theirs = ours | started(ROOT, starts, by), theirs | started(other, starts, by)
+    print(f"beside {against}, which is meant by `before`\n")
+    for line in (*lines(ours, theirs), "", *ratios(ours)):
+        print(line)
+    if not asked.only:
+        print(echo(ROOT))
+    crashed = [name for name, told in ours.items() if "error" in told]
+    return 1 if set(crashed) - {"10 circling robots of ir-sim"} else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Measures cases of one version of the program, in a process of that version.
+
+    runner.py COUNTER REPEATS INTO CASE...
+
+Each case is measured in a process of its own, a copy of this one after what all drives need is
+there; a line of JSON for each is added to the file INTO.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+TESTS = str(Path(__file__).parents[1])
+
+
+def measured(name: str, counter: Any, repeats: int) -> dict[str, Any]:
+    """What a unit of a case costs: instructions, and the least CPU time of some repeats [s]."""
+    from benchmarks.cases import CASES
+
+    work = CASES[name].prepare()
+    work()
+    gc.collect()
+    units, instructions = counter.count(work)
+    told = {"case": name, "instructions": instructions and instructions / units}
+    return told | {"cpu_s": min(spent(work) for _ in range(repeats)) if repeats else None}
+
+
+def spent(work: Any) -> float:
+    """CPU time of a unit [s]."""
+    began = time.process_time()
+    units: float = work()
+    return (time.process_time() - began) / units
+
+
+def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
+    """Measure one case in a copy of this process; what goes wrong is told instead."""
+    if copy := os.fork():
+        os.waitpid(copy, 0)
+        return
+    from benchmarks.counting import COUNTERS
+
+    try:
+        with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):  # noqa: PTH123
+            told = measured(name, COUNTERS[counter](), repeats)
+    except BaseException as error:  # pytest's skip, too
+        told = {"case": name, "error": traceback.format_exception_only(error)[-1].strip()}
+    with into.open("a") as file:
+        file.write(json.dumps(told) + "\n")
+    os._exit(0)
+
+
+def read(into: Path) -> Iterator[dict[str, Any]]:
+    """What has been measured."""
+    yield from (json.loads(line) for line in into.read_text().splitlines())
+
+
+if __name__ == "__main__":
+    sys.path.insert(1, TESTS)
+    from benchmarks.cases import warm
+
+    warm()
+    for case in sys.argv[4:]:
+        in_a_copy(case, sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))

@@ -1,0 +1,88 @@
+"""What starting each command costs, as a whole process and those that it starts.
+
+Commands that work for long are given a name that nobody has: that is what they load until they
+refuse it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import synthetic_study as synthetic
+from benchmarks.counting import FOLDER, Callgrind, Perf
+
+NOBODY = "no-such-name"
+COMMANDS = {
+    "--help": "--help",
+    "--version": "--version",
+    "list": "list",
+    "plugins": "plugins",
+    "schema": "schema scenario",
+    "check": "check {root}/experiments/scenarios/fire-drill.yaml",
+    "site": "site show hall -o {out}/site.png",
+    "new": "new {out}/mine",
+    "keys": "keys {out}/keys drive-to-event",
+    "show": "show {results}",
+    "export": "export {results} -o {out}/runs.csv",
+    "compare": "compare {results} {results}",
+    "episode": "episode drive-to-event --set horizon_s=1",
+    **{name: f"{name} {NOBODY}" for name in ("run", "register", "tune", "report", "replay")},
+    **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate")},
+}
+PREFIX = "start-up: "
+REPEATS = 3
+
+
+def results_folder(folder: Path) -> Path:
+    """Results that commands may read."""
+    tables = {"runs": synthetic.drive_rows(4, 1), "tracks": synthetic.track_rows()}
+    tables["events"] = synthetic.story_rows(4)
+    return synthetic.write(folder, tables, synthetic.manifest(4, 1))
+
+
+def started(words: list[str], environment: Mapping[str, str]) -> tuple[int, float]:
+    """Run a program to its end; its process, and the CPU time of all its processes [s].
+
+    Raises:
+        RuntimeError: it crashed.
+    """
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    with subprocess.Popen(words, env=environment, **pipes) as process:
+        assert process.stderr is not None
+        said = process.stderr.read().decode()
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode not in (0, 2) or "Traceback" in said:
+        raise RuntimeError(said.strip().splitlines()[-1])
+    return process.pid, used.ru_utime + used.ru_stime
+
+
+def measured(name: str, counter: str, root: Path, environment: Mapping[str, str]) -> dict[str, Any]:
+    """Instructions, where they are counted, and the least CPU time [s] of starting a command."""
+    with tempfile.TemporaryDirectory() as folder:
+        results = results_folder(Path(folder) / "results")
+        environment = {**environment, FOLDER: folder}
+
+        def words() -> list[str]:
+            out = tempfile.mkdtemp(dir=folder)
+            asked = COMMANDS[name].format(root=root, results=results, out=out)
+            return [sys.executable, "-m", "dva_sim.cli", *asked.split()]
+
+        instructions: float | None = None
+        try:
+            cpu_s = min(started(words(), environment)[1] for _ in range(REPEATS))
+            if counter == Perf.name:
+                instructions = Perf().count(lambda: started(words(), environment)[1])[1]
+            elif counter == Callgrind.name:
+                under = [*Callgrind.words(Path(folder), at_once=True), *words()]
+                pid, _ = started(under, environment)
+                instructions = Callgrind.total(Path(folder) / str(pid))
+        except RuntimeError as error:
+            return {"case": PREFIX + name, "error": str(error)}
+        return {"case": PREFIX + name, "instructions": instructions, "cpu_s": cpu_s}

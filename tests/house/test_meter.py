@@ -1,0 +1,57 @@
+"""What `make bench` counts with, and how it tells it."""
+
+import platform
+
+import pytest
+from benchmarks import counting, meter
+
+
+@pytest.mark.skipif(platform.system() != "Linux", reason="perf_event_open is Linux's")
+def test_the_systems_counter_counts_what_happens_while_it_works():
+    try:
+        counter = counting.Perf(counting.SOFTWARE_TASK_CLOCK)  # there without a counting processor
+    except counting.Unavailable as why:
+        pytest.skip(str(why))
+    done, little = counter.count(lambda: float(sum(range(100))))
+    _, much = counter.count(lambda: float(sum(range(1_000_000))))
+    assert done == 4950.0
+    assert 0 < little < much
+
+
+def test_a_counter_that_the_system_does_not_have_says_so():
+    with pytest.raises(counting.Unavailable):
+        counting.Perf((0, 1 << 40))
+
+
+def test_callgrinds_account_is_read(tmp_path):
+    (tmp_path / "7.2").write_text("fn=(3) main\ntotals: 1234\n")
+    assert counting.Callgrind.total(tmp_path / "7.2") == 1234
+
+
+def test_what_is_measured_depends_on_no_hash_seed_and_no_processor():
+    assert counting.pinned()["PYTHONHASHSEED"] == "0"
+    assert "AVX" in counting.pinned()["NPY_DISABLE_CPU_FEATURES"] or platform.machine() != "x86_64"
+
+
+def test_a_row_tells_both_versions_and_the_change():
+    ours = {"a task": {"instructions": 9e6, "cpu_s": 0.004}}
+    theirs = {"a task": {"instructions": 1e7, "cpu_s": 0.005}}
+    row = list(meter.lines(ours, theirs))[1]
+    assert row.split() == ["a", "task", "run", "9.00", "M", "10.00", "M", "-10.0", "%", "4", "5"]
+
+
+def test_a_case_that_the_other_version_lacks_is_told_and_does_not_count_as_a_crash():
+    ours = {"a task": {"instructions": 9e6, "cpu_s": None}}
+    rows = list(meter.lines(ours, {"a task": {"error": "ImportError: no such module"}}))
+    assert rows[1].split() == ["a", "task", "run", "9.00", "M", "-", "-", "-"]
+    assert rows[2] == "before, a task: ImportError: no such module"
+
+
+def test_a_ratio_is_told_where_both_its_cases_were_measured():
+    above, below = next(iter(meter.RATIOS.values()))
+    found = {
+        above: {"instructions": 6e6, "cpu_s": 1.0},
+        below: {"instructions": 2e6, "cpu_s": 1.0},
+    }
+    assert list(meter.ratios(found)) == [f"{next(iter(meter.RATIOS))}: 3.00"]
+    assert list(meter.ratios({above: found[above]})) == []
