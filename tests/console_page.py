@@ -34,12 +34,20 @@ class Page:
     """What a page would do, and what it is told."""
 
     def __init__(
-        self, monkeypatch, scenario="hands-on", seed=1, client="c1", sockets=None, **changes
+        self,
+        monkeypatch,
+        scenario="hands-on",
+        seed=1,
+        client="c1",
+        sockets=None,
+        measured=False,
+        **changes,
     ):
         document = load(scenario) if isinstance(scenario, str) else scenario
         changes = {key.replace("__", "."): value for key, value in changes.items()}
         clock = VirtualPace() if sockets is None else PacedClock()
-        self.world = ConsoleWorld(build(document, changes), "a test", seed, clock, sockets)
+        scenario = build(document, changes)
+        self.world = ConsoleWorld(scenario, "a test", seed, clock, sockets, measured)
         if sockets is None:
             monkeypatch.setattr(time, "monotonic", lambda: self.world.clock.now)
         self.lines, self.frames, self.client = [], [], client

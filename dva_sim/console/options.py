@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.real_links import ConsoleSockets, MakeSockets
 from dva_sim.console.web.addresses import own_address
 from dva_sim.kernel.config_overrides import parse_changes, set_by
@@ -36,6 +37,7 @@ class ConsoleOptions:
         dva_port: Port of the DVA on real links; 0: any that is free.
         open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
+        results: Folder for the tables of what people did, if any.
         overwrite: What is there may be replaced.
     """
 
@@ -52,7 +54,19 @@ class ConsoleOptions:
     dva_port: int = 0
     open: bool = True
     record: Path | None = None
+    results: Path | None = None
     overwrite: bool = False
+
+    def kept_results(self) -> KeptResults | None:
+        """What makes tables of what people do, if they are wanted.
+
+        Raises:
+            ConfigError: the folder holds something already.
+        """
+        if self.results is None:
+            return None
+        asked = self.scenario, self.changes, self.seed, self.overwrite
+        return KeptResults(self.results, *asked)
 
     def sockets(self) -> MakeSockets | None:
         """What makes the sockets of real links."""

@@ -19,13 +19,17 @@ Note = Callable[[DriveLog], object]
 class ConsoleRecorder(Recorder):
     """A recorder of a run that may last for ever.
 
+    Args:
+        measured: Whether all is kept, to be measured in the end.
+
     Attributes:
         on_applied: Told of each drive that has had a command take effect.
         kept: Takes lines for a recording, if there is to be one.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, measured: bool = False) -> None:
         super().__init__()
+        self._measured = measured
         self.on_applied: Note = lambda _: None
         self.kept: LiveRecorder | None = None
         self._numbers: dict[int, int] = {}
@@ -68,10 +72,15 @@ class ConsoleRecorder(Recorder):
         self._numbers[id(drive)] = self._known
 
     def tidy(self) -> None:
-        """Keep what is new for the recording, and forget what is old."""
+        """Keep what is new for the recording, and forget what is old unless it is measured."""
         for drive in self.drives:
             if self.kept is not None:
                 self._keep(self.kept, drive)
+        if not self._measured:
+            self._forget()
+
+    def _forget(self) -> None:
+        for drive in self.drives:
             for kept in (drive.frames, drive.commands, drive.applied, drive.intents):
                 del kept[:-KEPT]
         over = [drive for drive in self.drives if drive.ended is not None][:-KEPT_DRIVES]

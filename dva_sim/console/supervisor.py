@@ -8,8 +8,8 @@ import socket
 import sys
 import time
 import webbrowser
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from dva_sim.console.actions import Actions
@@ -53,18 +53,38 @@ class ConsoleSupervisor:
             ChildFailed: the web process could not begin, or has ended by itself.
             DvaSimError: what was to be recorded is not, or not all of it.
         """
-        options = self._options
-        scenario = options.read()
-        world = ConsoleWorld(scenario, options.scenario, options.seed, sockets=options.sockets())
-        keeper, outlet = None, None
+        options, scenario, seed = self._options, self._options.read(), self._options.seed
+        results = options.kept_results()
+        if results is not None:
+            scenario, seed = results.scenario, results.seed
+        measured = results is not None
+        world = ConsoleWorld(
+            *(scenario, options.scenario, seed), sockets=options.sockets(), measured=measured
+        )
+        if results is not None:
+            results.follow(world)
+        with self._recorded(world):
+            self._run(world)
+        if results is not None:
+            results.write()
+            self._say(f"{options.results} written")
+        if self._failed:
+            raise ChildFailed(self._failed)
         if options.record is not None:
-            keeper = Keeper(options.record, world.scenario, options.seed)
+            self._say(f"{options.record} written")
+
+    @contextmanager
+    def _recorded(self, world: ConsoleWorld) -> Iterator[None]:
+        """Keep a recording of what happens, if one is wanted; in the end all is closed."""
+        options, keeper, outlet = self._options, None, None
+        if options.record is not None:
+            keeper = Keeper(options.record, world.scenario, world.seed)
             outlet = Outlet(keeper.inlet())
             world.recorder.kept = LiveRecorder(world.clock, outlet)
             world.recorder.kept.is_own = lambda _: True
             keep_run(world.run, world.recorder)
         try:
-            self._run(world)
+            yield
         finally:
             self._end_all()
             if world.sockets is not None:
@@ -75,10 +95,6 @@ class ConsoleSupervisor:
             lost = None if keeper is None else keeper.finish()
             if lost is not None and sys.exc_info()[0] is None:
                 raise DvaSimError(lost)
-        if self._failed:
-            raise ChildFailed(self._failed)
-        if options.record is not None:
-            self._say(f"{options.record} written")
 
     def _run(self, world: ConsoleWorld) -> None:
         options = self._options

@@ -54,6 +54,7 @@ class ConsoleWorld:
         seed: Decides all luck.
         clock: Its time; default: real time.
         sockets: Makes what carries the messages; default: the link that the scenario models.
+        measured: Whether all that happens is kept, to be measured in the end.
 
     Attributes:
         clock: Virtual time, at its pace.
@@ -73,15 +74,16 @@ class ConsoleWorld:
         seed: int,
         clock: PacedClock | None = None,
         sockets: MakeSockets | None = None,
+        measured: bool = False,
     ) -> None:
         if scenario.transport == "zeromq" and scenario.network_depth == "auto":
             # A later link may lose or delay anything: only the segments are right for all.
             scenario = scenario.model_copy(update={"network_depth": "segment"})
         self.scenario, self.name, self.seed = scenario, name, seed
-        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder(measured)
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
         self.sockets = sockets(scenario, self.clock, self.recorder) if sockets else None
-        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, False, self.sockets)
+        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, measured, self.sockets)
         try:
             self.run = Run(scenario, seed, watched=watched)
         except DvaSimError:

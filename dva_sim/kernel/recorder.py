@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -143,6 +144,25 @@ class Followed(NamedTuple):
     time: float
 
 
+class DrivenBy(NamedTuple):
+    """Who drove, and with what, where that is not the scenario's.
+
+    Attributes:
+        person: A number and no name; empty of a simulated person.
+        pattern: What carried the commands.
+        pipeline: How tilt became commands.
+        sensor_hz: Samples of a real phone per second, as measured.
+    """
+
+    person: str = ""
+    pattern: str = ""
+    pipeline: str = ""
+    sensor_hz: float = math.nan
+
+
+SIMULATED = DrivenBy()
+
+
 @dataclass
 class DriveLog:
     """One drive of one robot by one operator.
@@ -171,6 +191,7 @@ class DriveLog:
         waits_from: When the robot had come to where its operator has to judge [s].
         commands: Made from the tilt: when [s], speed [m/s], turn rate [rad/s].
         ways: Those planned by the operator: when [s], points `(n, 2)` [m].
+        by: Who drove, and with what, where people take part.
     """
 
     robot: str
@@ -202,6 +223,7 @@ class DriveLog:
     waits_from: float | None = None
     commands: list[tuple[float, float, float]] = field(default_factory=list)
     ways: list[tuple[float, NDArray[np.float64]]] = field(default_factory=list)
+    by: DrivenBy = SIMULATED
 
     def followed(self, tick: int, now: float) -> float:
         """Something is wanted by the frame of that tick: when that was captured [s].

@@ -25,6 +25,7 @@ from dva_sim.simulation import full, shift, task, transport
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import measures as of_full
 from dva_sim.simulation.full import workload
+from dva_sim.simulation.full.drive_tables import COMMAND_COLUMNS, DRIVE_COLUMNS
 from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
 from dva_sim.simulation.shift import TimedScenario
@@ -188,6 +189,8 @@ class _Full(_Operated[Scenario]):
         "people": of_full.PEOPLE_COLUMNS,
         "operators": workload.OPERATOR_COLUMNS,
         "tracks": of_full.TRACK_COLUMNS,
+        "drives": DRIVE_COLUMNS,
+        "commands": COMMAND_COLUMNS,
     }
     is_recorded = True
     teller = "dva_sim.cli.stories:tell_full"

@@ -152,6 +152,7 @@ class Run:
         self.dva = add_dva(self.stage, keep_events=watched.keeps)
         self.field = Field(self.stage)
         self.field.populate()
+        self._seats = watched.seats
         simulated = scenario.operator.count - watched.seats
         for number in range(1, max(0, simulated) + 1):
             add_operator(self.stage, number, self.field.truth)
@@ -199,6 +200,10 @@ class Run:
         while now < horizon and not self._settled():
             now = min(now + 1.0, horizon)
             self.clock.run(now)
+        return self.recording()
+
+    def recording(self) -> Recording:
+        """What is left of it now."""
         self._watch()
         self._sample()
         stage, field = self.stage, self.field
@@ -222,6 +227,7 @@ class Run:
             links=self.links,
             people=self._people(),
             depth=self._connector.deepest,
+            seats=self._seats,
         )
 
     def _people(self) -> list[PersonLog]:

@@ -37,6 +37,13 @@ def id_of(kind: str, number: int) -> str:
     return f"02:00:00:{_ROOMS[kind]:02X}:{number >> 8:02X}:{number & 0xFF:02X}"
 
 
+def kind_of(id_tag: str) -> tuple[str, int]:
+    """The kind and the number of a device by its id; of a stranger, an empty kind."""
+    *_, room, high, low = id_tag.split(":")
+    kind = next((kind for kind, number in _ROOMS.items() if number == int(room, 16)), "")
+    return kind, int(high + low, 16)
+
+
 def team_of(scenario: Scenario) -> Iterator[str]:
     """All devices of a scenario by id; each report may have a detector or a caller."""
     counts = {

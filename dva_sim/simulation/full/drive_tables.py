@@ -1,0 +1,110 @@
+"""The drives of a run one by one, and their commands: for runs in which people drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from dva_sim.kernel.measure import Measure, text
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.simulation.full.loop_delay import NAN, Row, driven
+from dva_sim.simulation.full.recording import Recording
+
+_NUMBER = Measure("drive", "number of the drive in its run, from 1, as they were ordered")
+DRIVE_COLUMNS = (
+    _NUMBER,
+    text("operator_name", "the device that drove, by its kind and number"),
+    text("person_label", "who drove, without a name; empty of a simulated person"),
+    text("robot_name", "the robot"),
+    Measure("event_id", "the event that it was for; 0: none"),
+    text("pattern", "what carried the commands"),
+    text("pipeline", "how tilt became commands; of a person at a page, the scenario's phone"),
+    Measure("sensor_hz", "samples of the person's own phone per second, as measured"),
+    Measure("t_ordered_s", "when it was ordered, or a person pressed Start"),
+    Measure("t_started_s", "when the robot said that it had begun"),
+    Measure("t_ended_s", "when it was over; empty: it went on at the end of the run"),
+    text("outcome", "how it ended"),
+    Measure("driven_s", "how long it went on"),
+    Measure("commands_sent", "commands that were sent"),
+    Measure("commands_applied", "commands that took effect", better="large"),
+    Measure("commands_superseded", "commands that a newer one replaced before they were sent"),
+    Measure("commands_refused", "commands that the robot refused"),
+    Measure("timeouts", "requests whose answer did not come in time"),
+    Measure("alerts", "alerts that the link may be lost"),
+    Measure("command_age_p50_s", "median age of commands at application"),
+    Measure("command_age_p95_s", "percentile 95 of this age"),
+    Measure("round_trip_p50_s", "median time from a command's request to its answer"),
+    Measure("round_trip_p95_s", "percentile 95 of this time"),
+    Measure("stop_share", "share of the driving time without a command in force"),
+)
+COMMAND_COLUMNS = (
+    _NUMBER,
+    Measure("t_made_s", "when it was made from the tilt"),
+    Measure("t_sent_s", "when the pattern let it go"),
+    Measure("t_arrived_s", "when it reached the robot"),
+    Measure("t_applied_s", "when it took effect"),
+    Measure("age_s", "from making to effect"),
+    Measure("sample_age_s", "mean age of the tilt samples behind it when it was made"),
+)
+
+
+def drive_tables(recording: Recording) -> dict[str, list[Row]]:
+    """A row for each drive, and for each command that took effect."""
+    logs = list(enumerate(recording.recorder.drives, 1))
+    return {
+        "drives": [_drive(recording, number, log) for number, log in logs],
+        "commands": [row for number, log in logs for row in _commands(number, log)],
+    }
+
+
+def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
+    end = recording.duration if log.ended is None else log.ended
+    lasted = 0.0 if log.started is None else end - log.started
+    done = driven(log, end)
+    ages = [a.time - a.issued for a in done.applied]
+    by, names = log.by, recording.labels
+    return {
+        "drive": number,
+        "operator_name": names.get(log.operator, log.operator),
+        "person_label": by.person,
+        "robot_name": names.get(log.robot, log.robot),
+        "event_id": log.event,
+        "pattern": by.pattern or recording.scenario.pattern,
+        "pipeline": by.pipeline,
+        "sensor_hz": by.sensor_hz,
+        "t_ordered_s": log.ordered,
+        "t_started_s": NAN if log.started is None else log.started,
+        "t_ended_s": NAN if log.ended is None else log.ended,
+        "outcome": log.outcome if log.ended is not None else "open",
+        "driven_s": lasted,
+        "commands_sent": log.sent,
+        "commands_applied": len(done.applied),
+        "commands_superseded": log.superseded,
+        "commands_refused": sum(log.refused.values()),
+        "timeouts": log.timeouts,
+        "alerts": log.alerts,
+        "command_age_p50_s": _percentile(ages, 50),
+        "command_age_p95_s": _percentile(ages, 95),
+        "round_trip_p50_s": _percentile(list(log.round_trips), 50),
+        "round_trip_p95_s": _percentile(list(log.round_trips), 95),
+        "stop_share": 1.0 - float(done.hold.sum()) / lasted if lasted > 0.0 else NAN,
+    }
+
+
+def _percentile(values: list[float], q: int) -> float:
+    return float(np.percentile(values, q)) if values else math.nan
+
+
+def _commands(number: int, log: DriveLog) -> Iterator[Row]:
+    for a in log.applied:
+        yield {
+            "drive": number,
+            "t_made_s": a.issued,
+            "t_sent_s": a.sent,
+            "t_arrived_s": a.arrived,
+            "t_applied_s": a.time,
+            "age_s": a.time - a.issued,
+            "sample_age_s": a.sample_age,
+        }
