@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from fake_phones import DVA_ADDRESS, OFFER
 
 from dva_sim.worlds.geojson import write_features
 from dva_sim.worlds.site import Site, load_site
@@ -154,13 +155,21 @@ class Scene:
             "rules": ["A robot without a command for 3 s stops."],
             "legend": [],
             "lag_limit_s": 0.25,
+            "dva_address": DVA_ADDRESS,
+            "phone": OFFER,
         }
+
+    @staticmethod
+    def id_of(walker: Walker) -> str:
+        """By which its device is known."""
+        kind = 1 if walker.kind == "robot" else 2
+        return f"02:00:00:{kind:02X}:{walker.index // 256:02X}:{walker.index % 256 + 1:02X}"
 
     def _thing(self, walker: Walker) -> dict[str, Any]:
         is_robot = walker.kind == "robot"
         about: dict[str, Any] = {
             "i": walker.index,
-            "id": f"02:00:00:00:{walker.index // 256:02X}:{walker.index % 256:02X}",
+            "id": self.id_of(walker),
             "label": walker.label,
             "kind": walker.kind,
             "radius_m": 0.25,
@@ -169,6 +178,8 @@ class Scene:
         }
         if is_robot:
             about["camera"] = {"field_of_view_deg": 70, "range_m": 12, "rate_hz": 10}
+        if walker.kind == "guard":
+            about["person"] = True
         return about
 
     def tour(self) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections import deque
 from contextlib import suppress
@@ -25,6 +26,7 @@ from PIL import Image, ImageDraw
 
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 
+from fake_phones import FakePhone, PhoneDesk  # noqa: E402
 from fake_scene import LINK, Scene, Walker  # noqa: E402
 
 from dva_sim.console.frames import ALIVE, Picture, pack  # noqa: E402
@@ -39,6 +41,7 @@ class Seat:
         self.name, self.robots, self.phase = name, list[Walker](), "free"
         self.wanted, self.heard, self.n, self.sent = (0.0, 0.0), 0.0, 0, 0
         self.alert = ""
+        self.phone: FakePhone | None = None
         self.late: deque[tuple[float, int, float, float]] = deque()
         self.command = (0.0, 0.0)
         self.applied = {"n": 0, "at_ms": 0.0}
@@ -52,6 +55,7 @@ class Seat:
             "phase": self.phase,
             "order": None,
             "alert": self.alert,
+            "phone": self.phone.line(self.command) if self.phone else None,
             "drives": [
                 {
                     "i": robot.index,
@@ -77,7 +81,7 @@ class Seat:
         }
 
 
-class FakeWorld:
+class FakeWorld(PhoneDesk):
     """The fake itself.
 
     Args:
@@ -93,12 +97,18 @@ class FakeWorld:
         self.watched: set[int] = set()
         self.toured = False  # from then on robots that nobody drives stand
         self.done: dict[str, dict[str, Any]] = {}
+        self.phones, self.guards = 0, dict[str, dict[str, Any]]()
+        self.more: dict[str, Any] = {}  # of the answer to an action
         self.pictures = not options.no_pictures
         self.socket, theirs = socket.socketpair()
         self.painter, their_painter = socket.socketpair()
         words = [sys.executable, "-m", "dva_sim.console.web", "--fd", str(theirs.fileno())]
         words += ["--pictures-fd", str(their_painter.fileno()), "--port", str(options.port)]
         words += ["--no-token"] if options.no_token else []
+        if options.phones:
+            self.folder = tempfile.TemporaryDirectory()
+            words += ["--phones-host", "127.0.0.1", "--phones-port", "0"]
+            words += ["--certificates", self.folder.name]
         numbers = theirs.fileno(), their_painter.fileno()
         folder = Path(__file__).parents[2]
         self.child = subprocess.Popen(words, pass_fds=numbers, cwd=folder)
@@ -138,13 +148,13 @@ class FakeWorld:
         if key in self.done:
             self.say(self.done[key])
             return
-        ok, text = True, "done"
+        ok, text, self.more = True, "done", {}
         try:
             text = getattr(self, f"do_{what}")(asked) or text
         except (KeyError, ValueError, AttributeError) as error:
             ok, text = False, str(error)
         if key is not None:
-            more = {"tour": self.scene.tour()} if what == "tour" else {}
+            more = {"tour": self.scene.tour()} if what == "tour" else self.more
             self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text, **more}
             self.say(self.done[key])
 
@@ -153,6 +163,7 @@ class FakeWorld:
     def do_serving(self, asked: dict[str, Any]) -> None:
         print(f"Console: {asked['drive']}", flush=True)
         print(f"Look only: {asked['look']}", flush=True)
+        print(f"Phone: {asked['phone']}", flush=True)
         self.say(self.scene.line())
 
     def do_tour(self, asked: dict[str, Any]) -> str:
@@ -165,7 +176,7 @@ class FakeWorld:
         self.watched = set(asked["robots"])
 
     def do_take(self, asked: dict[str, Any]) -> str:
-        seat = self.seats.setdefault(asked["client"], Seat(asked["client"]))
+        seat = self.own_seat(asked["client"])
         robots = [self.scene.all[i] for i in asked["robots"]]
         for other in self.seats.values():
             if other is not seat and set(other.robots) & set(robots):
@@ -175,6 +186,9 @@ class FakeWorld:
             robot.wanted = (0.0, 0.0)
         self.tell(seat)
         return "control taken"
+
+    def own_seat(self, client: str) -> Seat:
+        return self.seats.setdefault(client, Seat(client))
 
     def seat_of(self, asked: dict[str, Any]) -> Seat:
         return self.seats.get(asked["client"]) or Seat(asked["client"])
@@ -189,6 +203,8 @@ class FakeWorld:
         for robot in seat.robots:
             robot.wanted = (0.0, 0.0) if self.toured else None
         seat.robots = []
+        if seat.phone:
+            seat.phone.device = seat.phone.level = None
         self.tell(seat)
 
     def halt(self, seat: Seat, phase: str) -> None:
@@ -218,6 +234,8 @@ class FakeWorld:
             self.do_stop(asked)
 
     def do_emergency(self, asked: dict[str, Any]) -> str:
+        own = [robot.index for robot in self.seat_of(asked).robots]
+        asked.setdefault("robots", own)
         for seat in self.seats.values():
             if asked["robots"] == "all" or {r.index for r in seat.robots} & set(asked["robots"]):
                 seat.alert = "emergency stop"
@@ -376,7 +394,7 @@ class FakeWorld:
             who = self.scene.all[ticks % len(self.scene.all)].label
             self.say({"k": "story", "who": who, "what": "looks around", "kind": "event"})
         for seat in self.seats.values():
-            if seat.robots and ticks % 3 == 0:
+            if (seat.robots or seat.phone) and ticks % 3 == 0:
                 self.say(seat.line(self))
 
 
@@ -385,6 +403,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--no-token", action="store_true")
+    parser.add_argument("--phones", action="store_true", help="an address for phones, by https")
     parser.add_argument("--no-pictures", action="store_true")
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--people", type=int, default=100)

@@ -35,10 +35,17 @@ class World(NamedTuple):
     Attributes:
         drive: Address with the token for driving.
         look: The same for looking only.
+        phones: That for phones, by https; empty without one.
     """
 
     drive: str
     look: str
+    phones: str = ""
+
+    @property
+    def phone(self) -> str:
+        """The phone's page at the console's own address, as by `adb reverse`."""
+        return f"{self.base}phone?{self.phones.partition('?')[2]}"
 
     @property
     def base(self) -> str:
@@ -53,12 +60,14 @@ def running(folder: Path, command: list[str]) -> Iterator[World]:
     with out.open("wb") as file:
         process = subprocess.Popen([sys.executable, *command], stdout=file, stderr=file)
     try:
-        told = re.compile(r"^(Console|Look only): +(\S+)", re.MULTILINE)
+        told = re.compile(r"^(Console|Look only|Phone): +(https?:\S+)", re.MULTILINE)
         becomes(lambda: "Console:" in out.read_text() or process.poll() is not None)
+        becomes(lambda: "Phone:" in out.read_text() or process.poll() is not None)
         becomes(lambda: out.read_text().endswith("\n"))
         found = dict(told.findall(out.read_text()))
         assert "Console" in found, out.read_text()
-        yield World(found["Console"], found.get("Look only", found["Console"]))
+        look = found.get("Look only", found["Console"])
+        yield World(found["Console"], look, found.get("Phone", ""))
     finally:
         process.terminate()
         process.wait(PATIENCE_S)
@@ -119,13 +128,18 @@ class Visit:
 
     def open(self, address: str, page: str = "map") -> Page:
         """Go to a page and wait until the world is there."""
-        tab = self.context.new_page()
-        tab.on("pageerror", lambda error: self.errors.append(str(error)))
-        tab.on("console", lambda said: self._note(said.type, said.text))
+        tab = self.tab()
         tab.goto(f"{address}#/{page}")
         expect(
             tab.get_by_role("region", name="Map").or_(tab.locator(".network-page"))
         ).to_be_visible()
+        return tab
+
+    def tab(self) -> Page:
+        """An empty page, whose errors are noted."""
+        tab = self.context.new_page()
+        tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        tab.on("console", lambda said: self._note(said.type, said.text))
         return tab
 
     def _note(self, kind: str, text: str) -> None:

@@ -14,6 +14,11 @@ export const events = signal([]);
 export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */
 export const seat = signal(null);
+/**
+ * What the guard knows whom this page stands for.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
+ */
+export const guard = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
@@ -41,8 +46,8 @@ export const floorMs = computed(
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
-/** Whether this page's address is one for driving. */
-export const mayDrive = computed(() => you.value?.role === 'drive');
+/** Whether this page's address is one for driving, or for a phone. */
+export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
 /** Whether anything can be steered now. */
 export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
 

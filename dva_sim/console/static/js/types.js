@@ -4,7 +4,8 @@
  *
  * @typedef {{i: number, id: string, label: string, kind: string, radius_m: number,
  *   max_speed_mps: number, max_turn_rate_radps: number,
- *   camera?: {field_of_view_deg: number, range_m: number, rate_hz: number}}} Thing
+ *   camera?: {field_of_view_deg: number, range_m: number, rate_hz: number},
+ *   person?: boolean}} Thing
  *
  * @typedef {{name: string, polygon_m: number[][], floor: string, outdoor: boolean}} Room
  * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
@@ -21,7 +22,9 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number}} Scene
+ *   lag_limit_s: number, dva_address?: string, phone?: PhoneOffer}} Scene
+ * @typedef {{pipelines: Record<string, any>, filters: string[], mappings: string[],
+ *   speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number}} PhoneOffer
  *
  * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean}} Clock
  * @typedef {{i: number, mode: string, pattern: string, battery: number | null,
@@ -48,10 +51,22 @@
  * @typedef {{event: number, kind: string, robot: number, x_m: number, y_m: number,
  *   room?: string}} Order
  * @typedef {{t: number, seat: string, phase: string, order: Order | null, alert: string,
- *   drives: SeatDrive[]}} Seat
+ *   drives: SeatDrive[], phone?: Phone | null}} Seat
+ * @typedef {{id: string, label: string, address: string, registered: boolean,
+ *   device: string | null, level: string | null, calibrated: boolean, pipeline: string,
+ *   filter: string | null, mapping: string, radius_deg: number, speed_mps: number,
+ *   reading: number[] | null, sensor_hz: number | null, samples: number, samples_lost: number,
+ *   attempts: number}} Phone
+ * @typedef {{id: string, label: string, type: string, address: string}} Device
+ *
+ * @typedef {{event: number, kind: string, task: string, x_m: number, y_m: number,
+ *   room?: string, distance_m: number | null, way_m: number[][], answered: boolean}} GuardOrder
+ * @typedef {{t: number, seat: string, guard: number, label: string, doing: string,
+ *   order: GuardOrder | null, alert: string}} Guard
  *
  * @typedef {{client: string, role: string}} You
- * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan}} Done
+ * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
+ *   address: string}, devices?: Device[]}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
  */
 export {};

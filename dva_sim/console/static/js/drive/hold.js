@@ -20,6 +20,8 @@ const LEAST_MS = 15;
 export const wish = signal(/** @type {Wish} */ ({ speed: 0, turn: 0 }));
 /** Whether anything is held. */
 export const held = signal(false);
+/** Whether a drive goes on without anything held: a phone is steered by the way it is tilted. */
+export const engaged = signal(false);
 /** Why driving was interrupted; empty once somebody takes hold again. */
 export const interrupted = signal('');
 
@@ -63,7 +65,8 @@ export function onRelease(release) {
  * @param {string} why
  */
 export function interrupt(why) {
-  const was = held.value;
+  const was = held.value || engaged.value;
+  engaged.value = false;
   forget();
   if (!was) return;
   steer({ do: 'gone' });
@@ -131,7 +134,7 @@ export function watchInterruptions() {
   const blur = () => interrupt('The window lost the focus.');
   const hide = () => document.hidden && interrupt('The page was hidden.');
   const leave = () => {
-    if (held.value) sayGone();
+    if (held.value || engaged.value) sayGone();
     interrupt('The page was left.');
   };
   const turned = () => interrupt('The screen was turned.');
@@ -140,6 +143,7 @@ export function watchInterruptions() {
   document.addEventListener('visibilitychange', hide);
   document.addEventListener('freeze', leave);
   window.screen?.orientation?.addEventListener?.('change', turned);
+  window.addEventListener('orientationchange', turned); // where the screen tells nothing
   const endWatch = watchEnds();
   return () => {
     endWatch();
@@ -148,5 +152,6 @@ export function watchInterruptions() {
     document.removeEventListener('visibilitychange', hide);
     document.removeEventListener('freeze', leave);
     window.screen?.orientation?.removeEventListener?.('change', turned);
+    window.removeEventListener('orientationchange', turned);
   };
 }

@@ -2,7 +2,7 @@
 import { html } from '../../vendor/preact.js';
 import { maySteer, rows, seat, thingAt } from '../store.js';
 import { act } from '../net/actions.js';
-import { roomAt } from '../map/shown.js';
+import { placeOf } from '../map/shown.js';
 import { chooseRobots, driven } from '../shell/route.js';
 import { capital, plain } from '../ui/words.js';
 
@@ -12,15 +12,13 @@ export function OrderInHand() {
   const order = mine ?? rows.value?.order ?? null;
   if (!order) return null;
   const robot = thingAt(order.robot)?.label ?? 'a robot';
-  const room = order.room || roomAt(order.x_m, order.y_m);
-  const where = room ? `in ${room}` : `at ${order.x_m.toFixed(0)} m, ${order.y_m.toFixed(0)} m`;
   const here = driven.value.some((one) => one.i === order.robot);
   const holds = Boolean(seat.value?.drives.length);
   const off = !maySteer.value || !mine;
   return html`<section class="panel order" aria-label="Order in hand">
     <h2>Order: event ${order.event}, ${plain(order.kind)}</h2>
-    <p>${capital(plain(order.kind))} reported ${where}. Drive ${robot} there, look, and say whether
-      it is true.${mine ? '' : ' It waits for whoever takes control.'}</p>
+    <p>${capital(plain(order.kind))} reported ${placeOf(order)}. Drive ${robot} there, look, and say
+      whether it is true.${mine ? '' : ' It waits for whoever takes control.'}</p>
     <div class="buttons">
       ${!here && html`<button type="button" class="go" disabled=${holds}
         onClick=${() => chooseRobots([robot])}>Choose ${robot}</button>`}

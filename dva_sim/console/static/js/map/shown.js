@@ -42,6 +42,15 @@ export function roomAt(x, y) {
   return (inside.find((room) => !room.outdoor) ?? inside[0])?.name ?? '';
 }
 
+/**
+ * Where something is, in words.
+ * @param {{x_m: number, y_m: number, room?: string}} what
+ */
+export function placeOf(what) {
+  const room = what.room || roomAt(what.x_m, what.y_m);
+  return room ? `in ${room}` : `at ${what.x_m.toFixed(0)} m, ${what.y_m.toFixed(0)} m`;
+}
+
 /** @param {number} i */
 export function roomOf(i) {
   const place = tracks.last(i);

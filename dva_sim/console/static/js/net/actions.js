@@ -1,7 +1,7 @@
 /** What the person asks of the world, with the answer to each. */
 import { signal } from '../../vendor/preact.js';
 import { forget } from '../drive/hold.js';
-import { notice } from '../store.js';
+import { notice, you } from '../store.js';
 import { steer } from './wire.js';
 
 const PATIENCE_MS = 8000;
@@ -61,10 +61,16 @@ export function socketLost(unexpected) {
   if (unexpected) driveLost.value += 1;
 }
 
-/** Stop all robots, on a way of its own. What is held then drives no robot at the next start. */
-export async function emergencyStop() {
+/** Stop all robots. What is held then drives no robot at the next start. */
+export const emergencyStop = () => stopRobots('all');
+
+/**
+ * Stop robots at once, on a way of its own.
+ * @param {'all' | number[]} which
+ */
+export async function stopRobots(which) {
   forget();
-  const body = JSON.stringify({ id: newId(), robots: 'all' });
+  const body = JSON.stringify({ id: newId(), robots: which, client: you.peek()?.client });
   const headers = { 'Content-Type': 'application/json' };
   try {
     const answer = await fetch('/api/emergency', { method: 'POST', headers, body });

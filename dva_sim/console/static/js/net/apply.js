@@ -1,6 +1,6 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
-import { connection, events, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import { connection, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -24,6 +24,9 @@ const LINES = {
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
     if (isMine(line)) seat.value = line;
+  },
+  guard: (line) => {
+    if (line.seat === you.value?.client) guard.value = line.label ? line : null;
   },
   you: (line) => {
     you.value = { client: line.client, role: line.role };
@@ -54,6 +57,7 @@ function snap(line) {
   if (line.scene) scene.value = line.scene;
   story.value = [];
   seat.value = null;
+  guard.value = null;
   const { pos, story: told, ...others } = line.state ?? {};
   if (pos) LINES.pos({ p: pos });
   if (told) story.value = told.slice(-STORY_KEPT);

@@ -10,6 +10,9 @@ export function replaceDriveSocket(socket) {
   old?.close();
 }
 
+/** What waits in the browser and has not been sent yet [B]. */
+export const backlog = () => drive?.bufferedAmount ?? 0;
+
 /** @param {WebSocket} socket */
 export const isDriveSocket = (socket) => socket === drive;
 

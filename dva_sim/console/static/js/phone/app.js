@@ -1,0 +1,99 @@
+/** The frame of the five screens: where one is, how the link is, what is wrong, emergency stop. */
+import { html, render, useEffect, useRef } from '../../vendor/preact.js';
+import { connection, notice, scene, seat } from '../store.js';
+import { stopRobots } from '../net/actions.js';
+import { interrupted } from '../drive/hold.js';
+import { Icon } from '../ui/icon.js';
+import { AuthenticationScreen } from './authentication.js';
+import { CalibrationScreen } from './calibration.js';
+import { choices } from './choices.js';
+import { robot, whyNoEmergency } from './drive.js';
+import { InstructionsScreen } from './instructions.js';
+import { LinkStatus } from './link_status.js';
+import { MainScreen } from './main_screen.js';
+import { SCREENS, screen } from './screens.js';
+import { TeleoperationScreen } from './teleoperation.js';
+
+const BODIES = /** @type {Record<string, any>} */ ({
+  main: MainScreen,
+  authentication: AuthenticationScreen,
+  calibration: CalibrationScreen,
+  instructions: InstructionsScreen,
+  teleoperation: TeleoperationScreen,
+});
+
+/** @param {HTMLElement} where */
+export function showPhone(where) {
+  where.replaceChildren();
+  render(html`<${App} />`, where);
+}
+
+function App() {
+  const name = screen.value;
+  const Screen = BODIES[name];
+  const heading = useFocusAfterMove(name);
+  return html`<div class=${`phone ${name} hand-${choices.value.hand}`}>
+    <header class="top">
+      ${name === 'main'
+        ? html`<span class="brand">dva-sim</span>`
+        : html`<a class="back" href="#/main">‹ Main</a>`}
+      <h1 ref=${heading} tabindex="-1">${SCREENS[name]}</h1>
+      <${LinkStatus} />
+    </header>
+    <${Alerts} />
+    <main id="main">${scene.value ? html`<${Screen} key=${name} />` : html`<${Waiting} />`}</main>
+    <${Emergency} />
+  </div>`;
+}
+
+/**
+ * Who moves on by keys or by ear begins at the heading of the next screen.
+ * @param {string} name
+ */
+function useFocusAfterMove(name) {
+  const heading = useRef(/** @type {HTMLElement | null} */ (null));
+  const first = useRef(true);
+  useEffect(() => {
+    if (!first.current) heading.current?.focus();
+    first.current = false;
+    document.title = `${SCREENS[name]} – dva-sim phone`;
+  }, [name]);
+  return heading;
+}
+
+function Waiting() {
+  const lost = connection.value === 'lost';
+  return html`<p class="soft">${lost ? 'The console cannot be reached. Trying again …' : 'Waiting for the console …'}</p>`;
+}
+
+/** What is wrong, and what follows from it. */
+function Alerts() {
+  const ended = !['open', 'connecting', 'lost'].includes(connection.value);
+  const texts = [
+    connection.value === 'lost' &&
+      'link lost: the console cannot be reached. The robot stops by itself. Trying again …',
+    ended && `The world has ended: ${connection.value}`,
+    seat.value?.alert,
+    interrupted.value && `${interrupted.value} The robot was stopped; start again when you are ready.`,
+  ];
+  return html`<div class="alerts" role="alert">
+    ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
+    ${notice.value &&
+    html`<p class="warning">${notice.value}
+      <button type="button" class="plain" aria-label="Dismiss" onClick=${() => (notice.value = '')}>
+        <${Icon} name="x" /></button></p>`}
+  </div>`;
+}
+
+/** On every screen, by a request of its own; before a robot is chosen it says why it cannot. */
+function Emergency() {
+  const why = whyNoEmergency.value;
+  const one = robot.value;
+  return html`<footer class="bottom">
+    ${why && html`<p class="soft" id="why-no-emergency">${why}</p>`}
+    <button type="button" class="emergency" disabled=${Boolean(why)}
+      aria-describedby=${why ? 'why-no-emergency' : null}
+      onClick=${() => one && stopRobots([one.i])}>
+      <${Icon} name="octagon-x" />Emergency stop</button>
+  </footer>`;
+}

@@ -1,0 +1,38 @@
+/** What the phone does with itself while somebody drives: it stays awake, and it shakes. */
+
+const SHAKES = { start: [80], stop: [50, 60, 50], contact: [200], lost: [300, 100, 300] };
+
+/** @param {keyof typeof SHAKES} what */
+export function vibrate(what) {
+  navigator.vibrate?.(SHAKES[what]);
+}
+
+/** @type {any} */
+let lock = null;
+let wanted = false;
+
+/** @param {boolean} awake whether the screen must not go dark */
+export function keepAwake(awake) {
+  wanted = awake;
+  if (!awake) {
+    lock?.release?.();
+    lock = null;
+  } else if (!lock) take();
+}
+
+/** A browser may refuse it, as with a battery that is nearly empty; then the person has to touch. */
+async function take() {
+  try {
+    const taken = await navigator.wakeLock?.request('screen');
+    if (!wanted) return taken?.release();
+    lock = taken;
+    taken?.addEventListener('release', () => (lock = null));
+  } catch {
+    lock = null;
+  }
+  return undefined;
+}
+
+document.addEventListener('visibilitychange', () => {
+  if (wanted && !document.hidden && !lock) take();
+});

@@ -1,0 +1,29 @@
+/** How far the robot is: the round trip of the newest drive, or how the connection is. */
+import { html } from '../../vendor/preact.js';
+import { connection, link, seat } from '../store.js';
+import { msText } from '../ui/words.js';
+import { isLinkLost } from './drive.js';
+
+const POOR_MS = 600;
+const FAIR_MS = 250;
+
+/** The status, with bars that tell the same as the words. */
+export function LinkStatus() {
+  const trip = seat.value?.drives[0]?.round_trip_ms ?? null;
+  const modelled = link.value ? 2 * 1000 * link.value.delay_s : null;
+  const known = trip ?? modelled;
+  const [bars, text] = isLinkLost()
+    ? [0, 'link lost']
+    : connection.value !== 'open'
+      ? [0, 'connecting']
+      : [rank(known), msText(known)];
+  return html`<span class=${`link-status bars-${bars}`} role="status" aria-label="Link" aria-live="off"
+    title=${`There and back between this phone and the robot${trip === null ? ', as the link is modelled' : ''}`}>
+    <span class="bars" aria-hidden="true"><i></i><i></i><i></i></span>${text}</span>`;
+}
+
+/** @param {number | null} ms */
+function rank(ms) {
+  if (ms === null) return 3;
+  return ms > POOR_MS ? 1 : ms > FAIR_MS ? 2 : 3;
+}

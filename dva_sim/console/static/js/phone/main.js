@@ -1,0 +1,11 @@
+/** Where the phone's pages begin. */
+import { connect, keepDriveSocket } from '../net/sockets.js';
+import { showPhone } from './app.js';
+import { keepDriveInHand } from './drive.js';
+import { keepSampling } from './samples.js';
+
+showPhone(/** @type {HTMLElement} */ (document.getElementById('app')));
+connect();
+keepDriveSocket();
+keepDriveInHand();
+keepSampling();

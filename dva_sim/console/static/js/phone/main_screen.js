@@ -1,0 +1,41 @@
+/** The menu, and the events that wait for somebody. */
+import { html } from '../../vendor/preact.js';
+import { worldNow } from '../net/world_time.js';
+import { eventsInOrder, isOpen, placeOf } from '../map/shown.js';
+import { dark, switchTheme } from '../shell/theme.js';
+import { SeverityMark } from '../ui/icon.js';
+import { useEvery } from '../ui/every.js';
+import { ageText, capital, plain } from '../ui/words.js';
+import { holds, isKnown, phone } from './drive.js';
+import { SCREENS } from './screens.js';
+
+/** The screen. */
+export function MainScreen() {
+  const done = /** @type {Record<string, string>} */ ({
+    authentication: isKnown.value ? (holds.value ? 'a robot is in your hands' : 'registered') : '',
+    calibration: phone.value?.calibrated ? 'done' : '',
+  });
+  const names = Object.keys(SCREENS).filter((name) => name !== 'main');
+  return html`<nav class="menu" aria-label="Screens">
+      ${names.map((name) => html`<a class="big" href=${`#/${name}`}>${SCREENS[name]}
+        ${done[name] && html`<small>${done[name]}</small>`}</a>`)}
+    </nav>
+    <${Events} />
+    <p class="ends"><a href="/guard">I am a guard</a>
+      <button type="button" class="plain" onClick=${switchTheme}>
+        ${dark.value ? 'Light colours' : 'Dark colours'}</button></p>`;
+}
+
+function Events() {
+  useEvery(1000);
+  const open = eventsInOrder().filter(isOpen);
+  const next = holds.value ? 'teleoperation' : 'authentication';
+  return html`<section aria-label="Events"><h2>Events <span class="count">${open.length} open</span></h2>
+    ${open.length === 0 && html`<p class="soft">Nothing has been reported.</p>`}
+    <ul class="cards">${open.map(
+      (event) => html`<li key=${event.number}><${SeverityMark} severity=${event.severity} />
+        <span class="what"><b>${capital(plain(event.kind))}</b> ${placeOf(event)}
+          <small>${event.severity}, ${plain(event.state)} ${ageText(worldNow() - event.since_ms)}</small></span>
+        <a class="go" href=${`#/${next}`} aria-label=${`Drive to event ${event.number}`}>Drive there</a></li>`,
+    )}</ul></section>`;
+}

@@ -1,0 +1,68 @@
+/** Samples on their way to the world: as they are, in batches, with the phone's own times. */
+import { seat } from '../store.js';
+import { backlog, steer } from '../net/wire.js';
+import { choices } from './choices.js';
+import { thumb } from './drive.js';
+import { screen } from './screens.js';
+import { listen, onSample } from './sensor.js';
+
+const LEAST_MS = 20; // between two batches
+const MOST = 64; // samples in one
+const MOST_BACKLOG = 4096; // [B] beyond it the connection does not keep up: the oldest are lost
+const NEEDED_ON = ['calibration', 'teleoperation'];
+
+/** @type {import('./sensor.js').Sample[]} */
+let waiting = [];
+let count = 0; // of the first that waits
+let sent = -Infinity;
+
+/** From now on. */
+export function keepSampling() {
+  listen();
+  onSample((sample) => {
+    if (!isWanted()) return drop();
+    waiting.push(sample);
+    if (waiting.length > MOST) lose();
+    if (performance.now() - sent >= LEAST_MS) send();
+  });
+  window.setInterval(send, LEAST_MS);
+}
+
+/** Whether anybody would make something of them. */
+function isWanted() {
+  const known = seat.peek()?.phone?.registered || (seat.peek()?.drives.length ?? 0) > 0;
+  return known && choices.peek().by === 'tilt' && NEEDED_ON.includes(screen.peek());
+}
+
+/** What nobody wants does not count as lost. */
+function drop() {
+  waiting = [];
+}
+
+function lose() {
+  waiting.shift();
+  count += 1;
+}
+
+function send() {
+  if (!waiting.length || backlog() > MOST_BACKLOG) return;
+  const batch = waiting;
+  const told = {
+    do: 'samples',
+    n: count,
+    at: batch.map((sample) => Number(sample.at.toFixed(3))),
+    xyz: batch.map((sample) => sample.xyz.map((value) => Number(value.toFixed(4)))),
+    hand: !choices.peek().hold || thumb.peek(),
+    orientation: orientation(),
+  };
+  if (!steer(told)) return;
+  sent = performance.now();
+  count += batch.length;
+  waiting = [];
+}
+
+/** How far the screen is turned: 0, 90, 180 or 270 degrees. */
+export function orientation() {
+  const turned = window.screen?.orientation?.angle ?? /** @type {any} */ (window).orientation ?? 0;
+  return (((Math.round(turned / 90) * 90) % 360) + 360) % 360;
+}

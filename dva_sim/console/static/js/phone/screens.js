@@ -1,0 +1,18 @@
+/** Which of the five screens is shown, in the address: a reload shows the same. */
+import { computed, signal } from '../../vendor/preact.js';
+
+/** Names of the screens with their headings, in the order of the menu. */
+export const SCREENS = /** @type {Record<string, string>} */ ({
+  main: 'Main',
+  authentication: 'Authentication',
+  calibration: 'Calibration',
+  instructions: 'Instructions',
+  teleoperation: 'Teleoperation',
+});
+const hash = signal(location.hash);
+window.addEventListener('hashchange', () => (hash.value = location.hash));
+
+export const screen = computed(() => {
+  const name = hash.value.replace(/^#\/?/, '').split('?')[0];
+  return name in SCREENS ? name : 'main';
+});

@@ -1,0 +1,129 @@
+/**
+ * The motion sensor: the acceleration with gravity, in the axes of the device, as the browser has
+ * it.
+ *
+ * Where `devicemotion` is missing, the angles of `deviceorientation` are turned into what gravity
+ * alone would be (W3C Device Orientation: turns about z, then x, then y). The first event of a
+ * phone without a sensor holds nothing but nulls; a phone that wants to be asked first sends none
+ * at all until it has been, from a tap.
+ */
+import { signal } from '../../vendor/preact.js';
+
+const G = 9.80665; // [m/s^2]
+const RADIANS = Math.PI / 180;
+const WAIT_MS = 1000;
+
+/** @typedef {{at: number, xyz: number[]}} Sample time [ms] and acceleration [m/s^2] */
+
+/** 'looking', 'live', 'tap' (it has to be asked for), 'denied', 'insecure', 'none'. */
+export const state = signal(window.isSecureContext ? 'looking' : 'insecure');
+/** The newest sample, for what is shown; it changes ten times a second. */
+export const shown = signal(/** @type {Sample | null} */ (null));
+
+const SHOWN_MS = 100;
+const Motion = /** @type {any} */ (window.DeviceMotionEvent);
+const Orientation = /** @type {any} */ (window.DeviceOrientationEvent);
+/** Whether gravity's sign is the other one: so it is on iPhones and iPads. */
+export const isIos =
+  /iP(hone|ad|od)/.test(navigator.userAgent) ||
+  (navigator.userAgent.includes('Macintosh') && navigator.maxTouchPoints > 1);
+
+/** @type {Set<(sample: Sample) => void>} */
+const hearers = new Set();
+/** @type {Sample[]} */
+let recent = [];
+let heard = -Infinity;
+let motion = false;
+let answered = false;
+
+/** When the sensor last said anything [ms]. */
+export const lastHeard = () => heard;
+
+/** @param {(sample: Sample) => void} hear @returns {() => void} how to end that */
+export function onSample(hear) {
+  hearers.add(hear);
+  return () => hearers.delete(hear);
+}
+
+/** The mean of the last quarter of a second, which is how the phone is held. */
+export function pose() {
+  const now = performance.now();
+  const some = recent.filter((sample) => now - sample.at < 250);
+  if (!some.length) return null;
+  return [0, 1, 2].map((n) => some.reduce((sum, { xyz }) => sum + xyz[n], 0) / some.length);
+}
+
+/** Listen, from now on. */
+export function listen() {
+  if (state.peek() === 'insecure') return;
+  window.addEventListener('devicemotion', (event) => {
+    const { x, y, z } = event.accelerationIncludingGravity ?? { x: null, y: null, z: null };
+    answered = true;
+    if (x === null || y === null || z === null) return;
+    motion = true;
+    take({ at: event.timeStamp, xyz: [x, y, z] });
+  });
+  window.addEventListener('deviceorientation', ({ timeStamp, beta, gamma }) => {
+    answered = true;
+    if (motion || beta === null || gamma === null) return;
+    take({ at: timeStamp, xyz: gravity(beta, gamma) });
+  });
+  window.setTimeout(judge, WAIT_MS);
+}
+
+/** After a while without a value: what may be the reason. */
+function judge() {
+  if (state.peek() !== 'looking') return;
+  state.value = !answered && Motion?.requestPermission ? 'tap' : 'none';
+}
+
+/** Ask the phone, which has to be from a tap. */
+export async function ask() {
+  if (state.peek() !== 'tap' && state.peek() !== 'denied') return;
+  try {
+    const asked = [Motion, Orientation].map((kind) => kind?.requestPermission?.() ?? 'granted');
+    const answers = await Promise.all(asked);
+    state.value = answers.every((answer) => answer === 'granted') ? 'looking' : 'denied';
+  } catch {
+    state.value = 'denied';
+  }
+  window.setTimeout(() => {
+    if (state.peek() === 'looking') state.value = 'none';
+  }, WAIT_MS);
+}
+
+/** @param {Sample} sample */
+function take(sample) {
+  const last = recent.at(-1)?.at ?? -Infinity;
+  if (sample.at <= last || !sample.xyz.every(Number.isFinite)) return;
+  heard = performance.now();
+  recent = [...recent.slice(-63), sample];
+  state.value = 'live';
+  if (sample.at - (shown.peek()?.at ?? -Infinity) >= SHOWN_MS) shown.value = sample;
+  for (const hear of hearers) hear(sample);
+}
+
+/**
+ * What gravity alone would be measured as, with the sign of this phone.
+ * @param {number} beta about x [degrees]
+ * @param {number} gamma about y [degrees]
+ */
+export function gravity(beta, gamma) {
+  const [b, c] = [beta * RADIANS, gamma * RADIANS];
+  const size = isIos ? -G : G;
+  return [-Math.cos(b) * Math.sin(c), Math.sin(b), Math.cos(b) * Math.cos(c)].map((v) => size * v);
+}
+
+/** Each state in words, with the way out. */
+export const WORDS = /** @type {Record<string, string>} */ ({
+  looking: 'Looking for the motion sensor …',
+  live: 'The motion sensor works.',
+  tap: 'This phone wants to be asked for its motion sensor.',
+  denied:
+    'There is no sensor: this page was not allowed to read it. Allow motion and orientation for ' +
+    'this page in the settings of the browser and load it again, or steer by the stick.',
+  insecure:
+    'There is no sensor: browsers give it to pages over https alone. Open the address that begins ' +
+    'with https://, or steer by the stick.',
+  none: 'There is no sensor that answers. Steer by the stick on the screen, by keys or by a gamepad.',
+});

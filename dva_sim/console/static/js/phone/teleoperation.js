@@ -1,0 +1,109 @@
+/** The robot's picture over the whole screen, and the robot in the hand. */
+import { html, useEffect, useMemo } from '../../vendor/preact.js';
+import { clock, maySteer, rowOf, rows, seat } from '../store.js';
+import { act } from '../net/actions.js';
+import { watch } from '../net/sockets.js';
+import { placeOf } from '../map/shown.js';
+import { CameraPicture } from '../drive/camera.js';
+import { driveByGamepad } from '../drive/gamepad.js';
+import { driveByKeys } from '../drive/keys.js';
+import { Stick } from '../drive/stick.js';
+import { msText, plain } from '../ui/words.js';
+import { choices } from './choices.js';
+import { holds, isDriving, phase, phone, robot, sendCalibration, start, stop, thumb, tilts } from './drive.js';
+import { swipes } from './swipe.js';
+
+/** The screen. */
+export function TeleoperationScreen() {
+  const one = robot.value;
+  const held = holds.value;
+  useEffect(() => {
+    if (!one || !held) return undefined;
+    watch([one.i]);
+    sendCalibration();
+    return () => watch([]);
+  }, [one?.i, held]);
+  if (!one || !held) {
+    return html`<div role="alert" class="warning"><span>There is no permission to drive a robot yet:
+      ${' '}<a href="#/authentication">Authentication</a> comes first.</span></div>`;
+  }
+  return html`<${Cockpit} one=${one} />`;
+}
+
+/** @param {{one: import('../types.js').Thing}} props */
+function Cockpit({ one }) {
+  const handlers = useMemo(swipes, []);
+  useEffect(() => {
+    const ends = [driveByKeys(), driveByGamepad()];
+    return () => ends.forEach((end) => end());
+  }, []);
+  const busy = isDriving.value;
+  return html`<div class="cockpit-phone">
+    <div class="surface" ...${handlers}><${CameraPicture} robot=${one} /></div>
+    <${Figures} one=${one} />
+    <${Order} />
+    <div class="below">
+      <p class="hint" role="status" aria-label="Doing"><${Hint} one=${one} /></p>
+      ${!tilts.value && html`<div class="stick-box"><${Stick} disabled=${!maySteer.value} /></div>`}
+      <div class="buttons">
+        <button type="button" class=${busy ? 'big' : 'big go'} disabled=${!maySteer.value || busy || phase.value === 'stopping'}
+          onClick=${start}>Start</button>
+        <button type="button" class=${busy ? 'big go' : 'big'} disabled=${!maySteer.value || !busy}
+          onClick=${stop}>Stop</button>
+      </div>
+    </div>
+  </div>`;
+}
+
+/**
+ * Radius and speed as the app has them, and how late it all is.
+ * @param {{one: import('../types.js').Thing}} props
+ */
+function Figures({ one }) {
+  const drive = seat.value?.drives.find((each) => each.i === one.i);
+  const [speed, turn] = drive?.command ?? [0, 0];
+  const degrees = phone.value ? phone.value.radius_deg : Math.trunc((turn * 180) / Math.PI);
+  const metres = phone.value ? phone.value.speed_mps : speed;
+  return html`<div class="figures-phone">
+    <span role="status" aria-label="Radius" aria-live="off">Radius: ${degrees}°</span>
+    <span role="status" aria-label="Speed" aria-live="off">Speed: ${metres.toFixed(2)}m/s</span>
+    <small>command ${msText(drive?.command_age_ms ?? null)} old</small>
+  </div>`;
+}
+
+const PHASES = /** @type {Record<string, string>} */ ({
+  asking: 'Asking for the robot …',
+  starting: 'Starting …',
+  stopping: 'Stopping …',
+});
+
+/** What to do next, or why the robot stands. @param {{one: import('../types.js').Thing}} props */
+function Hint({ one }) {
+  void rows.value;
+  if (clock.value.paused) return 'The world is paused.';
+  if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
+  if (PHASES[phase.value]) return PHASES[phase.value];
+  const how = tilts.value ? 'tilt to drive' : 'hold the stick, a key or the gamepad';
+  if (phase.value !== 'driving') {
+    const warn = choices.value.calibrated ? '' : ' This phone is not calibrated: it will drive by nonsense.';
+    return `Swipe up or press Start, then ${how}.${warn}`;
+  }
+  if (choices.value.hold && tilts.value && !thumb.value) return 'Hold your thumb on the picture and tilt.';
+  const why = rowOf(one.i)?.stands;
+  return why ? `It stands: ${why}.` : 'Driving. Swipe down to stop.';
+}
+
+/** The order in hand, and what the person saw there. */
+function Order() {
+  const order = seat.value?.order;
+  if (!order) return null;
+  const off = !maySteer.value;
+  return html`<section class="order-phone" aria-label="Order in hand">
+    <p>Event ${order.event}: ${plain(order.kind)} ${placeOf(order)}</p>
+    <div class="buttons">
+      <button type="button" disabled=${off} onClick=${() => act('confirm')}>Confirm</button>
+      <button type="button" disabled=${off} onClick=${() => act('refute')}>Refute</button>
+      <button type="button" disabled=${off} onClick=${() => act('decline')}>Decline</button>
+    </div>
+  </section>`;
+}
