@@ -1,4 +1,4 @@
-"""A phone at a console's world in virtual time: what its page would do, and a hand that tilts it."""
+"""A phone at a console's world in virtual time: what its page does, and a hand that tilts it."""
 
 import math
 

@@ -203,6 +203,8 @@ class Actions:
         if self._seats.heard(client, time.monotonic(), held):
             count = number if isinstance(number, int) else 0
             self._person(client).want(count, float(speed or 0.0), float(turn or 0.0))
+            if not held:
+                self._phones.let_go(client)
 
     def _gone(self, client: str) -> None:
         """The page is hidden, or its socket closed: nobody has a hand on it."""

@@ -63,6 +63,12 @@ class PhoneActions:
         phone = self._phones.by_client.get(client)
         return phone is not None and phone.tilts
 
+    def let_go(self, client: str) -> None:
+        """The stick on a phone's screen is let go, if it is a phone."""
+        phone = self._phones.by_client.get(client)
+        if phone is not None:
+            phone.tilt.let_go()
+
     def samples(self, client: str, line: Line) -> None:
         """Samples of a phone have come; what makes no sense counts as silence."""
         said, phone = samples_of(line), self._phones.seat(client)
@@ -74,8 +80,8 @@ class PhoneActions:
         elif phone.driven is not None and said.orientation != phone.orientation:
             self._stop(client, TURNED)
         phone.turn(said.orientation)
-        self._seats.heard(client, now, said.hand)
-        phone.take(said, now)
+        if phone.take(said, now):  # a sensor that says the same again and again is silent
+            self._seats.heard(client, now, said.hand)
 
     def forget(self, client: str) -> None:
         """Its page is gone for good: the device leaves."""

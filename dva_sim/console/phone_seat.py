@@ -111,8 +111,8 @@ class PhoneSeat:
         if self.driven is None:
             self.new_tilt()
 
-    def take(self, said: Samples, came: float) -> None:
-        """Samples have come.
+    def take(self, said: Samples, came: float) -> bool:
+        """Samples have come; whether one of them is new.
 
         Args:
             said: Which.
@@ -121,7 +121,7 @@ class PhoneSeat:
         fresh = [pair for pair in zip(said.at, said.xyz, strict=True) if not self._is_old(pair[0])]
         self._count(said, len(fresh))
         if not fresh:
-            return
+            return False
         told = [at for at, _ in fresh]
         for at, (_, xyz) in zip(self._times.times_of(told, came), fresh, strict=True):
             # What was so long ago in real time was as long ago here, times the pace.
@@ -136,6 +136,7 @@ class PhoneSeat:
         elif driven is None:
             self.tilt.look(self._clock.now)  # the screen shows what would be sent
         self.kept(said)
+        return True
 
     def _is_old(self, told: float) -> bool:
         return self._times.is_old(told)

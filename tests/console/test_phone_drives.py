@@ -1,4 +1,4 @@
-"""A real phone registers, is given a robot and tilts it, by the messages of any operator's phone."""
+"""A real phone registers, is given a robot and tilts it, by the messages of any operator."""
 
 import re
 

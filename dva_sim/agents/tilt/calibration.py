@@ -12,6 +12,7 @@ SPEED_PER_LEVEL: Final = 0.05  # [m/s]
 MAX_TURN_DEG: Final = 30.0  # either way, per second
 
 Reading = tuple[float, float]  # speed level, turn [deg/s]
+SIDE_KNOWN: Final = 3.0  # who calibrates a phone that stands so upright has no side up [m/s^2]
 NEUTRAL: Final[Reading] = (0.0, 0.0)  # of a phone at rest: stand
 
 
@@ -38,7 +39,8 @@ class Calibration:
         max_delay: float = 0.5,
     ) -> None:
         self.reference, self.max_delay = reference, max_delay
-        self._x, self._y, self._z = reference
+        self._x, self._y, z = reference
+        self._z = z if abs(z) > SIDE_KNOWN else 0.0
         self._speed_step, self._turn_step = speed_step, turn_step
 
     def reading(self, ax: float, ay: float, az: float) -> Reading:

@@ -61,6 +61,10 @@ class TiltSources:
         self._given_at = now
         self._given.ask(now, speed, turn_rate)
 
+    def let_go(self) -> None:
+        """Nobody holds the stick any more: the next sample acts, if one comes."""
+        self._given_at = -math.inf
+
     def next_look(self, now: float, rate_hz: float) -> float:
         """See `TiltApp`."""
         return self._acting.next_look(now, rate_hz)

@@ -41,3 +41,10 @@ def test_beyond_what_gravity_gives_the_pose_is_the_nearest_there_is() -> None:
 
 def test_a_phone_upside_down_steers_nothing() -> None:
     assert Calibration().reading(3.0, 3.0, -8.0) == (0.0, 0.0)
+
+
+def test_a_phone_that_is_held_upright_has_no_side_that_must_be_up() -> None:
+    steep = Calibration((9.6, 0.0, 2.0))
+    assert steep.reading(9.6, 1.2, -0.5) == pytest.approx((0.0, 10.0))
+    flat = Calibration((6.0, 0.0, 7.7))
+    assert flat.reading(6.0, 1.2, -0.5) == (0.0, 0.0)

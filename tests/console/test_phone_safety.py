@@ -1,0 +1,233 @@
+"""Whatever ends a phone's drive ends it at once and for good, and nothing it says does harm."""
+
+import json
+import math
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from phone_page import HeldPhone, PhonePage
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.phone_input import samples_of, settings_of
+from dva_sim.kernel.errors import ConfigError
+
+
+@pytest.fixture
+def page(monkeypatch):
+    return PhonePage(monkeypatch)
+
+
+def set_out(page, client="p1", robot=0):
+    """A phone that drives straight on."""
+    assert page.register(client, label=f"phone {client}")["ok"]
+    assert page.permit(robot, client=client)["ok"]
+    assert page.calibrate(client)["ok"]
+    held = HeldPhone(page, client)
+    held.tilt(10.3)
+    page.let(1.0)
+    assert page.do("start", client=client)[0]
+    page.let(3.0)
+    return held
+
+
+@pytest.fixture
+def driving(page):
+    page.held = set_out(page)
+    assert page.robot().body.speed > 0.2
+    return page
+
+
+def lift(page):
+    page.held.hand = False
+
+
+def turn(page):
+    page.held.orientation = 90
+
+
+def send_nonsense(page):
+    page.held.put_away()
+    page.world.clock.every(0.03, lambda: page.held.say([1.0], [[math.nan, 0.0, 9.8]]))
+
+
+def send_the_past(page):
+    page.held.put_away()
+    page.world.clock.every(0.03, lambda: page.held.say([1e3], [[0.0, -3.0, 9.0]]))
+
+
+@pytest.mark.parametrize(
+    ("end", "within", "why"),
+    [
+        (lambda page: page.held.put_away(), 0.5, "silent for 0.3 s"),
+        (lift, 0.1, "thumb was lifted"),
+        (turn, 0.1, "screen has turned"),
+        (send_nonsense, 0.5, "silent"),
+        (send_the_past, 0.5, "silent"),
+        (lambda page: page.actions.take({"client": "p1", "do": "gone"}), 0.05, "hidden"),
+        (lambda page: page.do("stop"), 0.1, ""),
+        (lambda page: page.do("emergency"), 0.1, ""),
+        (lambda page: page.do("emergency", client="another", robots="all"), 0.3, "emergency"),
+        (lambda page: page.do("release"), 0.1, ""),
+        (lambda page: page.world.clock.on_late(0.3), 0.05, "behind real time"),
+    ],
+)
+def test_what_ends_a_drive_ends_it_at_once_and_for_good(driving, end, within, why):
+    log = driving.world.recorder.drives[-1]
+    then = driving.world.clock.now
+    end(driving)
+    driving.let(2.5)
+    assert log.ended - then < within
+    driving.held.hand, driving.held.on = True, True
+    driving.let(2.0)
+    assert driving.robot().controller.mode is Mode.IDLE
+    assert driving.robot().body.speed == pytest.approx(0.0, abs=1e-3)
+    assert why in driving.seat()["alert"]
+
+
+def test_who_was_stopped_starts_again_by_a_new_start_only(driving):
+    lift(driving)
+    driving.let(2.5)
+    driving.held.hand = True
+    driving.let(1.0)
+    assert driving.robot().controller.mode is Mode.IDLE
+    assert driving.do("start")[0]
+    driving.let(3.0)
+    assert driving.robot().body.speed > 0.2
+
+
+def test_an_emergency_goes_out_before_session_and_calibration(page):
+    page.do("take", robots=[0], client="c1")
+    page.do("start", client="c1")
+    page.client = "c1"
+    page.want(0.5)
+    page.let(3.0)
+    assert page.robot().body.speed > 0.2
+    assert page.register("p1")["ok"]
+    done, text = page.do("emergency", robots=["robot-1"], client="p1")
+    assert done
+    assert "robot-1 has stopped" in text
+    page.let(2.0)
+    assert page.robot().controller.mode is Mode.IDLE
+    sent = [x for x in page.heard if x[0].startswith("02:00:00:06") and b"<EmergencyMsg" in x[2]]
+    assert sent
+
+
+def test_an_emergency_names_a_robot_or_is_for_ones_own(page):
+    assert page.register()["ok"]
+    done, text = page.do("emergency")
+    assert not done
+    assert "no robot is named" in text
+
+
+def test_without_registration_there_are_neither_lists_nor_permissions(page):
+    for what in ("phone_devices", "phone_permission"):
+        answer = page.ask(what, device=page.robot().device.id_tag, level="both")
+        assert not answer["ok"]
+        assert "not registered" in answer["text"]
+
+
+def test_a_page_that_is_gone_for_good_leaves_the_dva_and_its_robot(driving):
+    driving.held.put_away()
+    goodbye = {"id": "bye-release-p1", "client": "p1", "do": "release"}
+    driving.actions.take(goodbye)
+    driving.let(3.0)
+    assert driving.robot().controller.mode is Mode.IDLE
+    assert driving.register("p2", label="next")["ok"]
+    assert driving.permit(client="p2")["ok"]
+    driving.let(30.0)
+    listed = {d["label"] for d in driving.ask("phone_devices", client="p2")["devices"]}
+    assert "phone p1" not in listed
+    assert "next" in listed
+    assert driving.seat()["phone"] is None
+
+
+def test_who_registers_anew_has_one_device_and_its_drive_is_over(driving):
+    old = driving.phone()["id"]
+    assert driving.register(label="renamed")["ok"]
+    driving.let(2.0)
+    assert driving.robot().controller.mode is Mode.IDLE
+    assert driving.phone()["id"] != old
+    assert driving.permit()["ok"]
+
+
+def test_ids_are_given_out_again_and_nothing_grows_without_end(page):
+    devices = len(page.world.run.stage.devices)
+    for n in range(20):
+        assert page.register(f"x{n % 3}", label=f"{n}")["ok"]
+    page.let(125.0)
+    assert len(page.world.run.stage.devices) <= devices + 3
+    assert len(page.world.persons) == 4  # the console's, and three phones
+
+
+@pytest.mark.parametrize("label", ["", "x" * 65, "\x00", "line\nbreak", 7, None, ["a"]])
+def test_a_label_that_is_none_is_refused_in_words(page, label):
+    answer = page.register(label=label)
+    assert not answer["ok"]
+    assert answer["text"]
+    assert not page.phone()["registered"] if page.told("seat") else True
+
+
+@pytest.mark.parametrize("label", ["<script>alert(1)</script>", "a & b", "телефон ☎", '"'])
+def test_a_label_is_data(page, label):
+    assert page.register(label=label)["ok"]
+    assert page.phone()["label"] == label
+    assert label in {d["label"] for d in page.ask("phone_devices")["devices"]}
+
+
+NUMBERS = st.one_of(
+    st.floats(), st.integers(), st.sampled_from([10**400, -(10**400), 1e308, True, None, "1", [1]])
+)
+MESSAGES = st.fixed_dictionaries(
+    {},
+    optional={
+        "n": NUMBERS,
+        "at": st.one_of(NUMBERS, st.lists(NUMBERS, max_size=70)),
+        "xyz": st.one_of(NUMBERS, st.lists(st.lists(NUMBERS, max_size=4), max_size=70)),
+        "hand": NUMBERS,
+        "orientation": st.one_of(NUMBERS, st.sampled_from([0, 90, 180, 270])),
+    },
+)
+TIMES = st.lists(st.floats(0, 1e13), min_size=1, max_size=8, unique=True).map(sorted)
+TRIPLES = st.tuples(*[st.floats(-400, 400)] * 3).map(list)
+SOUND = TIMES.flatmap(
+    lambda at: st.fixed_dictionaries(
+        {
+            "n": st.integers(0, 2**53),
+            "at": st.just(at),
+            "xyz": st.lists(TRIPLES, min_size=len(at), max_size=len(at)),
+            "hand": st.booleans(),
+            "orientation": st.sampled_from([0, 90, 180, 270]),
+        }
+    )
+)
+
+
+@given(MESSAGES)
+def test_any_message_is_samples_or_nothing(message):
+    said = samples_of(message)
+    if said is not None:
+        assert len(said.at) == len(said.xyz) <= 64
+        assert all(math.isfinite(x) for one in said.xyz for x in one)
+
+
+@given(st.dictionaries(st.sampled_from(["reference_mps2", "speed_step_mps2", "pipeline"]), NUMBERS))
+def test_any_calibration_is_one_or_refused(message):
+    with pytest.raises(ConfigError):
+        settings_of(message)
+
+
+@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.lists(st.one_of(SOUND, MESSAGES), min_size=1, max_size=12))
+def test_no_stream_of_samples_breaks_the_world_or_leaves_its_limits(stream):
+    with pytest.MonkeyPatch.context() as patch:
+        page = PhonePage(patch)
+        set_out(page).put_away()
+        for message in stream:
+            page.actions.take({**message, "do": "samples", "client": "p1"})
+            page.let(0.1)
+            json.dumps(page.phone(), allow_nan=False)
+        assert 0.0 <= page.robot().set_point.speed <= 0.5
+        assert abs(page.robot().set_point.turn_rate) <= math.pi / 6 + 1e-9
+        page.let(2.0)
+        assert page.robot().body.speed == pytest.approx(0.0, abs=1e-3)
