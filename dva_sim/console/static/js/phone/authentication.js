@@ -137,7 +137,7 @@ function DeviceList({ devices, know, off }) {
     <button type="button" class=${devices || off ? 'big' : 'big go'} disabled=${off || !maySteer.value}
       onClick=${ask}>Get device list</button>
     ${devices?.length === 0 && html`<p>The DVA knows no devices.</p>`}
-    <${Choice} name="Device" value=${choices.value.device} disabled=${off || !options.length}
+    <${Choice} name="Device" value=${options.length ? choices.value.device : ''} disabled=${off || !options.length}
       options=${options.length ? options : [['', 'not listed yet']]}
       onInput=${(/** @type {string} */ id) => choose({ device: id })} />
   </li>`;
