@@ -4,7 +4,7 @@ import { mayDrive, maySteer, notice, robots, scene, seat, thingAt, you } from '.
 import { act } from '../net/actions.js';
 import { choices, choose } from './choices.js';
 import { holds, phone, robot } from './drive.js';
-import { Choice, Field } from './fields.js';
+import { Choice, Field } from '../ui/fields.js';
 
 const TYPES = /** @type {[string, string][]} */ (
   ['Robot', 'Remote Control', 'Teleoperation'].map((type) => [type, type])
