@@ -43,7 +43,7 @@ def test_eight_taps_lead_from_the_scan_to_a_robot_that_moves(hand) -> None:
     hand.tap("Go on: Teleoperation", "link")
     hand.swipe(-200)  # the eighth
     hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.25m/s")
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     asked = [line["do"] for line in page.evaluate("window.sent") if "id" in line]
     assert asked == [
         "phone_register",
@@ -58,7 +58,7 @@ def test_tilting_drives_and_a_swipe_down_stops(hand) -> None:
     hand.drive()
     hand.tilt(LEFT_FORWARDS)
     expect(hand.status("Radius")).to_have_text("Radius: 15°")
-    expect(hand.status("Speed")).to_have_text("Speed: 0.25m/s")
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     expect(hand.status("Link")).to_contain_text("ms")
     hand.swipe(200)
     expect(hand.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
@@ -109,7 +109,7 @@ def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(
 ) -> None:
     hand.drive()
     hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.25m/s")
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     hand.page.evaluate(interruption)
     expect(hand.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
     hand.alert(why)
@@ -139,7 +139,7 @@ def test_with_hold_to_drive_lifting_the_thumb_stops(hand) -> None:
     hand.go("Teleoperation")
     lift = hand.swipe(-200, hold=True)
     hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.25m/s")
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     assert hand.sent("samples")[-1]["hand"] is True
     lift()
     expect(hand.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
@@ -164,7 +164,7 @@ def test_leaving_the_screen_stops_and_a_reload_drives_no_further(hand) -> None:
 def test_a_socket_that_is_cut_in_mid_drive_ends_it(hand) -> None:
     hand.drive()
     hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.25m/s")
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     hand.page.context.set_offline(True)
     hand.page.evaluate("window.ends.forEach((socket) => socket.close())")
     hand.alert("link lost")
@@ -343,7 +343,7 @@ def test_by_https_the_page_is_secure_and_its_sensor_works(world, visits) -> None
     assert hand.page.evaluate("isSecureContext")
     hand.drive("robot-3")
     hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.25m/s")
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     hand.leave()
 
 

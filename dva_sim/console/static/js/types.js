@@ -11,7 +11,8 @@
  * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
  *   cells: string, heading_rad?: number}} Raster
  * @typedef {{name: string, extent_m: number[], rooms: Room[], walls_m: number[][],
- *   solids_m: number[][][], doors_m: number[][], exits_m: number[][], raster?: Raster}} Site
+ *   solids_m: number[][][], doors_m: number[][], exits_m: number[][], raster?: Raster,
+ *   origin?: {latitude_deg: number, longitude_deg: number}}} Site
  *
  * @typedef {{processing_s: number, delay_s?: number, jitter_s?: number, loss?: number,
  *   rate_bps?: number | null, jitter_wanted_s?: number, kind?: string, trace?: string | null,

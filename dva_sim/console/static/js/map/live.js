@@ -18,10 +18,12 @@ export class Live {
   /**
    * @param {() => number[]} cones robots whose cone of sight is drawn
    * @param {() => import('../types.js').Goal[]} goals
+   * @param {() => number[][][]} ways that somebody is to go [m]
    */
-  constructor(cones, goals) {
+  constructor(cones, goals, ways) {
     this.cones = cones;
     this.goals = goals;
+    this.ways = ways;
     this.sight = new Sight(scene.peek()?.site.walls_m ?? []);
     /** @type {Body[]} */
     this.bodies = [];
@@ -46,6 +48,7 @@ export class Live {
     this.bodies = placed(affine, now);
     this.drawCones(pen, now);
     this.drawTrails(pen);
+    this.drawWays(pen);
     this.drawGoals(pen);
     this.drawOrders(pen);
     this.drawSources(pen);
@@ -89,6 +92,18 @@ export class Live {
     }
     ctx.globalAlpha = 1;
     affine.toPixels(ctx);
+  }
+
+  /** @param {Pen} pen */
+  drawWays({ ctx, affine, colours: palette }) {
+    ctx.lineWidth = 4;
+    ctx.lineCap = ctx.lineJoin = 'round';
+    ctx.strokeStyle = palette.focus;
+    for (const way of this.ways()) {
+      ctx.beginPath();
+      for (const [x, y] of way) ctx.lineTo(...affine.pixel(x, y));
+      ctx.stroke();
+    }
   }
 
   /** @param {Pen} pen */

@@ -1,7 +1,7 @@
 /** The map as a component: the plan, what moves over it, and its buttons. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { effect } from '../../vendor/preact.js';
-import { events, hazards, rows, scene, selection, thingAt, tracks } from '../store.js';
+import { events, guard, hazards, rows, scene, selection, thingAt, tracks } from '../store.js';
 import { pageAge } from '../net/world_time.js';
 import { colours } from '../shell/theme.js';
 import { Icon } from '../ui/icon.js';
@@ -17,16 +17,21 @@ const TAP_PX = 5;
 
 /**
  * @param {{cones: () => number[], follows?: () => number | null, keyboard?: boolean,
- *   legend?: boolean, goals?: () => import('../types.js').Goal[]}} props
+ *   legend?: boolean, goals?: () => import('../types.js').Goal[], ways?: () => number[][][],
+ *   onPlace?: (x: number, y: number) => void}} props `onPlace` gets what is tapped [m]
  */
-export function MapBox({ cones, follows, keyboard = true, legend = true, goals = () => [] }) {
+export function MapBox(props) {
+  const { cones, follows, keyboard = true, legend = true, goals = () => [], ways = () => [] } = props;
+  const onPlace = useRef(props.onPlace);
+  onPlace.current = props.onPlace;
   const box = useRef(/** @type {HTMLElement | null} */ (null));
   const view = useRef(/** @type {MapView | null} */ (null));
   const [following, follow] = useState(false);
   const plan = scene.value;
   useEffect(() => {
     if (!plan || !box.current) return undefined;
-    return show(box.current, plan, { cones, keyboard, goals }, view, () => follow(false));
+    const options = { cones, keyboard, goals, ways, onPlace };
+    return show(box.current, plan, options, view, () => follow(false));
   }, [plan]);
   useEffect(() => {
     if (view.current) view.current.follow = following ? placeOf(follows) : null;
@@ -45,14 +50,15 @@ export function MapBox({ cones, follows, keyboard = true, legend = true, goals =
  * @param {HTMLElement} element
  * @param {import('../types.js').Scene} plan
  * @param {{cones: () => number[], keyboard: boolean,
- *   goals: () => import('../types.js').Goal[]}} options
+ *   goals: () => import('../types.js').Goal[], ways: () => number[][][],
+ *   onPlace: {current: ((x: number, y: number) => void) | undefined}}} options
  * @param {{current: MapView | null}} view
  * @param {() => void} letGo
  */
 function show(element, plan, options, view, letGo) {
   const ground = new Plan(plan.site);
   const fields = new Fields();
-  const live = new Live(options.cones, options.goals);
+  const live = new Live(options.cones, options.goals, options.ways);
   const paper = {
     draw: (/** @type {any} */ ctx, /** @type {any} */ affine) =>
       ground.draw(ctx, affine, colours.peek()),
@@ -68,11 +74,11 @@ function show(element, plan, options, view, letGo) {
       map.refresh(1);
     }),
     effect(() => {
-      void [colours.value, hazards.value, events.value, rows.value, selection.value];
+      void [colours.value, hazards.value, events.value, rows.value, selection.value, guard.value];
       map.refresh(2);
     }),
   ];
-  const stopPointing = pointing(element, map, live);
+  const stopPointing = pointing(element, map, live, options.onPlace);
   return () => {
     for (const stop of stops) stop();
     stopPointing();
@@ -86,14 +92,16 @@ function show(element, plan, options, view, letGo) {
  * @param {HTMLElement} element
  * @param {MapView} map
  * @param {Live} live
+ * @param {{current: ((x: number, y: number) => void) | undefined}} onPlace
  */
-function pointing(element, map, live) {
+function pointing(element, map, live, onPlace) {
   let [x, y] = [0, 0];
   const down = (/** @type {PointerEvent} */ event) => ([x, y] = [event.clientX, event.clientY]);
   const click = (/** @type {MouseEvent} */ event) => {
     if (Math.hypot(event.clientX - x, event.clientY - y) > TAP_PX) return;
     const [left, top] = map.place(event);
-    selection.value = live.hit(left, top, map.affine);
+    if (onPlace.current) onPlace.current(...map.affine.metres(left, top));
+    else selection.value = live.hit(left, top, map.affine);
   };
   const move = (/** @type {PointerEvent} */ event) => {
     if (event.buttons) return;

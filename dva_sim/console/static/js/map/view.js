@@ -28,6 +28,15 @@ export class Affine {
     return [this.left + x * this.scale, this.top - y * this.scale];
   }
 
+  /**
+   * @param {number} left
+   * @param {number} top
+   * @returns {[number, number]}
+   */
+  metres(left, top) {
+    return [(left - this.left) / this.scale, (this.top - top) / this.scale];
+  }
+
   /** @param {CanvasRenderingContext2D} ctx */
   toMetres(ctx) {
     const s = this.scale * this.dpr;

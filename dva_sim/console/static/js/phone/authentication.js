@@ -4,7 +4,7 @@ import { mayDrive, maySteer, notice, robots, scene, seat, thingAt, you } from '.
 import { act } from '../net/actions.js';
 import { choices, choose } from './choices.js';
 import { holds, phone, robot } from './drive.js';
-import { Choice, Field } from './fields.js';
+import { Choice, Field } from '../ui/fields.js';
 
 const TYPES = /** @type {[string, string][]} */ (
   ['Robot', 'Remote Control', 'Teleoperation'].map((type) => [type, type])
@@ -137,7 +137,7 @@ function DeviceList({ devices, know, off }) {
     <button type="button" class=${devices || off ? 'big' : 'big go'} disabled=${off || !maySteer.value}
       onClick=${ask}>Get device list</button>
     ${devices?.length === 0 && html`<p>The DVA knows no devices.</p>`}
-    <${Choice} name="Device" value=${choices.value.device} disabled=${off || !options.length}
+    <${Choice} name="Device" value=${options.length ? choices.value.device : ''} disabled=${off || !options.length}
       options=${options.length ? options : [['', 'not listed yet']]}
       onInput=${(/** @type {string} */ id) => choose({ device: id })} />
   </li>`;

@@ -3,7 +3,7 @@ import { html, useEffect, useState } from '../../vendor/preact.js';
 import { maySteer, scene } from '../store.js';
 import { choices, choose } from './choices.js';
 import { isKnown, phone, sendCalibration, tilts } from './drive.js';
-import { Choice, Field, Tick, wrongNumber } from './fields.js';
+import { Choice, Field, Tick, wrongNumber } from '../ui/fields.js';
 import { WORDS, ask, pose, shown, state } from './sensor.js';
 
 const HANDS = /** @type {[string, string][]} */ ([['right', 'right'], ['left', 'left']]);

@@ -124,6 +124,6 @@ export const WORDS = /** @type {Record<string, string>} */ ({
     'this page in the settings of the browser and load it again, or steer by the stick.',
   insecure:
     'There is no sensor: browsers give it to pages over https alone. Open the address that begins ' +
-    'with https://, or steer by the stick.',
+    'with https, or steer by the stick.',
   none: 'There is no sensor that answers. Steer by the stick on the screen, by keys or by a gamepad.',
 });

@@ -1,0 +1,7 @@
+/** Where the guard's page begins. */
+import { connect, keepDriveSocket } from '../net/sockets.js';
+import { showGuard } from './guard_page.js';
+
+showGuard(/** @type {HTMLElement} */ (document.getElementById('app')));
+connect();
+keepDriveSocket();

@@ -1,0 +1,31 @@
+/** An event that the guard has seen: kind, severity, and the place where the guard is. */
+import { html, useState } from '../../vendor/preact.js';
+import { maySteer, tracks } from '../store.js';
+import { act } from '../net/actions.js';
+import { Choice } from '../ui/fields.js';
+import { plain } from '../ui/words.js';
+
+const pairs = (/** @type {string[]} */ names) =>
+  /** @type {[string, string][]} */ (names.map((name) => [name, plain(name)]));
+const KINDS = pairs(['fire', 'gas_leak', 'flood']);
+const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
+
+/** @param {{me: import('../types.js').Guard}} props */
+export function Report({ me }) {
+  const [kind, setKind] = useState('fire');
+  const [severity, setSeverity] = useState('medium');
+  const [told, tell] = useState('');
+  const report = async () => {
+    tell('');
+    const at = tracks.last(me.guard);
+    if (!at) return;
+    const done = await act('guard_report', { kind, severity, x_m: at.x, y_m: at.y });
+    tell(done.ok ? `Told: ${done.text}` : '');
+  };
+  return html`<section class="panel" aria-label="Report"><details><summary>Report an event</summary>
+    <div class="report"><${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />
+      <${Choice} name="Severity" value=${severity} options=${SEVERITIES} onInput=${setSeverity} />
+      <button type="button" class="big" disabled=${!maySteer.value || !tracks.last(me.guard)}
+        onClick=${report}>Report it where I am</button>
+      <p role="status" aria-label="Report">${told}</p></div></details></section>`;
+}
