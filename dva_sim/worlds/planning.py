@@ -114,8 +114,7 @@ class Roadmap:
         columns = np.arange(shape[1])[None, :] * block + best % block
         self._room = blocks.max(axis=2)
         self._at = grid.to_xy(rows + 0.5, columns + 0.5)
-        self._nodes = np.flatnonzero(self._room.ravel() >= clearance)
-        self._spots = self._at.reshape(-1, 2)[self._nodes]
+        self._block = block
         self._graph = self._connect()
         cos, sin = math.cos(grid.origin.heading), math.sin(grid.origin.heading)
         self._corner = np.array([grid.origin.x, grid.origin.y])
@@ -189,13 +188,26 @@ class Roadmap:
 
     def _node_at(self, point: Point) -> int | None:
         """The nearest node in sight of a point."""
-        gaps = np.hypot(*(self._spots - point).T)
-        near = np.flatnonzero(gaps <= SNAP)
+        rows, columns = self._cells_around(point)
+        spots = self._at[rows, columns].reshape(-1, 2)
+        gaps = np.hypot(*(spots - point).T)
+        free = self._room[rows, columns].ravel() >= self._clearance
+        near = np.flatnonzero(free & (gaps <= SNAP))
         for index in near[np.argsort(gaps[near], kind="stable")]:
-            x, y = self._spots[index].tolist()
-            if self.sight.between(point, (x, y)):
-                return int(self._nodes[index])
+            if self.sight.between(point, tuple(spots[index].tolist())):
+                row, column = divmod(int(index), columns.stop - columns.start)
+                return int((rows.start + row) * self._room.shape[1] + columns.start + column)
         return None
+
+    def _cells_around(self, point: Point) -> tuple[slice, slice]:
+        """Rows and columns of the planning cells whose nodes may be within `SNAP` of a point."""
+        reach = math.ceil(SNAP / (self._block * self._grid.resolution)) + 1
+        here = (at // self._block for at in self._grid.to_cell(*point))
+        first, second = (
+            slice(max(0, min(at - reach, most)), max(0, min(at + reach + 1, most)))
+            for at, most in zip(here, self._room.shape, strict=True)
+        )
+        return first, second
 
     def room_at(self, points: Floats) -> Floats:
         """Room at many points `(n, 2)` [m]."""

@@ -85,11 +85,11 @@ def test_people_are_given_more_room_than_robots() -> None:
 
 def test_who_goes_first() -> None:
     wide, narrow = corridor("robot-5"), corridor("robot-5", half=0.55)
-    assert wide.yields_to(HERE, person(5.0, 0.0))
-    assert wide.yields_to(HERE, robot(4, 5.0, 0.0))
-    assert not wide.yields_to(HERE, robot(6, 5.0, 0.0))
-    assert not wide.yields_to(HERE, robot(10, 5.0, 0.0))  # ten is more than five
-    assert narrow.yields_to(HERE, robot(4, 5.0, 0.0))
+    assert wide.yields_to(HERE, [person(5.0, 0.0)]) == [True]
+    assert wide.yields_to(HERE, [robot(4, 5.0, 0.0)]) == [True]
+    assert wide.yields_to(HERE, [robot(6, 5.0, 0.0)]) == [False]
+    assert wide.yields_to(HERE, [robot(10, 5.0, 0.0)]) == [False]  # ten is more than five
+    assert narrow.yields_to(HERE, [robot(4, 5.0, 0.0)]) == [True]
 
 
 def test_who_is_in_the_narrow_part_goes_first_whatever_its_number() -> None:
@@ -97,8 +97,8 @@ def test_who_is_in_the_narrow_part_goes_first_whatever_its_number() -> None:
         return np.where(np.abs(points[:, 0] - 5.0) < 0.5, 0.55, 2.0)
 
     outside, inside = Avoidance("robot-1", 0.30, door), Avoidance("robot-9", 0.30, door)
-    assert outside.yields_to((2.0, 0.0), robot(9, 5.0, 0.0))
-    assert not inside.yields_to((5.0, 0.0), robot(1, 2.0, 0.0))
+    assert outside.yields_to((2.0, 0.0), [robot(9, 5.0, 0.0)]) == [True]
+    assert inside.yields_to((5.0, 0.0), [robot(1, 2.0, 0.0)]) == [False]
 
 
 def test_a_refuge_is_beside_the_way_with_room_for_who_passes() -> None:

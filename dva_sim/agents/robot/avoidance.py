@@ -89,15 +89,19 @@ class Avoidance:
     radius: float
     room_at: Callable[[Floats], Floats]
 
-    def yields_to(self, here: Point, other: Nearby) -> bool:
-        """Whether the other one goes first."""
-        if other.kind == "person":
-            return True
-        room = self.room_at(np.array([here, (other.x, other.y)]))
-        mine, others = room - (self.radius, other.radius) < NARROW
-        if mine != others:
-            return bool(others)
-        return _number(other.name) < _number(self.name)
+    def yields_to(self, here: Point, others: Sequence[Nearby]) -> list[bool]:
+        """Of each, whether the other one goes first."""
+        room = self.room_at(np.array([here, *((other.x, other.y) for other in others)])).tolist()
+        is_narrow = room[0] - self.radius < NARROW
+        return [
+            other.kind == "person"
+            or (
+                _number(other.name) < _number(self.name)
+                if (space - other.radius < NARROW) == is_narrow
+                else not is_narrow
+            )
+            for other, space in zip(others, room[1:], strict=True)
+        ]
 
     def lane(
         self, route: Route, along: float, here: Point, others: Sequence[Nearby], last: float
@@ -115,13 +119,14 @@ class Avoidance:
         base = np.array([route.point_at(along + s) for s in way.tolist()])
         left = _to_the_left(base)
         offset = float((np.array(here) - base[0]) @ left[0])
+        places = self._foreseen(way, here, others)
         if last == 0.0:  # then nothing is better than the planned way
             points = base + _shifts(way, offset, _SIDES[:1], _HOLDS[:1])[..., None] * left
-            if self._are_free(points, way, here, others)[1].all():
+            if self._are_free(points, places, others)[1].all():
                 return Lane(points[0], 0.0)
         points = base + _shifts(way, offset, _SIDES, _HOLDS)[..., None] * left
         walls = self._keeps_to_walls(points, base)
-        gaps, free = self._are_free(points, way, here, others)
+        gaps, free = self._are_free(points, places, others)
         keep = _keeps(others)
         cost = np.abs(_SIDES) + TO_THE_LEFT * (_SIDES > 0.0) + CHANGE * np.abs(_SIDES - last)
         choices = np.flatnonzero((walls & free).all(axis=1))
@@ -143,26 +148,36 @@ class Avoidance:
         kept[0] = True
         return kept
 
-    def _are_free(
-        self, points: Floats, way: Floats, here: Point, others: Sequence[Nearby]
-    ) -> tuple[Floats, NDArray[np.bool_]]:
-        """Gaps to everybody, `(others, k, n)` [m], and where they suffice, `(k, n)`.
-
-        A gap that is too small already may grow.
-        """
-        gaps = np.stack([self._gaps(points, way, here, other) for other in others])
-        enough = gaps >= np.minimum(_keeps(others), gaps[..., :1] - 0.01)
-        return gaps, np.asarray(enough.all(axis=0))
-
-    def _gaps(self, points: Floats, way: Floats, here: Point, other: Nearby) -> Floats:
-        """Gap between surfaces along lanes `(k, n, 2)` [m].
+    def _foreseen(self, way: Floats, here: Point, others: Sequence[Nearby]) -> Floats:
+        """Where others will be when one has come so far on one's way: `(2, others, n)` [m].
 
         Who goes first is expected to go on as it does; who does not, to stay where it is.
         """
-        time = np.minimum(way / PACE, FORESEEN) * self.yields_to(here, other)
-        x, y = other.x + other.vx * time, other.y + other.vy * time
-        gap = np.hypot(points[..., 0] - x, points[..., 1] - y)
-        return np.asarray(gap - self.radius - other.radius)
+        x, y, vx, vy = np.array([(o.x, o.y, o.vx, o.vy) for o in others]).T[..., None]
+        first = np.array(self.yields_to(here, others))[:, None]
+        time = np.minimum(way / PACE, FORESEEN) * first
+        return np.stack([x + vx * time, y + vy * time])
+
+    def _are_free(
+        self, points: Floats, places: Floats, others: Sequence[Nearby]
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """Gaps between surfaces to everybody, `(others, k, n)` [m], and where they suffice.
+
+        A gap that is too small already may grow.
+
+        Args:
+            points: Of lanes, shape `(k, n, 2)` [m].
+            places: Where others are meanwhile; see `_foreseen`.
+            others: Who they are.
+
+        Returns:
+            The gaps, and of all lanes' points whether they are free, shape `(k, n)`.
+        """
+        x, y = places[:, :, None]
+        radii = np.array([other.radius for other in others])[:, None, None]
+        gaps = np.hypot(points[..., 0] - x, points[..., 1] - y) - self.radius - radii
+        enough = gaps >= np.minimum(_keeps(others), gaps[..., :1] - 0.01)
+        return gaps, np.asarray(enough.all(axis=0))
 
     def refuge(self, here: Point, route: Floats, others: Sequence[Nearby]) -> Point | None:
         """The nearest place beside the way where one is in nobody's way; None if there is none.

@@ -288,7 +288,7 @@ class Pilot:
         x, y = seen.here
         apart = math.dist(seen.here, (other.x, other.y))
         goes_away = (other.vx * (other.x - x) + other.vy * (other.y - y)) > 0.05 * apart
-        first = self._avoidance.yields_to(seen.here, other)
+        (first,) = self._avoidance.yields_to(seen.here, [other])
         can = self._sharpest == 0.0 and self._left_aside != other.name
         return can and first and not goes_away
 
