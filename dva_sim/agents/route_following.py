@@ -49,22 +49,30 @@ class Ahead(NamedTuple):
 
 
 class _Leg(NamedTuple):
-    """A straight piece: its beginning [m], the way to its end [m] and the square of that."""
+    """A straight piece: its beginning [m], the way to its end [m], that squared, and its length."""
 
     x: float
     y: float
     dx: float
     dy: float
     square: float
+    length: float
+
+
+def _leg(ax: float, ay: float, bx: float, by: float) -> _Leg:
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    return _Leg(ax, ay, dx, dy, square, math.sqrt(square))
 
 
 class Route:
     """A polyline to follow, and how far along it one has come.
 
-    One's place on it is the nearest one that can have been reached: not behind the piece where one
-    was, and ahead of that no farther along the route than one may have come since, and `reach`. So
-    it does not matter how finely a route is cut nor how seldom one looks, and a later part of a
-    route that folds back beside an earlier one is not taken for it.
+    One's place on it is the nearest one that can have been reached; who has not moved is where it
+    was. It is not behind the piece where one was, and ahead of that no farther along the route than
+    one may have come since, and `reach`. So it does not matter how finely a route is cut nor how
+    seldom one looks, and a later part of a route that folds back beside an earlier one is not taken
+    for it.
 
     Args:
         points: Corners, shape `(n, 2)` [m], n >= 2.
@@ -75,12 +83,10 @@ class Route:
     def __init__(self, points: NDArray[np.float64], reach: float = REACH) -> None:
         self._points = [(float(x), float(y)) for x, y in points]
         steps = np.hypot(*np.diff(points, axis=0).T)
-        self._legs = [
-            _Leg(ax, ay, bx - ax, by - ay, (bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-            for (ax, ay), (bx, by) in pairwise(self._points)
-        ]
+        self._legs = [_leg(*start, *end) for start, end in pairwise(self._points)]
         self._at: list[float] = [0.0, *np.cumsum(steps).tolist()]
         self._segment, self._along, self._seen = 0, 0.0, self._points[0]
+        self._offset: float | None = None  # of the place seen last; None: not looked for yet
         self._reach = reach
         self.points = points
 
@@ -109,20 +115,26 @@ class Route:
         distance = math.hypot(tx - x, ty - y)
         return Ahead(bearing, distance, self.length - along, offset)
 
+    def remaining(self, x: float, y: float) -> float:
+        """Way left from the place on the route where one is who is here [m], as `ahead` tells."""
+        return self.length - self._project(x, y)[0]
+
     def advance(self, x: float, y: float) -> None:
         """Keep track of how far one has come who is here [m], as `ahead` does."""
         self._project(x, y)
 
     def _project(self, x: float, y: float) -> tuple[float, float]:
         """Nearest place within reach of the last one: (way along the route, distance) [m]."""
-        at, legs, nearest, found = self._at, self._legs, math.inf, (0.0, math.inf, 0.0)
         last_x, last_y = self._seen
+        if x == last_x and y == last_y and self._offset is not None:
+            return self._along, self._offset
+        at, legs, nearest, found = self._at, self._legs, math.inf, (0.0, math.inf, 0.0)
         end = self._along + self._reach + BENT * math.hypot(x - last_x, y - last_y)
         for i in range(self._segment, len(legs)):
             begins = at[i]
             if begins > end:
                 break
-            ax, ay, dx, dy, square = legs[i]
+            ax, ay, dx, dy, square, length = legs[i]
             share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
             share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
             if at[i + 1] > end:
@@ -130,18 +142,19 @@ class Route:
             away_x, away_y = ax + share * dx - x, ay + share * dy - y
             far = away_x * away_x + away_y * away_y
             if far < nearest:
-                nearest, found = far, (begins + share * math.sqrt(square), away_x, away_y)
+                nearest, found = far, (begins + share * length, away_x, away_y)
                 self._segment = i
-        self._seen, self._along = (x, y), found[0]
-        return found[0], math.hypot(found[1], found[2])
+        self._seen, self._along, self._offset = (x, y), found[0], math.hypot(found[1], found[2])
+        return self._along, self._offset
 
     def point_at(self, along: float) -> tuple[float, float]:
         """The place a given way along the route [m]; beyond its end, the end."""
-        i = min(bisect_right(self._at, along), len(self._at) - 1) - 1
-        (ax, ay), (bx, by) = self._points[i], self._points[i + 1]
+        i = min(bisect_right(self._at, along), len(self._legs)) - 1
+        ax, ay, dx, dy, _, _ = self._legs[i]
         length = self._at[i + 1] - self._at[i]
-        share = min(max((along - self._at[i]) / length, 0.0), 1.0) if length else 1.0
-        return ax + share * (bx - ax), ay + share * (by - ay)
+        share = (along - self._at[i]) / length if length else 1.0
+        share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+        return ax + share * dx, ay + share * dy
 
 
 class View(NamedTuple):
@@ -262,4 +275,5 @@ class PurePursuit:
         return Intent(speed, self._clamp(curvature * speed))
 
     def _clamp(self, turn_rate: float) -> float:
-        return min(max(turn_rate, -self.reach.turn_rate), self.reach.turn_rate)
+        most = self.reach.turn_rate
+        return -most if turn_rate < -most else most if turn_rate > most else turn_rate

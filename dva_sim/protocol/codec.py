@@ -42,16 +42,17 @@ _NAME = "([ -%'-;=?-~]{1,64})"
 _MODE = f"({'|'.join(choices('Mode'))})"
 
 
-def _real(whole: str) -> str:
+def _real(whole: str, sign: str = "-?") -> str:
     """A number with these digits before the point, or one below 10 with an exponent."""
     small = r"[0-9](?:\.[0-9]{1,17})?e-[0-9]{2,3}"
-    return rf"(-?(?:{whole}\.[0-9]{{1,22}}|{small}))"
+    return rf"({sign}(?:{whole}\.[0-9]{{1,22}}|{small}))"
 
 
 _BELOW_100 = _real("[0-9]{1,2}")
 _LATITUDE = _real("[1-8]?[0-9]")
 _LONGITUDE = _real("(?:1[0-7]|[1-9])?[0-9]")
 _HEADING = _real("[0-9]{1,6}")
+_DURATION = _real("[0-9]{1,6}", sign="")
 
 _HEADER = (
     f"<DestinationID>{_DEVICE_ID}</DestinationID><MessageID>{_POSITIVE}</MessageID>"
@@ -70,6 +71,11 @@ _STATUS = (
     f"<RobotStatus><Mode>{_MODE}</Mode>{_POSITION}<Heading>{_HEADING}</Heading>"
     f"<Speed>{_BELOW_100}</Speed><TurnRate>{_BELOW_100}</TurnRate><Tick>{_TICK}</Tick>"
     "</RobotStatus>"
+)
+_HOLDER = (
+    f"<RobotHolder>(?:<HolderID>{_DEVICE_ID}</HolderID>)?"
+    f"(?:<DeviceLabel>{_NAME}</DeviceLabel>)?<HeldFor>{_DURATION}</HeldFor>"
+    f"(?:<Code>{_CODE}</Code>)?</RobotHolder>"
 )
 _REPLY = f"<reply><Answers>{_NATURAL}</Answers><Code>{_CODE}</Code><Text>{_TEXT}</Text></reply>"
 
@@ -100,6 +106,16 @@ def _status(groups: _Groups) -> m.RobotStatus | None:
     )
 
 
+def _holder(groups: _Groups) -> m.RobotHolder:
+    holder, label, held_for, code = groups
+    return m.RobotHolder(
+        holder.decode() if holder else None,
+        label.decode() if label else None,
+        float(held_for),
+        int(code) if code else None,
+    )
+
+
 def _person(groups: _Groups) -> m.PersonStatus:
     activity, latitude, longitude = groups
     return m.PersonStatus(activity.decode(), m.Position(float(latitude), float(longitude)))
@@ -126,6 +142,7 @@ _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] 
     b"</Timestamp></HBMsg></msg>"[-_LAST:]: (_whole(_HEARTBEAT), lambda groups: m.Heartbeat()),
     b"</TeleOp></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_SET_TELEOP)), _set_teleop),
     b"</RobotStatus></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_STATUS)), _status),
+    b"</RobotHolder></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_HOLDER)), _holder),
     b"</PersonStatus></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_PERSON)), _person),
     b"</reply></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_REPLY)), _reply),
 }

@@ -72,6 +72,14 @@ def test_smoke_takes_contrast_by_its_optical_depth() -> None:
     assert seen.contrast == pytest.approx(math.exp(-2.0))
 
 
+def test_where_no_smoke_is_in_sight_none_is_looked_at() -> None:
+    def smoke(a: tuple[float, float], b: tuple[float, float]) -> float:
+        raise AssertionError
+
+    view = FieldOfView(1.2, 6.0, lambda a, b: True, smoke, hazy=lambda: False)
+    assert view.visibility(1.0, 2.0, 0.7) == CLEAR
+
+
 @pytest.mark.parametrize(("extinction", "far"), [(0.0, CLEAR), (0.5, 6.0), (3.0, 1.0)])
 def test_visibility_is_3_over_the_extinction(extinction: float, far: float) -> None:
     view = FieldOfView(1.2, 6.0, lambda a, b: True, lambda a, b: extinction * math.dist(a, b))

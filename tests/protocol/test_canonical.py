@@ -25,11 +25,23 @@ KNOWN = [
     message(m.Heartbeat(), session=None),
     message(STATUS),
     message(m.PersonStatus("walking", m.Position(38.66, -9.2))),
+    message(m.RobotHolder(TABLET, "tablet", 12.5, m.STALE)),
+    message(m.RobotHolder(None, None, 0.0)),
 ]
 SEEDS = [encode(one) for one in KNOWN]
 SAMPLES = sorted((Path(__file__).parents[2] / "protocol" / "samples" / "valid").glob("*.xml"))
 known_bodies = st.one_of(
-    *(BODIES[kind] for kind in (m.SetTeleOp, m.Heartbeat, m.RobotStatus, m.PersonStatus, m.Reply))
+    *(
+        BODIES[kind]
+        for kind in (
+            m.SetTeleOp,
+            m.Heartbeat,
+            m.RobotStatus,
+            m.RobotHolder,
+            m.PersonStatus,
+            m.Reply,
+        )
+    )
 )
 
 
@@ -63,6 +75,7 @@ def test_the_messages_of_a_drive_are_read_without_the_parser(sent):
         m.Message(ROBOT, MAX_UINT32, TABLET, "23:59:59.123456789", 1, m.Reply(MAX_UINT32, 999, "")),
         message(m.Reply(0, m.BAD_MESSAGE, "~ \"'!" * 42)),
         message(m.RobotStatus("Idle", m.Position(89.9, -179.9), -999999.9, 0.0, 0.0, 0)),
+        message(m.RobotHolder(None, "n" * 64, 999_999.9, 999)),
     ],
 )
 def test_what_a_drive_can_say_at_its_bounds_is_read_without_the_parser(sent):
@@ -110,13 +123,16 @@ def test_every_flipped_bit_is_read_the_same_or_left_to_the_parser(data):
             agrees(bytes(damaged))
 
 
-@pytest.mark.parametrize("element", ["Speed", "TurnRate", "Latitude", "Longitude", "Heading"])
+@pytest.mark.parametrize(
+    "element", ["Speed", "TurnRate", "Latitude", "Longitude", "Heading", "HeldFor"]
+)
 @given(value=st.floats(allow_nan=False, allow_infinity=False) | st.decimals(-2000, 2000, places=15))
 @search()
 def test_any_number_is_read_the_same_or_left_to_the_parser(element, value):
     text = repr(value) if isinstance(value, float) else f"{value:f}"
     pattern = f"(<{element}>)[^<]*".encode()
-    agrees(re.sub(pattern, rb"\g<1>" + text.encode(), SEEDS[4]))
+    data = SEEDS[6] if element == "HeldFor" else SEEDS[4]
+    agrees(re.sub(pattern, rb"\g<1>" + text.encode(), data))
 
 
 @pytest.mark.parametrize("data", SEEDS, ids=map(name, KNOWN))

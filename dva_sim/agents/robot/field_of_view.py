@@ -41,12 +41,14 @@ class FieldOfView:
         range: How far a hazard can be recognised [m].
         line_of_sight: Whether no wall stands between two places.
         smoke: Optical depth of the smoke between two places now.
+        hazy: Whether smoke is in anybody's sight now: if not, `smoke` is zero everywhere.
     """
 
     angle: float
     range: float
     line_of_sight: Callable[[Point, Point], bool]
     smoke: Callable[[Point, Point], float] = no_smoke
+    hazy: Callable[[], bool] = lambda: True
 
     def look(
         self, x: float, y: float, heading: float, hazards: Iterable[HazardSpot]
@@ -77,6 +79,8 @@ class FieldOfView:
         By the thicker of the smoke just before the camera and that along its axis: clean air
         beyond a wall lets nobody see through the smoke before it.
         """
+        if not self.hazy():
+            return CLEAR
         ahead = math.cos(heading), math.sin(heading)
         thickest = max(
             self.smoke((x, y), (x + far * ahead[0], y + far * ahead[1])) / far

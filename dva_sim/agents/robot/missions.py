@@ -181,7 +181,7 @@ class Pilot:
         route = self._route or self._plan(seen)
         if route is None:
             return self._end("failed", "no way")
-        left = route.ahead(seen.view.x, seen.view.y, seen.view.heading, 0.5).remaining
+        left = route.remaining(seen.view.x, seen.view.y)
         if left < NEAR:
             return self._arrive()
         if self._gets_nowhere(seen, left):

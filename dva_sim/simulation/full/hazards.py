@@ -184,6 +184,10 @@ class RunHazards:
         """How much of the light between two places [m] is lost now: an optical depth."""
         return self.surroundings.optical_depth(a, b, self.stage.clock.now)
 
+    def is_hazy(self) -> bool:
+        """Whether smoke is in anybody's sight now."""
+        return self.surroundings.is_hazy(self.stage.clock.now)
+
     def _going_on(self, now: float) -> list[RunHazard]:
         """What has begun, is real, and was not dealt with yet."""
         return [

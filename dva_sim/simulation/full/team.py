@@ -115,7 +115,13 @@ class TeamBuilder:
             service=service_times(processing, stage.streams.fresh(f"{body.name}/processing")),
             frame_rate=camera.rate_hz,
             frame_bytes=camera.frame_bytes,
-            view=FieldOfView(angle, camera.range_m, stage.planner.line_of_sight, hazards.smoke),
+            view=FieldOfView(
+                angle,
+                camera.range_m,
+                stage.planner.line_of_sight,
+                smoke=hazards.smoke,
+                hazy=hazards.is_hazy,
+            ),
             hazards=hazards.spots,
             sensors=make_ports(
                 configs, sources, lambda what: stage.streams.fresh(f"{body.name}/sensor/{what}")

@@ -73,6 +73,10 @@ class Surroundings:
                 here = together(here, field.at(x, y, time))
         return here
 
+    def is_hazy(self, time: float) -> bool:
+        """Whether smoke is at eye height anywhere at `time` [s]: quick, as cameras ask often."""
+        return any(field.is_hazy(time) for field in self._fields)
+
     def optical_depth(self, a: Point, b: Point, time: float) -> float:
         """Extinction by smoke along the straight line between two places, at eye height."""
         hazy = [field for field in self._fields if field.is_hazy(time)]

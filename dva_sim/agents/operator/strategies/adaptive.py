@@ -62,7 +62,7 @@ class Adaptive(Strategy):
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
         seen, person = view.seen, self.person
-        left = route.ahead(seen.x, seen.y, seen.heading, 0.0).remaining - stop_before
+        left = route.remaining(seen.x, seen.y) - stop_before
         delay = max(view.delay, SHORTEST)
         pace = min(self._most, person.caution * FARTHEST_LOOK / delay)
         turn = 1.0 / gain_at(person.crossover, person.margin, delay)
@@ -88,7 +88,7 @@ class Adaptive(Strategy):
     def follow(self, view: PathView) -> Velocity:
         """See `Strategy`."""
         seen, person = view.seen, self.person
-        left = view.path.ahead(seen.x, seen.y, 0.0, 0.0).remaining
+        left = view.path.remaining(seen.x, seen.y)
         pace = fastest(seen.tolerance, view.delay, person, self._most)
         count = max(left / self._moves.trusted_in(seen.tolerance), 1.0)
         self._choose(view.now, left / pace, self._waiting(left, count, view.delay))

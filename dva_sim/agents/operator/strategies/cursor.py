@@ -80,7 +80,7 @@ def through(path: Route, seen: Sighting, delay: float, person: Person, most: flo
     """
     delay, gain = max(delay, SHORTEST), gain_at(person.pointing, person.margin, delay)
     speed = fastest(seen.tolerance, delay, person, most)
-    left = path.ahead(seen.x, seen.y, 0.0, 0.0).remaining
+    left = path.remaining(seen.x, seen.y)
     along = path.length - left
     bend, room = _bend(path, along, speed * delay + seen.tolerance), seen.tolerance * person.caution
     if 0.5 * bend * (speed * delay) ** 2 > room:

@@ -154,7 +154,7 @@ class MoveAndWait(Strategy):
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
         seen = view.seen
-        left = route.ahead(seen.x, seen.y, seen.heading, 0.0).remaining  # kept track of in moves
+        left = route.remaining(seen.x, seen.y)  # kept track of in moves
         wanted = self.moves.next(view.now, view.delay, self._pace(seen.speed, seen.turn_rate))
         if wanted is None:
             parts = self._way(route, seen, left, stop_before)
@@ -178,7 +178,7 @@ class MoveAndWait(Strategy):
     def follow(self, view: PathView) -> Velocity:
         """See `Strategy`."""
         seen, path = view.seen, view.path
-        left = path.ahead(seen.x, seen.y, 0.0, 0.0).remaining
+        left = path.remaining(seen.x, seen.y)
         wanted = self.moves.next(view.now, view.delay, self._flow(seen.vx, seen.vy))
         if wanted is not None:
             return wanted
