@@ -91,8 +91,8 @@ def write_site(folder: Path, places: int) -> Path:
 
 def a_run(kind: str, size: int, folder: Path) -> Costs:
     """A run with so many robots on patrol, guards or bystanders."""
-    from dva_sim.simulation.models import model_for, model_of
     from dva_sim.kernel.yaml_files import load_yaml
+    from dva_sim.simulation.models import model_for, model_of
 
     costs = Costs()
     counts = {"robots": 0, "guards": 0 if kind == "robots" else 1, "bystanders": 0} | {kind: size}
