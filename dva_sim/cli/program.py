@@ -175,6 +175,7 @@ _PANELS: dict[str, tuple[Callable[..., None], ...]] = {
         files.list_,
         files.plugins,
         files.check,
+        files.phone_log,
         files.schema,
         files.validate,
     ),
@@ -215,7 +216,7 @@ def _assembled() -> typer.Typer:
     program.callback()(_program)
     for panel, commands in _PANELS.items():
         for command in commands:
-            name = command.__name__.rstrip("_")
+            name = command.__name__.rstrip("_").replace("_", "-")
             program.command(
                 name, cls=CommandWithExamples, rich_help_panel=panel, context_settings=HELP
             )(command)
