@@ -58,7 +58,7 @@ class Page:
         self.wanted, self._count = None, 0
         self.world.clock.every(0.03, self._want)
 
-    def do(self, what, within=30.0, client=None, **about):
+    def do(self, what, /, within=30.0, client=None, **about):
         """An action, and its answer once it comes."""
         self._count += 1
         number = f"action {self._count}"

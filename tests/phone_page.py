@@ -100,7 +100,7 @@ class PhonePage(Page):
         """Calibrate."""
         return self.ask("phone_calibrate", client=client, **CALIBRATION | other)
 
-    def ask(self, what, client=None, **about):
+    def ask(self, what, /, client=None, **about):
         """An action, and its whole answer."""
         self.do(what, within=60.0, client=client, **about)
         return self.told("done")[-1]

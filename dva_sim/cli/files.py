@@ -1,4 +1,4 @@
-"""The commands about names and files: list, check, schema, and validate for the program itself."""
+"""The commands about names and files, and validate for the program itself."""
 
 from __future__ import annotations
 
@@ -100,6 +100,39 @@ def check(
     from dva_sim.cli import checks  # late: start-up
 
     raise typer.Exit(checks.check(files, set_ or []))
+
+
+def phone_log(
+    file: Annotated[Path, Argument(metavar="FILE", help="Of a phone's motion.")],
+    commands: Annotated[
+        bool, Option("--commands", help="Print the commands that its app made of it.")
+    ] = False,
+    rate: Annotated[
+        float, Option("--rate", metavar="HZ", min=0.1, max=100.0, help="Of these commands.")
+    ] = 10.0,
+    part: Annotated[
+        Path | None,
+        Option("--part", metavar="OUT", help="Write an accelerometer part that measures so."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Say how even and how noisy a phone's samples are, or replay them.
+
+    Files of motion are written by a console that keeps them, of phones whose person agrees.
+
+    Examples:
+        dva-sim phone-log motion-1.csv  # rate, jitter, gaps, noise at rest
+        dva-sim phone-log motion-1.csv --commands  # what the app made of it
+        dva-sim phone-log motion-1.csv --part mine.yaml  # for phone.accelerometer
+    """
+    from dva_sim.cli import phone_log  # late: start-up
+
+    if part is not None:
+        phone_log.write_part(file, part)
+    elif commands:
+        phone_log.tell_commands(file, rate)
+    else:
+        phone_log.tell(file, as_json)
 
 
 def schema(

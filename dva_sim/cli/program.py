@@ -76,7 +76,7 @@ class SiteGroup(PanelGroup):
 
 
 def _named(*commands: Callable[..., None]) -> dict[str, Command]:
-    return {command.__name__.rstrip("_"): command for command in commands}
+    return {command.__name__.rstrip("_").replace("_", "-"): command for command in commands}
 
 
 class DvaSimProgram(PanelGroup):
@@ -87,7 +87,8 @@ class DvaSimProgram(PanelGroup):
         "Results": _named(results.report, results.show, results.export, results.compare),
         "Single runs": _named(runs.episode, runs.replay, runs.live, runs.console, runs.keys),
         "Names, files and evidence": {
-            **_named(files.list_, files.plugins, files.check, files.schema, files.validate),
+            **_named(files.list_, files.plugins, files.check, files.phone_log),
+            **_named(files.schema, files.validate),
             "site": typer_of(SiteGroup, help="Draw a site, or write it as files to edit."),
         },
     }

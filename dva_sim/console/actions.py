@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
@@ -54,6 +55,7 @@ class Actions:
             "decline": self._decline,
             "tour": self._tour,
             **self._phones.doers,
+            **GuardActions(world).doers,
         }
 
     def take(self, line: Line) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from dva_sim.agents.people.bystander import SAFE
+from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.stands import why_stands
@@ -67,7 +68,8 @@ class Feed:
             device = getattr(who, "device", None)
             kind = "bystander" if device is None else "guard"
             id_tag = name if device is None else device.id_tag
-            self._number(id_tag, name, kind, radius_m=who.walking.body.radius)
+            played = {"person": True} if isinstance(who, PersonGuard) else {}
+            self._number(id_tag, name, kind, radius_m=who.walking.body.radius, **played)
 
     def _number(self, id_tag: str, label: str, kind: str, **more: Any) -> None:
         number = len(self.things)

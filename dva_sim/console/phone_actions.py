@@ -88,6 +88,7 @@ class PhoneActions:
         phone = self._phones.by_client.pop(client, None)
         if phone is not None:
             self._retire(client, phone)
+            phone.keep(None)
             self._world.free_seat(client)
 
     # --- who it is -------------------------------------------------------------------------
@@ -200,9 +201,11 @@ class PhoneActions:
 
     def _calibrate(self, client: str, line: Line, said: Said) -> None:
         phone = self._phone(client)
-        phone.calibrate(settings_of(line))
+        settings = settings_of(line)
+        kept = self._phones.keep_motion(phone, settings.keep)
+        phone.calibrate(settings)
         later = " from the next drive on" if phone.driven is not None else ""
-        said(True, f"calibrated{later}")
+        said(True, f"calibrated{later}{kept}")
 
 
 NO_ANSWER = "the DVA does not answer"

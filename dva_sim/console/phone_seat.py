@@ -19,6 +19,7 @@ from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.device_axes import to_tilt_axes
 from dva_sim.console.phone_input import PhoneSettings, Samples
 from dva_sim.network.realtime import PacedClock
+from dva_sim.recordings.motion import MotionApp, MotionSample, MotionWriter
 
 Line = dict[str, Any]
 USUAL_HZ = 60.0  # of a phone's browser, until its own rate is known
@@ -45,7 +46,7 @@ class PhoneSeat:
         tilt: Makes commands: those of the drive that goes on, or else what its screen shows.
         samples: How many have come.
         lost: How many have not, by their numbers.
-        kept: Told of each message's samples, if the person agreed that they are written down.
+        motion: Where its motion is written down, if its person agrees.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class PhoneSeat:
         self.settings, self.orientation = PhoneSettings(), 0
         self._profile = profile(self.settings)
         self.samples = self.lost = 0
-        self.kept: Callable[[Samples], object] = lambda _: None
+        self.motion: MotionWriter | None = None
         self._times = PhoneClock()
         self._told: deque[float] = deque(maxlen=RATED_BY)
         self._next, self._at, self._came = 0, 0.0, -math.inf
@@ -99,7 +100,20 @@ class PhoneSeat:
         period = 1.0 / (self.rate_hz or USUAL_HZ)
         self.tilt = TiltSources(self._profile, reference, period, self._given_hz)
         self.tilt.pick_up(self._clock.now)
+        self._note_app(period)
         return self.tilt
+
+    def keep(self, motion: MotionWriter | None) -> None:
+        """Write its motion down from the next calibration on, or no longer."""
+        if self.motion is not None:
+            self.motion.close()
+        self.motion = motion
+
+    def _note_app(self, period: float) -> None:
+        if self.motion is not None:
+            now, settings = self._clock.now, self.settings
+            app = MotionApp(now, period, settings.reference, settings.ios, self._profile)
+            self.motion.app(app)
 
     def turn(self, orientation: int) -> None:
         """Its screen is turned."""
@@ -123,11 +137,9 @@ class PhoneSeat:
         if not fresh:
             return False
         told = [at for at, _ in fresh]
-        for at, (_, xyz) in zip(self._times.times_of(told, came), fresh, strict=True):
-            # What was so long ago in real time was as long ago here, times the pace.
-            self._at = max(self._at, self._clock.now - (came - at) * self._clock.factor)
-            self._newest = to_tilt_axes(xyz, self.orientation, self.settings.ios)
-            self.tilt.sample(self._at, self._newest)
+        times = self._times.times_of(told, came)
+        for by_phone, taken, (_, xyz) in zip(told, times, fresh, strict=True):
+            self._take_one(by_phone, came - taken, xyz)
         self._told.extend(told)
         self._came = came
         driven = self.driven
@@ -135,8 +147,16 @@ class PhoneSeat:
             driven.tilted(said.first + len(said.at) - 1, self._at)
         elif driven is None:
             self.tilt.look(self._clock.now)  # the screen shows what would be sent
-        self.kept(said)
         return True
+
+    def _take_one(self, told: float, age: float, xyz: Triple) -> None:
+        """A sample of such an age in real time [s]: as old here, times the pace."""
+        now = self._clock.now
+        self._at = max(self._at, now - age * self._clock.factor)
+        self._newest = to_tilt_axes(xyz, self.orientation, self.settings.ios)
+        self.tilt.sample(self._at, self._newest)
+        if self.motion is not None:
+            self.motion.sample(MotionSample(told, now, self._at, xyz, self.orientation))
 
     def _is_old(self, told: float) -> bool:
         return self._times.is_old(told)

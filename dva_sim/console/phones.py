@@ -7,6 +7,8 @@ Numbers, and with them ids, are given out again only when the DVA has forgotten 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
+from pathlib import Path
 from typing import Any, Final
 
 from dva_sim.agents.device import AgentDevice
@@ -16,7 +18,9 @@ from dva_sim.agents.tilt import PhoneProfile, known_filters, known_mappings
 from dva_sim.console.phone_input import DELAYS, PIPELINES, STEPS, PhoneSettings
 from dva_sim.console.phone_seat import PhoneSeat
 from dva_sim.core.registry import FORGET_AFTER, OPERATOR, REMOTE, ROBOT
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
+from dva_sim.recordings.motion import MotionWriter
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of
 from dva_sim.simulation.scenario import PhoneConfig, phone_profile
@@ -42,11 +46,13 @@ class Phones:
 
     Attributes:
         by_client: The phones by their pages.
+        motion_folder: Where the motion of those is kept whose person agrees; None: nowhere.
     """
 
     def __init__(self, run: Run, clock: PacedClock, console: Callable[[], Console]) -> None:
         self._run, self._clock, self._console = run, clock, console
         self.by_client: dict[str, PhoneSeat] = {}
+        self.motion_folder: Path | None = None
         self._used: set[int] = set()
 
     @property
@@ -88,6 +94,30 @@ class Phones:
             "max_delay_s": default.max_delay_s,
             "limits": {"step_mps2": list(STEPS), "max_delay_s": list(DELAYS)},
         }
+
+    def keep_motion(self, seat: PhoneSeat, agreed: bool) -> str:
+        """Begin or end to write a phone's motion down; what there is to say of it.
+
+        Raises:
+            ConfigError: the file cannot be written.
+        """
+        if not agreed or self.motion_folder is None:
+            seat.keep(None)
+            return "; this console keeps no motion" if agreed else ""
+        if seat.motion is not None:
+            return f"; its motion is kept in {seat.motion.name}"
+        names = (self.motion_folder / f"motion-{n}.csv" for n in count(1))
+        try:
+            seat.keep(MotionWriter(next(name for name in names if not name.exists())))
+        except OSError as error:
+            problem = f"its motion cannot be kept: {error.strerror}"
+            raise ConfigError(problem, self.motion_folder) from None
+        return f"; its motion is kept in {seat.motion.name}" if seat.motion is not None else ""
+
+    def close(self) -> None:
+        """The run is over: files of motion are complete."""
+        for seat in self.by_client.values():
+            seat.keep(None)
 
     # --- devices -----------------------------------------------------------------------------
 

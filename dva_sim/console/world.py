@@ -20,6 +20,7 @@ from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
 from dva_sim.console.phones import FIRST_SEAT, Phones
+from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.scene import scene_of
@@ -101,7 +102,8 @@ class ConsoleWorld:
         self._persons: dict[int, PersonAgent] = {}
         self.phones = Phones(self.run, self.clock, lambda: self._console)
         self.client_of: dict[int, str] = {}
-        self.person(0)
+        for number in range(max(PEOPLE, len(self.run.persons))):
+            self.person(number)
         self.feed.add(DVA, "dva", "dva")
         if self.sockets is not None:
             self.sockets.join("console", SCREEN)
@@ -111,6 +113,7 @@ class ConsoleWorld:
         self.seat_lines = SeatLines(
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
+        self.guards = PlayedGuards(self.run, self.feed)
         self.recorder.on_applied = self.seat_lines.applied
         self.hazards = HazardFeed(self.run)
         self._newest: dict[str, Any] = {}
@@ -243,7 +246,7 @@ class ConsoleWorld:
         self._tell_seats()
 
     def _tell_seats(self) -> None:
-        for client, line in self.seat_lines.lines():
+        for client, line in (*self.seat_lines.lines(), *self.guards.lines()):
             self._tell_new(line, but="t", key=client)
 
     def _tell_new(self, line: Line, but: str, key: str = "") -> None:

@@ -157,6 +157,22 @@ class World(Ticks):
         self.people.append(person)
         return person
 
+    def put(self, person: PersonBody, x: float, y: float) -> None:
+        """Let a person stand somewhere else at once [m].
+
+        Raises:
+            ConfigError: a wall, a robot or another person is in the way.
+        """
+        shape = person.shape
+        shape.filter = pymunk.ShapeFilter(categories=0)  # nobody is in one's own way
+        try:
+            self._check_place("person", person.name, Pose(x, y, 0.0), person.radius)
+        finally:
+            shape.filter = pymunk.ShapeFilter(categories=_MOVING)
+        person.body.position, person.body.velocity = (x, y), (0.0, 0.0)
+        self.space.reindex_shapes_for_body(person.body)
+        self.wake(person)
+
     def remove(self, person: PersonBody) -> None:
         """Take somebody away who has left the site; where it was last, it still says."""
         self.people.remove(person)

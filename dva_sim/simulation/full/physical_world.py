@@ -10,6 +10,7 @@ from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import Truth
 from dva_sim.agents.people.bystander import SAFE, BystanderAgent
 from dva_sim.agents.people.guard import GuardAgent
+from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.protocol import messages as m
@@ -47,7 +48,7 @@ class Field(RunHazards):
         super().__init__(stage)
         self.world = World(stage.site, PHYSICS_TICK)
         self.robots: dict[str, RobotAgent] = {}
-        self.guards: list[GuardAgent] = []
+        self.guards: list[GuardAgent | PersonGuard] = []
         self.bystanders: list[BystanderAgent] = []
         self._others = 0
 
@@ -60,7 +61,7 @@ class Field(RunHazards):
         self.guards += [team.add_guard(n + 1) for n in range(scenario.guard.count)]
         self.bystanders += [team.add_bystander(n + 1) for n in range(scenario.bystander.count)]
 
-    def people(self) -> Iterator[tuple[str, GuardAgent | BystanderAgent]]:
+    def people(self) -> Iterator[tuple[str, GuardAgent | PersonGuard | BystanderAgent]]:
         """Who is on foot, by name."""
         for guard in self.guards:
             yield guard.device.label, guard

@@ -101,7 +101,7 @@ class Recording(Playback):
         people: What became of the people on foot.
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
             `datagram`.
-        seats: Places of operators that people took.
+        persons: Numbers of the operators whose places people took.
     """
 
     events: list[Event]
@@ -109,7 +109,7 @@ class Recording(Playback):
     links: dict[str, tuple[Link, Link]]
     people: list[PersonLog] = field(default_factory=list)
     depth: str = "message"
-    seats: int = 0
+    persons: tuple[int, ...] = ()
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""

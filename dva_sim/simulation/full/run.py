@@ -109,7 +109,7 @@ class Watched:
         clock: Its time.
         recorder: Told what happens.
         cameras: Where the robots' pictures are.
-        seats: So many operators are people, the last ones.
+        seats: So many operators are people, the last ones, if the scenario names none.
         keeps: Whether all that happens is kept to be measured; without, a run may last for ever.
         real: What carries the messages; None: the network that the scenario models.
     """
@@ -130,6 +130,9 @@ class Run:
         seed: Decides all luck but the persons'.
         keep_traffic: Keep messages and the operators' views, for pictures.
         watched: What people give a run who watch it, and take part.
+
+    Attributes:
+        persons: Numbers of the operators who are people.
     """
 
     def __init__(
@@ -152,10 +155,12 @@ class Run:
         self.dva = add_dva(self.stage, keep_events=watched.keeps)
         self.field = Field(self.stage)
         self.field.populate()
-        self._seats = watched.seats
-        simulated = scenario.operator.count - watched.seats
-        for number in range(1, max(0, simulated) + 1):
-            add_operator(self.stage, number, self.field.truth)
+        count = scenario.operator.count
+        last = range(max(0, count - watched.seats) + 1, count + 1)
+        self.persons = scenario.operator.persons or tuple(last)
+        for number in range(1, count + 1):
+            if number not in self.persons:
+                add_operator(self.stage, number, self.field.truth)
         self.field.schedule_incidents()
         self.audit = SafetyAudit(
             self.recorder,
@@ -227,7 +232,7 @@ class Run:
             links=self.links,
             people=self._people(),
             depth=self._connector.deepest,
-            seats=self._seats,
+            persons=self.persons,
         )
 
     def _people(self) -> list[PersonLog]:

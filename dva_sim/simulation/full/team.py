@@ -11,10 +11,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.people.bystander import BystanderAgent, draw_places
 from dva_sim.agents.people.evacuation import AirAt, clean_air, refuges_of
 from dva_sim.agents.people.guard import GuardAgent
 from dva_sim.agents.people.pedestrian_avoidance import RADIUS
+from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.people.profiles import Occupant, Walker
 from dva_sim.agents.people.walking import Walking
 from dva_sim.agents.robot.battery import Battery
@@ -155,7 +157,7 @@ class TeamBuilder:
                     f"is held back, as its drive fails: {robot.body.motors.first_failure}", "mode"
                 )
 
-    def add_guard(self, number: int) -> GuardAgent:
+    def add_guard(self, number: int) -> GuardAgent | PersonGuard:
         """The `number`-th guard, at its post; it registers and is on duty.
 
         Raises:
@@ -166,16 +168,33 @@ class TeamBuilder:
         device = stage.device("guard", number)
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
         body = self._world.add_person(device.label, post, radius=RADIUS)
+        legs = self._legs(body, walker.speed)
+        if number in stage.scenario.guard.persons:
+            return self._played(device, walker, legs)
         guard = GuardAgent(
             device,
             walker,
             stage.planner,
-            self._legs(body, walker.speed),
+            legs,
             is_there=hazards.is_there,
             contain=hazards.contain,
             air=self._air,
             refuges=self._refuges,
             smoke=hazards.smoke,
+        )
+        device.register(guard.start)
+        return guard
+
+    def _played(self, device: AgentDevice, walker: Walker, legs: Walking) -> PersonGuard:
+        """A guard whom a person plays; nobody does as yet."""
+        guard = PersonGuard(
+            device,
+            walker,
+            self._stage.planner,
+            legs,
+            put=lambda x, y: self._world.put(legs.body, x, y),
+            contain=self._hazards.contain,
+            air=self._air,
         )
         device.register(guard.start)
         return guard

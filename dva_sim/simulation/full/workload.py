@@ -287,8 +287,8 @@ def judgement(recording: Recording, log: DriveLog) -> str:
 # --- rows --------------------------------------------------------------------------------------
 def operator_rows(recording: Recording) -> list[Row]:
     """One row per operator, simulated or a person who has driven."""
-    simulated = max(0, recording.scenario.operator.count - recording.seats)
-    ids = [id_of("operator", n) for n in range(1, simulated + 1)]
+    numbers = range(1, recording.scenario.operator.count + 1)
+    ids = [id_of("operator", n) for n in numbers if n not in recording.persons]
     ids += sorted({log.operator for log in recording.recorder.drives}.difference(ids))
     return [operator_row(recording, id_tag) for id_tag in ids]
 

@@ -84,10 +84,33 @@ class RobotConfig(Config):
         return self
 
 
+Kind = Literal["simulated", "person"]
+Kinds = Kind | dict[Annotated[int, Field(ge=1)], Kind]
+"""Of all, or of some by their numbers from 1; who is not named is simulated."""
+
+
+def persons_of(kinds: Kinds, count: int) -> tuple[int, ...]:
+    """The numbers of those who are persons."""
+    if isinstance(kinds, str):
+        return tuple(range(1, count + 1)) if kinds == "person" else ()
+    return tuple(sorted(number for number, kind in kinds.items() if kind == "person"))
+
+
+def check_kinds(kinds: Kinds, count: int, what: str) -> None:
+    """Refuse numbers of those who are not there.
+
+    Raises:
+        ValueError: there are some.
+    """
+    if not isinstance(kinds, str) and max(kinds, default=0) > count:
+        raise ValueError(f"{what}.kind names {what} {max(kinds)}, {what}.count is {count}")
+
+
 class GuardConfig(Config):
     """The guards: how many, and from which profile they are drawn.
 
     Attributes:
+        kind: Who plays them: `simulated`, `person`, or some by number, as in `{2: person}`.
         mobilisation_s: Median from the order to the first step; left out: as the profile says.
         way_m: They wait at places from which the way to the first event is so long, rather than
             at the site's posts.
@@ -99,6 +122,17 @@ class GuardConfig(Config):
         Positive | None, Key("time until the guard sets out", stated=False)
     ] = None
     way_m: Annotated[Positive | None, Key("way of the guard", stated=False)] = None
+    kind: Annotated[Kinds, Key("who plays the guards", stated=False)] = "simulated"
+
+    @model_validator(mode="after")
+    def _persons_are_there(self) -> GuardConfig:
+        check_kinds(self.kind, self.count, "guard")
+        return self
+
+    @property
+    def persons(self) -> tuple[int, ...]:
+        """The numbers of the guards whom people play."""
+        return persons_of(self.kind, self.count)
 
 
 class BystanderConfig(Config):
@@ -144,6 +178,8 @@ class OperatorConfig(Config):
         person: Index of the first operator's person in the population; the next operator
             is the next person.
         population_seed: Draws the population; a study gives its own seed.
+        kind: Who they are: `simulated`, `person`, or some by number, as in `{2: person}`; people
+            take part at a console, and nowhere else.
     """
 
     strategy: Annotated[str, Key("operator strategy")] = "adaptive"
@@ -158,6 +194,17 @@ class OperatorConfig(Config):
     population: str = "operators"
     person: Annotated[int, Field(ge=0)] = 0
     population_seed: Annotated[int, Field(ge=0)] = 1
+    kind: Annotated[Kinds, Key("who the operators are", stated=False)] = "simulated"
+
+    @model_validator(mode="after")
+    def _persons_are_there(self) -> OperatorConfig:
+        check_kinds(self.kind, self.count, "operator")
+        return self
+
+    @property
+    def persons(self) -> tuple[int, ...]:
+        """The numbers of the operators who are people."""
+        return persons_of(self.kind, self.count)
 
 
 class CommandConfig(Config):

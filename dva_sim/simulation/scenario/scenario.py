@@ -43,6 +43,8 @@ NEWER = (
     ("pattern_options",),
     ("dispatch", "depart_within_s", "still_within_s"),
     ("command", "heeds"),
+    ("guard", "kind"),
+    ("operator", "kind"),
     ("disturbance",),
     ("dva",),
 )

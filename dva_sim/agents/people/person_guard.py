@@ -1,0 +1,276 @@
+"""A person as a guard: a device like any other guard's, whose decisions are somebody's own.
+
+It takes the DVA's orders by the protocol of all guards, and says what the person says. Its body
+stands where the person says it is. Where nobody sits, an order is declined after a while.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from dva_sim.agents.device import LONGEST_BID, STATUS, AgentDevice, do_nothing
+from dva_sim.agents.people.evacuation import AirAt, Exposure, OnFoot, clean_air
+from dva_sim.agents.people.guard import (
+    CONFIRMED,
+    CONTAINED,
+    FIRST_STATUS,
+    HERE,
+    KEEPS_OFF,
+    REFUTED,
+    STATUS_PERIOD,
+    Point,
+)
+from dva_sim.agents.people.guard_protocol import Errand, GuardProtocol
+from dva_sim.agents.people.profiles import Walker
+from dva_sim.agents.people.walking import Walking
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.planning import Planner
+
+DECLINED_AFTER: Final = 30.0  # an order to a guard whom nobody plays [s]
+SET_OUT: Final = 2.0  # who is so far from where the order came has departed [m]
+FINDINGS: Final = (CONFIRMED, REFUTED, CONTAINED)
+SAYINGS: Final = ("departed", "arrived", *FINDINGS, "help")
+SEVERITIES: Final = {"low": 0.15, "medium": 0.4, "high": 0.6, "critical": 0.9}
+"""What a report's word stands for, as a share; assumed."""
+KINDS: Final = ("fire", "gas_leak", "flood")
+
+Said = Callable[[bool, str], object]
+
+
+class PersonGuard(OnFoot):
+    """A guard whom a person plays, or nobody.
+
+    Args:
+        device: Identity and ways to talk.
+        walker: At what pace the DVA may expect it.
+        planner: Of the site's ways.
+        walking: Its body; where it stands first is its post.
+        put: Puts that body somewhere else [m].
+        contain: Told of what kind is dealt with near a place [m].
+        air: What it is like at a place [m] and time [s].
+
+    Attributes:
+        attended: Whether somebody plays it.
+        answered: Whether the person has accepted the order.
+        alert: What the person has to know, in words.
+    """
+
+    def __init__(
+        self,
+        device: AgentDevice,
+        walker: Walker,
+        planner: Planner,
+        walking: Walking,
+        *,
+        put: Callable[[float, float], object],
+        contain: Callable[[str, float, float], object] = do_nothing,
+        air: AirAt = clean_air,
+    ) -> None:
+        super().__init__(walking, Exposure(device.clock, walking, air))
+        self.device, self._walker, self._planner = device, walker, planner
+        self._put, self._contain = put, contain
+        self.attended = self.answered = self._needs_help = False
+        self.alert = ""
+        self._stage = ""  # of the order: departed, arrived
+        self._order_at: Point = walking.place
+        self._protocol = GuardProtocol(device.dva, 0.0, self._stands_at)
+        self.exposure.start(self._felt)
+        device.serve(self._on_request)
+
+    def start(self) -> None:
+        """Begin to tell where one is."""
+        clock = self.device.clock
+        clock.every(STATUS_PERIOD, self._publish_status, start=clock.now + FIRST_STATUS)
+
+    @property
+    def order(self) -> m.Order | None:
+        """What the DVA asks for, until it is settled."""
+        return self._protocol.order
+
+    @property
+    def activity(self) -> str:
+        """What the person is doing, in words."""
+        if self._needs_help:
+            return "needs help"
+        if not self.attended:
+            return "nobody there"
+        if self.order is None:
+            return "waiting"
+        if not self.answered:
+            return "reads an order"
+        return {"departed": "walking", "arrived": "looking"}.get(self._stage, "getting ready")
+
+    def goal(self) -> tuple[Point, float, list[list[float]]] | None:
+        """Where the order leads: the place [m], and the way there, its length and points [m]."""
+        if self.order is None:
+            return None
+        place = self._xy(self.order.position)
+        way = self._planner.path(self.walking.place, place)
+        points = [] if way is None else [[round(x, 2), round(y, 2)] for x, y in way.tolist()]
+        return place, self._planner.distance(self.walking.place, place), points
+
+    # --- what the person does ----------------------------------------------------------------
+
+    def join(self) -> None:
+        """Somebody plays this guard from now on."""
+        self.attended, self.alert = True, ""
+
+    def leave(self) -> None:
+        """Nobody does any more: an order that is open is given back."""
+        if self.order is not None:
+            self._give_back("failed" if self.answered else "declined", "leaves")
+        self.attended = self._needs_help = False
+
+    def answer(self, accepts: bool, reason: str, said: Said) -> None:
+        """Accept the order, or decline it."""
+        order = self.order
+        if order is None:
+            said(False, "there is no order in hand")
+        elif accepts:
+            self.answered = True
+            self.device.progress(order.event_id, "accepted")
+            said(True, f"event {order.event_id} is yours")
+        else:
+            self._give_back("failed" if self.answered else "declined", reason or "no reason given")
+            said(True, f"event {order.event_id} is given back")
+
+    def say(self, what: str, said: Said) -> None:
+        """Say how it goes, one of `SAYINGS`."""
+        order = self.order
+        if what == "help":
+            self._needs_help = True
+            self.device.tell("needs help", "safety")
+            self._publish_status()
+            said(True, "the DVA is told that you need help")
+        elif order is None:
+            said(False, "there is no order in hand")
+        elif what in FINDINGS:
+            self._find(order, what, said)
+        else:
+            self._needs_help = False
+            self._reach(order, what)
+            said(True, f"{what} is told")
+
+    def stand_at(self, x: float, y: float, said: Said) -> None:
+        """Say where one is [m]."""
+        try:
+            self._put(x, y)
+        except ConfigError as error:
+            said(False, error.problem)
+            return
+        self._publish_status()
+        errand = self._protocol.errand
+        if errand is not None and errand.order is None and self._stands_at(errand.place):
+            self._protocol.is_over()
+        far = math.dist(self._order_at, (x, y)) > SET_OUT
+        if self.order is not None and self.answered and far:
+            self._reach(self.order, "departed")
+        said(True, "")
+
+    def report(self, kind: str, x: float, y: float, severity: str, said: Said) -> None:
+        """Report an event at a place [m]."""
+        position = m.Position(*self.device.frame.to_latlon(x, y))
+        body = m.EventReport(None, kind, position, SEVERITIES[severity], 0.9, "detected")
+        self._ask(body, f"{kind.replace('_', ' ')} is reported", said)
+        self.device.tell(f"reports {kind.replace('_', ' ')}", "event")
+
+    def _find(self, order: m.Order, finding: str, said: Said) -> None:
+        place = self._xy(order.position)
+        off = math.dist(self.walking.place, place)
+        if finding == CONTAINED and off > KEEPS_OFF:
+            said(False, f"it is {off:.0f} m away: go within {KEEPS_OFF:g} m to contain it")
+            return
+        self._reach(order, "arrived")
+        if finding == CONTAINED:
+            self._contain(order.kind, *place)
+        body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.99, finding)
+        self._ask(body, f"event {order.event_id} is {finding}", said)
+        self.device.tell(f"{finding} event {order.event_id}", "event")
+        if finding == CONFIRMED and order.task == "contain":
+            return  # it is still there to be contained
+        self.device.progress(order.event_id, "done")
+        self._end(at_event=True)
+
+    def _reach(self, order: m.Order, stage: str) -> None:
+        """Tell the DVA each stage once, in their order; who gets there has accepted."""
+        if not self.answered:
+            self.answered = True
+            self.device.progress(order.event_id, "accepted")
+        if not self._stage:
+            self._stage = "departed"
+            self.device.progress(order.event_id, "departed")
+        if stage == "arrived" and self._stage == "departed":
+            self._stage = "arrived"
+            self.device.progress(order.event_id, "arrived")
+
+    def _ask(self, body: m.Body, done: str, said: Said) -> None:
+        def answered(reply: m.Reply) -> None:
+            ok = reply.code == m.OK
+            said(ok, done if ok else reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+
+        unreachable = lambda: said(False, "the DVA does not answer")  # noqa: E731
+        self.device.ask(self.device.dva, body, answered, unreachable)
+
+    # --- what the DVA says -------------------------------------------------------------------
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        had, now = self.order, self.device.clock.now
+        answer = self._protocol.handle(message, now)
+        if answer.changed:
+            self._changed(had, self._protocol.errand)
+        if answer.bid_on is not None and self.attended:
+            self.device.clock.call_after(0.0, self._bid, answer.bid_on)
+        return m.Reply(message.message_id, answer.code, answer.text)
+
+    def _changed(self, had: m.Order | None, errand: Errand | None) -> None:
+        """There is another errand, or none any more."""
+        self.answered, self._stage, self._order_at = False, "", self.walking.place
+        if errand is None:
+            self.alert = f"event {had.event_id} is settled, or another's" if had else ""
+        elif errand.order is None:
+            x, y = self._xy(errand.place)
+            self.alert = f"the DVA asks you to wait at x {x:.0f} m, y {y:.0f} m"
+        else:
+            self.alert = ""
+            self.device.tell(f"is asked to go to event {errand.order.event_id}", "order")
+            self.device.clock.call_after(DECLINED_AFTER, self._decline_alone, errand.order)
+
+    def _decline_alone(self, order: m.Order) -> None:
+        """Nobody sits here: others shall go."""
+        if self.order is order and not self.attended:
+            self._give_back("declined", "nobody sits here")
+
+    def _bid(self, announced: m.TaskAnnouncement) -> None:
+        way = self._planner.distance(self.walking.place, self._xy(announced.position))
+        arrival = self._walker.usual_mobilisation + way / self._walker.speed
+        if self.order is None and arrival <= LONGEST_BID:
+            self.device.ask(self.device.dva, m.TaskBid(announced.event_id, arrival))
+
+    def _give_back(self, state: str, why: str) -> None:
+        order = self.order
+        assert order is not None
+        self.device.progress(order.event_id, state)
+        self.device.tell(f"gives event {order.event_id} back: {why}", "order")
+        self._end()
+
+    def _end(self, at_event: bool = False) -> None:
+        self._protocol.is_over(at_event)
+        self.answered, self._stage, self._needs_help = False, "", False
+
+    def _felt(self) -> None:
+        """Half a second more in this air: it is for the person to leave."""
+        if self.exposure.is_too_much and self.attended:
+            self.alert = "the air where you stand is dangerous: leave"
+
+    def _publish_status(self) -> None:
+        position = m.Position(*self.device.frame.to_latlon(*self.walking.place))
+        self.device.publish(STATUS, m.PersonStatus(self.activity, position))
+
+    def _stands_at(self, place: m.Position) -> bool:
+        return math.dist(self.walking.place, self._xy(place)) < HERE
+
+    def _xy(self, place: m.Position) -> Point:
+        return self.device.frame.to_xy(place.latitude, place.longitude)

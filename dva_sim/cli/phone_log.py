@@ -1,0 +1,73 @@
+"""Prints what a file of a phone's motion tells, and writes an accelerometer part of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+from dva_sim.cli.verbosity import print_json
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.motion import read_motion, replayed
+from dva_sim.recordings.motion_figures import MotionFigures, figures_of, part_of
+
+
+def tell(path: Path, as_json: bool) -> None:
+    """Print figures.
+
+    Raises:
+        ConfigError: it is no such file, or too short.
+    """
+    found = figures_of(read_motion(path), path)
+    if as_json:
+        print_json(found._asdict())
+        return
+    for line in lines(found):
+        print(line)
+
+
+def lines(found: MotionFigures) -> list[str]:
+    """The figures in words."""
+    return [
+        f"{found.samples} samples in {found.duration_s:.1f} s: {found.rate_hz:.1f} a second, "
+        f"jitter {100.0 * found.jitter:.1f} %",
+        f"gaps: {found.gaps}, the longest interval {1000.0 * found.longest_gap_s:.0f} ms",
+        f"noise at rest {found.noise_mg:.2f} mg, steps of {found.resolution_mg:.3f} mg, "
+        f"largest {found.largest_g:.2f} g",
+        f"{found.late_ms:.0f} ms from a sample to when it came",
+    ]
+
+
+def tell_commands(path: Path, rate_hz: float) -> None:
+    """Print what the apps of a file make of its samples, as a table with commas.
+
+    Raises:
+        ConfigError: it is no such file, or one of its apps cannot be made.
+    """
+    print("t_s,speed_mps,turn_rate_radps,sample_age_s")
+    for now, command in replayed(read_motion(path), rate_hz=rate_hz):
+        print(f"{now:.6f},{command.speed!r},{command.turn_rate!r},{command.sample_age:.6f}")
+
+
+def write_part(path: Path, out: Path) -> None:
+    """Write an accelerometer part of what a file tells.
+
+    Raises:
+        ConfigError: it is no such file, or `out` exists or cannot be written.
+    """
+    part = part_of(figures_of(read_motion(path), path))
+    text = "".join(f"{key}: {_yaml(value)}\n" for key, value in part.items())
+    try:
+        with out.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise ConfigError("is there already", out) from None
+    except OSError as error:
+        raise ConfigError(f"cannot be written: {error.strerror}", out) from None
+    print(f"{out} written: name it as phone.accelerometer")
+
+
+def _yaml(value: object) -> str:
+    """A value as YAML has it: that of JSON is."""
+    assert not (isinstance(value, float) and not math.isfinite(value))
+    return json.dumps(value)
