@@ -168,6 +168,9 @@ def console(
         Path | None,
         Option("-o", "--out", metavar="FOLDER", help="Keep tables of what people did there."),
     ] = None,
+    keep_motion: Annotated[
+        Path | None, folder("Keep the motion of phones there whose person agrees.")
+    ] = None,
     overwrite: Overwrite = False,
     seed: RunSeed = 1,
     set_: Sets = None,
@@ -204,6 +207,7 @@ def console(
         open=not no_open,
         record=record,
         results=out,
+        keep_motion=keep_motion,
         overwrite=overwrite,
     )
     with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):

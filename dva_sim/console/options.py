@@ -38,6 +38,7 @@ class ConsoleOptions:
         open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
         results: Folder for the tables of what people did, if any.
+        keep_motion: Folder for the samples of phones whose person agrees, if any.
         overwrite: What is there may be replaced.
     """
 
@@ -55,6 +56,7 @@ class ConsoleOptions:
     open: bool = True
     record: Path | None = None
     results: Path | None = None
+    keep_motion: Path | None = None
     overwrite: bool = False
 
     def kept_results(self) -> KeptResults | None:
@@ -67,6 +69,19 @@ class ConsoleOptions:
             return None
         asked = self.scenario, self.changes, self.seed, self.overwrite
         return KeptResults(self.results, *asked)
+
+    def motion_folder(self) -> Path | None:
+        """Where phones' motion is kept, made if need be.
+
+        Raises:
+            ConfigError: it cannot be.
+        """
+        if self.keep_motion is not None:
+            try:
+                self.keep_motion.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise ConfigError(f"--keep-motion {self.keep_motion}: {error.strerror}") from None
+        return self.keep_motion
 
     def sockets(self) -> MakeSockets | None:
         """What makes the sockets of real links."""

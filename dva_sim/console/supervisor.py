@@ -61,6 +61,7 @@ class ConsoleSupervisor:
         world = ConsoleWorld(
             *(scenario, options.scenario, seed), sockets=options.sockets(), measured=measured
         )
+        world.phones.motion_folder = options.motion_folder()
         if results is not None:
             results.follow(world)
         with self._recorded(world):
@@ -87,6 +88,7 @@ class ConsoleSupervisor:
             yield
         finally:
             self._end_all()
+            world.phones.close()
             if world.sockets is not None:
                 world.sockets.close()
             if outlet is not None:

@@ -208,3 +208,32 @@ def test_a_second_address_is_for_those_who_only_look(programs, console):
         urllib.request.urlopen(acts)
     with told.value as refused:
         assert refused.code == 403
+
+
+PHONES = ("--phones", "--phones-host", "127.0.0.1", "--phones-port", "0")
+
+
+def test_phones_get_an_address_by_https_and_a_code(programs, monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    console = running(programs, *PHONES)
+    console.wait_to_say("A phone has to trust this machine once: https://127.0.0.1:")
+    address = re.search(r"^Phone: (https://127\.0\.0\.1:\d+/\?token=\S{32})$", console.said, re.M)
+    assert address
+    assert "█▀" in console.said
+    kept = tmp_path / "data" / "dva-sim" / "phones"
+    assert {path.name for path in kept.iterdir()} == {"authority.pem", "console.pem"}
+    assert address[1].partition("=")[2] not in "".join(console.complained)
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+
+
+def test_where_no_certificate_can_be_kept_all_else_goes_on(programs, monkeypatch, tmp_path):
+    (tmp_path / "data").write_text("in the way")
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    console = running(programs, *PHONES)
+    console.wait_to_say("no address for phones: no certificate can be kept in")
+    assert "Phone:" not in console.said
+    with client(address_of(console)) as page:
+        assert page.do("take", robots=[0])[0]
+    console.send(signal.SIGINT)
+    assert console.ends() == 0

@@ -79,7 +79,9 @@ _CALIBRATE = {
     "filter": maybe(word),
     "mapping": one_of("absolute", "differential", "leaky"),
     "ios": flag,
+    "keep": flag,
 }
+_OPTIONAL = ("ios", "keep")
 _SAMPLES = {
     "n": whole(0, 2**53),
     "at": several(number(0, 1e13), 1, MOST_SAMPLES),
@@ -111,7 +113,7 @@ ACTIONS: Known = {
     "phone_register": (_REGISTER, tuple(_REGISTER)),
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
-    "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key != "ios")),
+    "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key not in _OPTIONAL)),
     "guard_join": ({"guard": _LABEL}, ("guard",)),
     "guard_leave": ({}, ()),
     "guard_answer": ({"accept": flag, "reason": text(0, 200)}, ("accept", "reason")),

@@ -15,7 +15,13 @@ from dva_sim.kernel.errors import DvaSimError
 
 AUTHORITY = "/trust/dva-sim.crt"
 # What may be seen before a phone trusts anything: no secret is in it.
-UNGUARDED = ("/trust", AUTHORITY, "/static/palette.css", "/static/css/trust.css")
+UNGUARDED = (
+    "/trust",
+    AUTHORITY,
+    "/static/icon.svg",
+    "/static/palette.css",
+    "/static/css/trust.css",
+)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from dva_sim.console.web.pipes import Lines, PipeEnd
 from dva_sim.console.web.state import RunState
 
 PATIENCE = 5.0  # for an answer [s]
+LONG = 60.0  # for one that the DVA gives, or does not give after all attempts [s]
+BY_THE_DVA = ("phone_register", "phone_devices", "phone_permission")
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
 MOST_PENDING = 256  # questions without an answer
@@ -125,11 +127,12 @@ class Simulation:
             told({"k": "done", "id": key, "ok": False, "text": "too much is asked at once"})
             return
         self._pending[key] = [told]
-        asyncio.get_running_loop().call_later(PATIENCE, self._give_up, key, told)
+        patience = LONG if asked["do"] in BY_THE_DVA else PATIENCE
+        asyncio.get_running_loop().call_later(patience, self._give_up, key, told, patience)
 
-    def _give_up(self, key: str, told: Told) -> None:
+    def _give_up(self, key: str, told: Told, patience: float) -> None:
         if told in self._pending.get(key, ()):
-            text = f"no answer within {PATIENCE:g} s"
+            text = f"no answer within {patience:g} s"
             self._answer({"k": "done", "id": key, "ok": False, "text": text, "late": True})
 
     async def answer(self, asked: Asked) -> Answer:

@@ -2,26 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import pytest
-from playwright.sync_api import Page, Response, expect
+from page_faults import faults
+from playwright.sync_api import Response, expect
 
-AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text()
-RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 PAGES = {"map": "Map", "drive": "Drive", "network": "Network"}
-
-
-def faults(page: Page) -> list[str]:
-    """What axe-core holds to be serious, or worse."""
-    page.evaluate(AXE)
-    options = json.dumps(
-        {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}
-    )
-    found = page.evaluate(f"axe.run(document, {options})")["violations"]
-    grave = [fault for fault in found if fault["impact"] in {"serious", "critical"}]
-    return [f"{fault['id']}: {node['html'][:160]}" for fault in grave for node in fault["nodes"]]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

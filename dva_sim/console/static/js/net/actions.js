@@ -5,6 +5,8 @@ import { notice, you } from '../store.js';
 import { steer } from './wire.js';
 
 const PATIENCE_MS = 8000;
+const LONG_MS = 65000; // for what the DVA answers, or does not after all attempts
+const BY_THE_DVA = ['phone_register', 'phone_devices', 'phone_permission'];
 const ENDS = ['stop', 'release'];
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */
@@ -32,9 +34,10 @@ export async function act(what, more = {}) {
     return told({ ok: false, text: 'There is no connection to the world; nothing was sent.' });
   }
   const answer = new Promise((resolve) => waiting.set(id, resolve));
+  const patience = BY_THE_DVA.includes(what) ? LONG_MS : PATIENCE_MS;
   const timer = window.setTimeout(
-    () => settle({ id, ok: false, text: `No answer to “${what}” within 8 s.` }),
-    PATIENCE_MS,
+    () => settle({ id, ok: false, text: `No answer to “${what}” within ${patience / 1000} s.` }),
+    patience,
   );
   const done = await answer;
   window.clearTimeout(timer);

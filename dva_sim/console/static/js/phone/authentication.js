@@ -73,15 +73,18 @@ function Register() {
     label: label.trim() ? '' : 'Any words that describe this device are needed.',
   };
   const known = phone.value;
+  const [asking, ask] = useState(false);
   const register = async () => {
     mark(true);
-    if (wrong.server || wrong.port || wrong.label) return;
+    if (asking || wrong.server || wrong.port || wrong.label) return;
+    ask(true);
     const done = await act('phone_register', {
       server: server.trim(),
       port: Number(port),
       label: label.trim(),
       type,
     });
+    ask(false);
     if (done.ok) unfold(false);
   };
   if (known?.registered && !open) {
@@ -100,6 +103,7 @@ function Register() {
     <${Choice} name="Device type" value=${type} options=${TYPES}
       onInput=${(/** @type {string} */ value) => choose({ type: value })} />
     <button type="button" class="big go" disabled=${!maySteer.value} onClick=${register}>Register</button>
+    <p role="status" aria-label="Registration">${asking && `Asking the DVA at ${server}:${port} …`}</p>
   </li>`;
 }
 

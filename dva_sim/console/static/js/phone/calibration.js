@@ -35,7 +35,8 @@ export function CalibrationScreen() {
     const numbers = { force: comma(force), radius: comma(radius), delay: comma(delay) };
     choose({ ...numbers, reference: tilts.peek() ? pose() : null, calibrated: true });
     const done = await sendCalibration(true);
-    tell(done && !done.ok ? '' : isKnown.peek() ? 'Calibrated.' : 'Kept on this phone; it counts once you have registered.');
+    if (!isKnown.peek()) tell('Kept on this phone; it counts once you have registered.');
+    else if (done?.ok) tell(choices.peek().keep ? `Calibrated: ${done.text}.` : 'Calibrated.');
   };
   return html`<${Sensor} />
     <${Live} />
@@ -119,7 +120,7 @@ function Pipeline() {
 
 /** What concerns this phone alone. */
 function Habits() {
-  const { by, hand, hold } = choices.value;
+  const { by, hand, hold, keep } = choices.value;
   return html`<section class="panel" aria-label="This phone"><h2>This phone</h2>
     <${Choice} name="Steer by" value=${by} options=${WAYS}
       onInput=${(/** @type {string} */ value) => choose({ by: value })} />
@@ -127,5 +128,7 @@ function Habits() {
       onInput=${(/** @type {string} */ value) => choose({ hand: value })} />
     <${Tick} name="Hold to drive: lifting the thumb stops the robot" value=${hold}
       onInput=${(/** @type {boolean} */ value) => choose({ hold: value })} />
+    <${Tick} name="Let the console keep my motion in a file, from the next Calibrate on" value=${keep}
+      onInput=${(/** @type {boolean} */ value) => choose({ keep: value })} />
   </section>`;
 }

@@ -7,7 +7,7 @@ const KEY = 'dva-sim-phone';
  * @typedef {{server: string, port: string, label: string, type: string, device: string,
  *   level: string, force: string, radius: string, delay: string, pipeline: string,
  *   filter: string, mapping: string, reference: number[] | null, calibrated: boolean,
- *   hand: string, hold: boolean, by: string}} Choices
+ *   hand: string, hold: boolean, keep: boolean, by: string}} Choices
  */
 
 /** @type {Choices} */
@@ -28,6 +28,7 @@ const FIRST = {
   calibrated: false,
   hand: 'right',
   hold: false,
+  keep: false,
   by: 'tilt',
 };
 

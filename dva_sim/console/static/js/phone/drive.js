@@ -26,13 +26,21 @@ const asking = signal(false);
 export const phone = computed(() => seat.value?.phone ?? null);
 export const phase = computed(() => seat.value?.phase ?? 'free');
 /** Whether a robot is in this page's hands: by the phone's permission, or by the console. */
-export const holds = computed(() => (seat.value?.drives.length ?? 0) > 0);
+export const holds = computed(
+  () => (seat.value?.drives.length ?? 0) > 0 && !['asking', 'free'].includes(phase.value),
+);
 /** Whether who drives is known to the DVA: as a phone, or as the console's operator. */
 export const isKnown = computed(() => Boolean(phone.value?.registered) || holds.value);
 export const isDriving = computed(() => ['starting', 'driving'].includes(phase.value));
-/** Whether the phone is steered by tilting it; without a sensor by the stick. */
+/**
+ * Whether the phone is steered by tilting it: without a sensor it is by the stick, and so is what the
+ * console's operator drives, who is no phone.
+ */
 export const tilts = computed(
-  () => choices.value.by === 'tilt' && ['live', 'looking', 'tap'].includes(sensor.value),
+  () =>
+    choices.value.by === 'tilt' &&
+    ['live', 'looking', 'tap'].includes(sensor.value) &&
+    !(holds.value && !phone.value?.registered),
 );
 
 /** The robot that is held, else the one that was chosen. */
@@ -50,8 +58,9 @@ export const whyNoEmergency = computed(() => {
 /** Begin, if a robot is in hand. */
 export async function start() {
   if (!holds.value || isDriving.value || asking.peek()) return;
-  if (tilts.peek() && isSilent()) {
-    notice.value = 'There is no sensor that says anything: nothing was started. See Calibration.';
+  const why = whyNot();
+  if (why) {
+    notice.value = why;
     return;
   }
   interrupted.value = '';
@@ -60,6 +69,14 @@ export async function start() {
   await sendCalibration();
   await act('start');
   asking.value = false;
+}
+
+/** Why a tilted phone cannot begin; empty if it can. */
+function whyNot() {
+  if (!tilts.peek()) return '';
+  if (isSilent()) return 'There is no sensor that says anything: nothing was started. See Calibration.';
+  const lifted = choices.peek().hold && !thumb.peek();
+  return lifted ? 'Hold to drive is on: swipe up over the picture and keep your thumb there.' : '';
 }
 
 /** End. */
@@ -81,6 +98,7 @@ export async function sendCalibration(force = false) {
     filter: kept.filter || null,
     mapping: kept.mapping,
     ios: isIos,
+    ...(kept.keep && { keep: true }),
   });
 }
 
@@ -117,7 +135,7 @@ const end = (why) => queueMicrotask(() => interrupt(why));
 export function press(down) {
   const was = thumb.peek();
   thumb.value = down;
-  if (was && !down && choices.peek().hold) interrupt('The thumb was lifted.');
+  if (was && !down && choices.peek().hold && tilts.peek()) interrupt('The thumb was lifted.');
 }
 
 /** A drive is felt: its start, its end, a contact, a lost link. */

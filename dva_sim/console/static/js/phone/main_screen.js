@@ -36,6 +36,6 @@ function Events() {
       (event) => html`<li key=${event.number}><${SeverityMark} severity=${event.severity} />
         <span class="what"><b>${capital(plain(event.kind))}</b> ${placeOf(event)}
           <small>${event.severity}, ${plain(event.state)} ${ageText(worldNow() - event.since_ms)}</small></span>
-        <a class="go" href=${`#/${next}`} aria-label=${`Drive to event ${event.number}`}>Drive there</a></li>`,
+        <a class="go" href=${`#/${next}`} aria-label=${`Drive there: event ${event.number}`}>Drive there</a></li>`,
     )}</ul></section>`;
 }

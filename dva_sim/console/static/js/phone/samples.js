@@ -1,8 +1,7 @@
 /** Samples on their way to the world: as they are, in batches, with the phone's own times. */
-import { seat } from '../store.js';
 import { backlog, steer } from '../net/wire.js';
 import { choices } from './choices.js';
-import { thumb } from './drive.js';
+import { thumb, tilts } from './drive.js';
 import { screen } from './screens.js';
 import { listen, onSample } from './sensor.js';
 
@@ -30,8 +29,7 @@ export function keepSampling() {
 
 /** Whether anybody would make something of them. */
 function isWanted() {
-  const known = seat.peek()?.phone?.registered || (seat.peek()?.drives.length ?? 0) > 0;
-  return known && choices.peek().by === 'tilt' && NEEDED_ON.includes(screen.peek());
+  return tilts.peek() && NEEDED_ON.includes(screen.peek());
 }
 
 /** What nobody wants does not count as lost. */

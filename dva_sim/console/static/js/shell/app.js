@@ -8,6 +8,7 @@ import { NetworkPage } from '../network/network_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
+import { PhoneButton, PhoneCode } from './phones.js';
 import { addressOf, page } from './route.js';
 
 const PAGES = /** @type {[string, string, string][]} */ ([
@@ -32,7 +33,7 @@ function App() {
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
     <div class="body"><${Warnings} /><${Tour} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
-    <${Help} />`;
+    <${Help} /><${PhoneCode} />`;
 }
 
 /** @param {Event} event */
@@ -47,7 +48,7 @@ function Rail() {
       ([name, title, icon]) => html`<a href=${addressOf(name)}
         aria-current=${page.value === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
     )}
-    <${TourButton} />
+    <${PhoneButton} /><${TourButton} />
   </nav>`;
 }
 

@@ -1,0 +1,116 @@
+"""The pages of phones and guards for everyone: sizes, themes, names, weight, no fault for axe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from page_faults import faults
+from phone_in_hand import Hand
+from playwright.sync_api import Page, Response, expect
+
+WORLD = ("--phones", "--robots", "3", "--people", "4")
+SIZES = {"smallest": (320, 568), "across": (740, 360), "tablet": (820, 1180)}
+TALLEST = 48  # of what is tapped, at least [px]
+
+
+def screens(hand: Hand) -> list[tuple[str, Callable[[], None]]]:
+    """All five, and Teleoperation with a robot in hand, in an order that comes back."""
+
+    def at(name: str) -> Callable[[], None]:
+        return lambda: hand.go(name)
+
+    def cockpit() -> None:
+        hand.register()
+        hand.take("robot-2")
+        expect(hand.page.get_by_text("is in your hands")).to_be_visible()
+        hand.calibrate()
+        hand.go("Teleoperation")
+        expect(hand.status("Radius")).to_be_visible()
+
+    names = ("Main", "Instructions", "Authentication", "Calibration", "Teleoperation")
+    return [*((name, at(name)) for name in names), ("driving", cockpit)]
+
+
+def too_wide(page: Page, width: int) -> bool:
+    wide = page.evaluate(
+        "Math.max(document.documentElement.scrollWidth, document.querySelector('main').scrollWidth)"
+    )
+    return bool(wide > width)
+
+
+SMALL = """least => [...document.querySelectorAll('button, select, a.big, a.go, .field input')]
+  .filter((one) => one.offsetParent && one.getBoundingClientRect().height < least - 0.5)
+  .map((one) => one.outerHTML.slice(0, 120))"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES)
+def test_every_screen_fits_and_axe_finds_nothing_serious(fake, visits, scheme, size) -> None:
+    width, height = SIZES[size]
+    about = {"color_scheme": scheme, "has_touch": True, "is_mobile": True}
+    hand = Hand(visits(width, height, **about), fake(*WORLD).phone)
+    for name, show in screens(hand):
+        show()
+        assert not too_wide(hand.page, width), name
+        assert hand.page.evaluate(SMALL, TALLEST) == [], name
+        stop = hand.page.get_by_role("button", name="Emergency stop").bounding_box()
+        assert stop is not None
+        assert stop["height"] >= 64, name
+        assert stop["y"] + stop["height"] <= height, name
+        assert faults(hand.page) == [], name
+    hand.leave()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES)
+def test_the_guards_page_fits_and_axe_finds_nothing_serious(fake, visits, scheme, size) -> None:
+    width, height = SIZES[size]
+    page = visits(width, height, color_scheme=scheme).tab()
+    page.goto(fake(*WORLD).phone.replace("/phone?", "/guard?"))
+    expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
+    assert faults(page) == []
+    page.get_by_role("button", name="guard-2").click()
+    expect(page.get_by_role("button", name="Accept")).to_be_visible()
+    assert not too_wide(page, width)
+    assert page.evaluate(SMALL, TALLEST) == []
+    assert faults(page) == []
+    page.get_by_role("button", name="Leave").click()
+    expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
+
+
+def test_how_to_trust_the_console_can_be_read_by_everybody(fake, visits) -> None:
+    page = visits(320, 568).tab()
+    page.goto(f"{fake(*WORLD).base}trust")
+    expect(page.get_by_role("heading", name="Trust this console")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 320
+    assert faults(page) == []
+
+
+def test_public_names_are_there(fake, visits) -> None:
+    hand = Hand(visits(360, 740, has_touch=True, is_mobile=True), fake(*WORLD).phone)
+    page = hand.page
+    hand.go("Authentication")
+    for field in ("Server IP", "Port", "Device label", "Device type", "Device", "Permission level"):
+        expect(page.get_by_label(field, exact=True)).to_have_count(1)
+    for button in ("Register", "Get device list", "Get Permission Level", "Emergency stop"):
+        expect(page.get_by_role("button", name=button, exact=True)).to_have_count(1)
+    hand.go("Calibration")
+    for field in ("Force", "Radius step", "Maximum delay"):
+        expect(page.get_by_label(field, exact=True)).to_have_count(1)
+    expect(page.get_by_role("button", name="Calibrate", exact=True)).to_have_count(1)
+    expect(hand.status("Link")).to_have_count(1)
+
+
+def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(fake, visits) -> None:
+    world = fake(*WORLD)
+    answers: list[Response] = []
+    page = visits(360, 740).tab()
+    page.on("response", lambda answer: answers.append(answer))
+    page.goto(world.phone)
+    expect(page.get_by_role("link", name="Authentication")).to_be_visible()
+    weights = {answer.url: len(answer.body()) for answer in answers if answer.status == 200}
+
+    assert all(url.startswith(world.base) for url in weights)
+    assert not any("leaflet" in url or "uplot" in url for url in weights)
+    assert sum(weights.values()) < 200_000, sum(weights.values())

@@ -1,0 +1,22 @@
+"""What axe-core finds wrong with a page for those who see, hear or move otherwise."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from playwright.sync_api import Page
+
+AXE = (Path(__file__).parent / "console" / "browser" / "vendor" / "axe.min.js").read_text()
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+
+
+def faults(page: Page) -> list[str]:
+    """What axe-core holds to be serious, or worse."""
+    page.evaluate(AXE)
+    options = json.dumps(
+        {"runOnly": {"type": "tag", "values": RULES}, "resultTypes": ["violations"]}
+    )
+    found = page.evaluate(f"axe.run(document, {options})")["violations"]
+    grave = [fault for fault in found if fault["impact"] in {"serious", "critical"}]
+    return [f"{fault['id']}: {node['html'][:160]}" for fault in grave for node in fault["nodes"]]
