@@ -46,6 +46,7 @@ class AgentDevice:
         address: As in its registration.
         dva: Id of the DVA.
         network: Where messages travel.
+        clock: The run's clock.
         recorder: Told what happens.
         frame: Between longitude/latitude on the wire and metres inside.
         timeout: Of a request on the acknowledged channel [s].
@@ -69,6 +70,7 @@ class AgentDevice:
     labels: dict[str, str] = field(default_factory=dict)
     time_of_day: tuple[float, bool] = (NOON, False)
     silent: bool = False
+    clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
     _has_left: bool = False
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
@@ -76,13 +78,9 @@ class AgentDevice:
     _nuisances: Nuisances = field(default_factory=Nuisances)
 
     def __post_init__(self) -> None:
+        self.clock = self.network.clock
         self.outbox = Outbox(self.id_tag, *self.time_of_day)
         self.labels[self.id_tag] = self.label
-
-    @property
-    def clock(self) -> Clock:
-        """The run's clock."""
-        return self.network.clock
 
     def register(self, then: Callable[[], object] = do_nothing) -> None:
         """Make oneself known to the DVA until it has answered, then renew that now and then.

@@ -188,16 +188,24 @@ class Ticks:
 
     def advance_to(self, time: float) -> None:
         """Let the bodies move up to `time` [s], in whole ticks; never back."""
-        self._now_us = max(self._now_us, round(time * US))
-        due = self._now_us // self._tick_us
-        step, dt = self.space.step, self.dt
-        while self._tick < due and self._awake:
-            for body in [body for body in self._awake if not body.push(self._tick, dt)]:
-                del self._awake[body]
-            if self._awake:
+        now_us = round(time * US)
+        if now_us <= self._now_us:
+            return
+        self._now_us = now_us
+        due = now_us // self._tick_us
+        step, dt, awake = self.space.step, self.dt, self._awake
+        while self._tick < due and awake:
+            stand = []
+            for body in awake:
+                if not body.push(self._tick, dt):
+                    stand.append(body)
+            for body in stand:
+                del awake[body]
+            if awake:
                 step(dt)
             self._tick += 1
-        self._tick = max(self._tick, due)
+        if self._tick < due:
+            self._tick = due
 
 
 class Body:
@@ -299,16 +307,15 @@ class Lock:
         space: That the body is in.
         body: Of the robot.
         arm: On which the grip holds against turning [m].
+
+    Attributes:
+        closed: Whether it holds.
     """
 
     def __init__(self, space: pymunk.Space, body: pymunk.Body, arm: float) -> None:
         self._space, self._body, self._arm = space, body, arm
         self._joints: list[pymunk.Constraint] = []
-
-    @property
-    def closed(self) -> bool:
-        """Whether it holds."""
-        return bool(self._joints)
+        self.closed = False
 
     def close(self, grip: float) -> None:
         """Hold from now on, with this friction coefficient of the floor."""
@@ -319,13 +326,13 @@ class Lock:
         turn = pymunk.GearJoint(floor, body, 0.0, 1.0)
         slide.max_bias = turn.max_bias = 0.0
         slide.max_force, turn.max_force = most, most * self._arm
-        self._joints = [slide, turn]
+        self._joints, self.closed = [slide, turn], True
         self._space.add(*self._joints)
 
     def open(self) -> None:
         """Let the wheels roll."""
         self._space.remove(*self._joints)
-        self._joints = []
+        self._joints, self.closed = [], False
 
 
 class RobotBody(Body):
@@ -489,7 +496,7 @@ class RobotBody(Body):
         self.distance += abs(forward) * dt
         power = along * (forward + 0.5 * dt * along / self._mass)  # with the mean of the tick
         spinning = torque * (spin + 0.5 * dt * torque / self._moment)
-        self.work += (max(power, 0.0) + max(spinning, 0.0)) * dt
+        self.work += ((power if power > 0.0 else 0.0) + (spinning if spinning > 0.0 else 0.0)) * dt
         return True
 
     def _is_held(self, dt: float) -> bool:

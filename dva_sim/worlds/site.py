@@ -180,13 +180,19 @@ class Site(FloorPlan):
 
     def _free_cells(self, clearance: float, room: str | None) -> NDArray[np.int64]:
         """Flat indices of the cells that `sample_free` chooses from."""
-        reached = self.grid.reachable(min(clearance, FOOTPRINT))
-        cells = np.flatnonzero(reached & (self.grid.clearance >= clearance))
+        grid = self.grid
+        way = min(clearance, FOOTPRINT)
+        reached = self.kept(("reached", way), lambda: grid.reachable(way))
+        free = reached & (grid.clearance >= clearance)
         if room is None:
-            return cells
-        columns = self.grid.cells.shape[1]
-        middles = self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
-        return cells[shapely.contains_xy(self.ground_of(self.room(room)), middles)]
+            return np.flatnonzero(free)
+        known = self.room(room)
+        window = grid.window(known.polygon)
+        inside = np.nonzero(free[window])
+        rows, columns = (found + part.start for found, part in zip(inside, window, strict=True))
+        middles = grid.to_xy(rows + 0.5, columns + 0.5)
+        cells: NDArray[np.int64] = rows * grid.cells.shape[1] + columns
+        return cells[shapely.contains_xy(self.ground_of(known), middles)]
 
     def ground_of(self, room: Room) -> Any:
         """The shapely area of a room; of ground outdoors what nothing else is drawn over."""

@@ -227,10 +227,15 @@ class DriverSeat:
     def judge(self, seen: Observation) -> Observation:
         """A frame as the person takes it: place and heading with an error."""
         person, error = self.person, self._errors
-        return seen._replace(
-            x=seen.x + person.position_error * next(error),
-            y=seen.y + person.position_error * next(error),
-            heading=seen.heading + person.heading_error * next(error),
+        return Observation(
+            seen.tick,
+            seen.x + person.position_error * next(error),
+            seen.y + person.position_error * next(error),
+            seen.heading + person.heading_error * next(error),
+            seen.speed,
+            seen.turn_rate,
+            seen.hazards,
+            seen.visibility,
         )
 
 

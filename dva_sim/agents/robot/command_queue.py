@@ -109,8 +109,17 @@ class FairQueue:
 
     def put(self, letter: Letter) -> Letter | None:
         """Take a letter in; the one that finds no room, if any: another, or itself."""
-        gone, key = None, (letter.peer, letter.moves)
-        standing = self._standing(letter)
+        gone, standing = None, self._standing(letter)
+        if standing is not Standing.HOLDER or self._length >= self._limit:
+            gone = self._make_room(letter, standing)
+            if gone is letter:
+                return letter
+        self._lines.setdefault((letter.peer, letter.moves), deque()).append(letter)
+        self._length += 1
+        return gone
+
+    def _make_room(self, letter: Letter, standing: Standing) -> Letter | None:
+        """The one that has to go for a letter, if any: another, which is gone then, or itself."""
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
         if standing is not Standing.HOLDER and sum(mine) >= EACH:
             return letter
@@ -121,10 +130,8 @@ class FairQueue:
                 worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
                 if (standing, mine[letter.moves] + 1) >= self._rank(line):
                     return letter
-                gone = self._take(worst, newest=True)
-        self._lines.setdefault(key, deque()).append(letter)
-        self._length += 1
-        return gone
+                return self._take(worst, newest=True)
+        return None
 
     def _rank(self, line: Line) -> tuple[Standing, int]:
         return self._standing(line[0]), len(line)
@@ -138,7 +145,9 @@ class FairQueue:
         lines = [key for key, line in self._lines.items() if self._standing(line[0]) is standing]
         if not lines:
             return None
-        key = min(lines, key=lambda one: one[1]) if standing is Standing.HOLDER else lines[0]
+        key = lines[0]
+        if standing is Standing.HOLDER and len(lines) > 1:
+            key = min(lines, key=lambda one: one[1])
         self._lines.move_to_end(key)
         return self._take(key)
 

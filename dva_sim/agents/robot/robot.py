@@ -156,6 +156,8 @@ class MissionLoop:
 
 HOLDERS_ONLY = m.StartTeleOp | m.StopTeleOp | m.SetTeleOp | Mission | m.CancelMission
 DVAS_ONLY = m.PermissionGrant | m.PermissionRevocation | m.TaskAnnouncement | m.TaskAward
+NOT_STRANGERS = HOLDERS_ONLY | DVAS_ONLY
+DRIVING = m.StartTeleOp, m.SetTeleOp
 LONGEST_HELD = 1e6  # [s]
 WHATEVER_WAITS = 1 << 40  # a message goes however much waits before the link [B]
 MISSION = "mission|"  # topic of how missions stand
@@ -327,7 +329,7 @@ class RobotAgent:
         any processing, unless a word of the DVA waits that may make one of them the holder.
         """
         message = None if self.device.silent else self.device.admit(request)
-        if message is None or not isinstance(body := message.body, HOLDERS_ONLY | DVAS_ONLY):
+        if message is None or not isinstance(body := message.body, NOT_STRANGERS):
             return message
         standing, now = self._standing_of(message), self.device.clock.now
         unknown = not self._is_driven() or self.inbox.hears_the_dva
@@ -412,11 +414,12 @@ class RobotAgent:
 
     def _note_holder(self, message: m.Message, code: int) -> None:
         """How the holder's commands fare; who listens hears at once when that changes."""
-        if isinstance(message.body, m.StartTeleOp | m.SetTeleOp) and message.source == self._holder:
+        holder = self._holder
+        if isinstance(message.body, DRIVING) and message.source == holder:
             self._fared = code
-        if self._holder != self._told[0]:
+        if holder != self._told[0]:
             self._held_since = self.device.clock.now
-        if (self._holder, self._fares if self._fares in m.OBEYS_NO_MORE else m.OK) != self._told:
+        if (holder, self._fares if self._fares in m.OBEYS_NO_MORE else m.OK) != self._told:
             self._publish_holder()
 
     @property

@@ -10,6 +10,7 @@ from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.field_of_view import FieldOfView
 from dva_sim.protocol import messages as m
 
 EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of the main corridor [m]
@@ -131,13 +132,18 @@ def test_a_revoked_permission_ends_one_mission_and_not_the_other() -> None:
 # --- what is seen through smoke -------------------------------------------------------------
 
 
+def fill_with_smoke(view: FieldOfView, extinction: float) -> None:
+    """So much of it everywhere [1/m]."""
+    object.__setattr__(view, "smoke", lambda a, b: extinction * math.dist(a, b))
+    object.__setattr__(view, "hazy", lambda: True)
+
+
 @pytest.mark.parametrize("control", ["direct", "supervisory"])
 def test_a_robot_in_thick_smoke_never_refutes(control: str) -> None:
     """At the place, but through smoke of 20 /m one sees 15 cm."""
     dva = PretendedDva(robots=1, control=control)
     for robot in dva.field.robots.values():
-        view = robot._setup.view
-        object.__setattr__(view, "smoke", lambda a, b: 20.0 * math.dist(a, b))
+        fill_with_smoke(robot._setup.view, 20.0)
     dva.operator()
     dva.order(1, EAST, robot=ROBOT)
     dva.run_until(lambda: "failed" in dva.progress(1))
@@ -151,7 +157,7 @@ def test_who_drives_through_thin_smoke_looks_from_nearer_and_can_refute() -> Non
     """Through smoke of 2.8 /m one sees 1.07 m: not from 1.2 m, but from 0.5 m."""
     dva = PretendedDva(robots=1)
     for robot in dva.field.robots.values():
-        object.__setattr__(robot._setup.view, "smoke", lambda a, b: 2.8 * math.dist(a, b))
+        fill_with_smoke(robot._setup.view, 2.8)
     dva.operator()
     dva.order(1, EAST, robot=ROBOT)
     dva.run_until(lambda: "done" in dva.progress(1))
