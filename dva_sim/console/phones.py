@@ -43,22 +43,22 @@ class Phones:
         run: In which.
         clock: Its own.
         console: What persons work with by now.
+        address: Where the DVA listens, if the links are real; a modelled one has no real address.
 
     Attributes:
+        address: Where the DVA listens.
         by_client: The phones by their pages.
         motion_folder: Where the motion of those is kept whose person agrees; None: nowhere.
     """
 
-    def __init__(self, run: Run, clock: PacedClock, console: Callable[[], Console]) -> None:
+    def __init__(
+        self, run: Run, clock: PacedClock, console: Callable[[], Console], address: str | None
+    ) -> None:
         self._run, self._clock, self._console = run, clock, console
+        self.address = address or f"{address_of('dva', 1)}:{DVA_PORT}"
         self.by_client: dict[str, PhoneSeat] = {}
         self.motion_folder: Path | None = None
         self._used: set[int] = set()
-
-    @property
-    def address(self) -> str:
-        """Where the modelled DVA listens."""
-        return f"{address_of('dva', 1)}:{DVA_PORT}"
 
     def seat(self, client: str) -> PhoneSeat | None:
         """The phone of a page, from its first word on; None: there are too many."""

@@ -128,3 +128,13 @@ class Screens:
     ) -> list[Any]:
         place = round(x, 3), round(y, 3), round(heading, 3)
         return [kind, self._numbers[name], *place, doing]
+
+
+def camera_url(base: str, label: str) -> str:
+    """Where a browser finds a robot's pictures."""
+    return f"{base}camera/{label}.mjpg"
+
+
+def topic_of(url: str) -> str | None:
+    """The frames of a console's cameras, whose URL is one for browsers."""
+    return FRAME if url.startswith("http") else None

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.console.link import changed, read, with_link
 from dva_sim.console.real_links import TITLE
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.scenario import Scenario, mean_processing_s
+from dva_sim.simulation.full.stage import Stage
+from dva_sim.simulation.scenario import Scenario, command_timeout_s, mean_processing_s
 
 
 class LinkSliders:
@@ -73,3 +75,18 @@ class LinkSliders:
         for robot in self._run.field.robots.values():
             robot.inbox.service = lambda: seconds
         self._run.audit.expect(seconds)
+
+
+def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
+    """How people's commands are made and sent, by a scenario that says how the link is now."""
+    command = scenario.command
+    return OperatorSetup(
+        pattern=stage.pattern_for,
+        window=command.window,
+        heeds=command.heeds,
+        rate_hz=command.rate_hz,
+        timeout=command_timeout_s(scenario),
+        attempts=command.attempts,
+        guarded=scenario.control == "coordinated",
+        topic=stage.cameras.topic,
+    )

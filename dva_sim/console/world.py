@@ -10,8 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from dva_sim.agents.observation import FRAME, Cameras
-from dva_sim.agents.operator.attention import OperatorSetup
+from dva_sim.agents.observation import Cameras
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
@@ -24,18 +23,14 @@ from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.scene import scene_of
-from dva_sim.console.screens import Screens
+from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
-from dva_sim.console.sliders import LinkSliders
+from dva_sim.console.sliders import LinkSliders, setup_of
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.simulation.scenario import (
-    Scenario,
-    command_timeout_s,
-    phone_profile,
-)
+from dva_sim.simulation.scenario import Scenario, phone_profile
 
 Line = dict[str, Any]
 Tell = Callable[..., object]
@@ -97,10 +92,13 @@ class ConsoleWorld:
         self.sliders = LinkSliders(self.run)
         self.dropped: Callable[[], int] = lambda: 0
         self._console = Console(
-            setup=self._setup(scenario), phone=phone_profile(scenario), reach=self.run.stage.reach
+            setup=setup_of(self.run.stage, scenario),
+            phone=phone_profile(scenario),
+            reach=self.run.stage.reach,
         )
         self._persons: dict[int, PersonAgent] = {}
-        self.phones = Phones(self.run, self.clock, lambda: self._console)
+        real = self.sockets.dva if self.sockets is not None else None
+        self.phones = Phones(self.run, self.clock, lambda: self._console, real)
         self.client_of: dict[int, str] = {}
         for number in range(max(PEOPLE, len(self.run.persons))):
             self.person(number)
@@ -174,20 +172,6 @@ class ConsoleWorld:
         person = self._persons.pop(number)
         person.release(lambda *_: None)
         self.phones.retire(number, person.device)
-
-    def _setup(self, scenario: Scenario) -> OperatorSetup:
-        stage = self.run.stage
-        command = scenario.command
-        return OperatorSetup(
-            pattern=stage.pattern_for,
-            window=command.window,
-            heeds=command.heeds,
-            rate_hz=command.rate_hz,
-            timeout=command_timeout_s(scenario),
-            attempts=command.attempts,
-            guarded=scenario.control == "coordinated",
-            topic=stage.cameras.topic,
-        )
 
     # --- what is told ----------------------------------------------------------------------
 
@@ -313,17 +297,7 @@ class ConsoleWorld:
             ConfigError: what cannot be.
         """
         told, scenario = self.sliders.change(given)
-        self._console = replace(self._console, setup=self._setup(scenario))
+        self._console = replace(self._console, setup=setup_of(self.run.stage, scenario))
         for person in self.persons:
             person.console = self._console
         return told
-
-
-def camera_url(base: str, label: str) -> str:
-    """Where a browser finds a robot's pictures."""
-    return f"{base}camera/{label}.mjpg"
-
-
-def topic_of(url: str) -> str | None:
-    """The frames of a console's cameras, whose URL is one for browsers."""
-    return FRAME if url.startswith("http") else None

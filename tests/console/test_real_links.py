@@ -30,21 +30,25 @@ def becomes(page, true):
 
 
 def drive(page):
-    """Begin to drive, again and again where this machine does much else and holds the robot."""
+    """Begin to drive a robot that is held, again and again where this machine does much else."""
 
     def moves():
         if page.robot().controller.mode is not Mode.TELEOPERATION:
             page.do("start", within=PATIENCE_S)
         return page.robot().body.speed > 0.2
 
-    assert page.do("take", robots=[0], within=PATIENCE_S)[0]
     page.want(0.5)
     becomes(page, moves)
 
 
+def take_and_drive(page):
+    assert page.do("take", robots=[0], within=PATIENCE_S)[0]
+    drive(page)
+
+
 def test_a_robot_is_driven_and_shown_and_no_rule_is_broken(page):
     page.actions.take({"client": "c1", "do": "watch", "robots": [0]})
-    drive(page)
+    take_and_drive(page)
     becomes(page, lambda: any(line["k"] == "frame" for line in page.frames))
     becomes(page, lambda: page.drive()["command_age_ms"] is not None)
     assert page.do("emergency", robots="all", within=PATIENCE_S)[0]
@@ -57,7 +61,7 @@ def test_a_robot_is_driven_and_shown_and_no_rule_is_broken(page):
 def test_a_robot_with_a_slack_watchdog_is_found_out_over_sockets_too(page):
     controller = page.robot().controller
     controller.limits = replace(controller.limits, watchdog=60.0)
-    drive(page)
+    take_and_drive(page)
     becomes(page, lambda: page.world.recorder.violations)
     assert set(page.world.recorder.violations) == {"S1"}
 
@@ -79,6 +83,19 @@ def test_how_long_a_robots_computer_takes_can_be_chosen_all_the_same(page):
     assert page.do("link", processing_s=0.2)[0]
     becomes(page, lambda: page.told("rows")[-1]["link"]["processing_s"] == 0.2)
     assert page.told("rows")[-1]["link"] == {"kind": "real", "processing_s": 0.2}
+
+
+def test_a_phone_registers_and_drives_over_sockets(page):
+    host, _, port = page.world.sockets.dva.partition(":")
+    asked = {"label": "mine", "type": "Teleoperation", "server": host, "port": int(port)}
+    wait = {"within": PATIENCE_S}
+    assert page.told("scene")[0]["dva_address"] == f"{host}:{port}"
+    assert page.do("phone_register", **asked, **wait)[0]
+    assert page.do("phone_devices", **wait)[0]
+    robot = page.robot().device.id_tag
+    assert page.do("phone_permission", device=robot, level="teleoperation", **wait)[0]
+    drive(page)
+    assert not page.world.recorder.violations
 
 
 def test_another_device_joins_over_the_network(page):
