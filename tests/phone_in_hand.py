@@ -34,7 +34,6 @@ class Hand:
     """
 
     def __init__(self, visit: Any, address: str, sensor: bool = True, script: str = "") -> None:
-        self.visit = visit
         self.page: Page = visit.tab()
         self.page.add_init_script(f"({LISTEN})()")
         if script:
