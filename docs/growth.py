@@ -30,7 +30,7 @@ SIZES: dict[str, tuple[int, ...]] = {
     "devices": (100, 1_000, 10_000),
     "rows": (100, 1_000, 10_000, 100_000),
 }
-SECONDS = 20.0  # simulated [s]
+SECONDS = 10.0  # simulated [s]
 ROOM_M = 5.0  # side of the room that each has
 YARD_M = 20.0  # depth of the yard beside the rooms, where it burns
 LATITUDE, LONGITUDE = 38.66, -9.2
@@ -103,7 +103,7 @@ def a_run(kind: str, size: int, folder: Path) -> Costs:
         f"bystander: {{count: {counts['bystanders']}}}",
         "control: supervisory",
         f"horizon_s: {SECONDS}",
-        "events: [{kind: fire, at_s: 5, room: Yard}]",
+        "events: [{kind: fire, at_s: 1, room: Yard}]",
     ]
     if kind == "robots":
         rounds = ((n, n, n % size + 1) for n in range(1, size + 1))

@@ -29,6 +29,7 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
+_ANYWHERE = "robot", "guard"  # whose scenario has a key `way_m`
 _ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5, "phone": 6}
 
 
@@ -179,7 +180,9 @@ def place_of(places: tuple[Pose, ...], number: int, what: str, site: Site) -> Po
     """
     if number > len(places):
         problem = f"site {site.name!r} has {len(places)} {what}s, the scenario needs more"
-        raise ConfigError(problem)
+        word = what.partition(" ")[0]
+        more = f"; {word}.way_m lets {word}s begin elsewhere" if word in _ANYWHERE else ""
+        raise ConfigError(problem + more)
     return places[number - 1]
 
 

@@ -39,7 +39,11 @@ def complaint_of_study(folder, *settings):
             "factors.pattern=[req-rep, pubsub]",
             "pattern 'pubsub' is unknown; did you mean 'pub-sub'?",
         ),
-        ("robot.count=9", "site 'caparica' has 3 robot bases, the scenario needs more"),
+        (
+            "robot.count=9",
+            "site 'caparica' has 3 robot bases, the scenario needs more; "
+            "robot.way_m lets robots begin elsewhere",
+        ),
         ("link.jitter_s=9", "link: jitter_s 9 is above delay_s 0"),
         ("phone.filter=medain", "filter 'medain' is unknown; did you mean 'median'?"),
         ("answer.measure=time_s", "measure 'time_s' is unknown; known: confirmed, drive_time_s"),
