@@ -100,7 +100,7 @@ class Hand:
         self.go("Calibration")
         expect(self.page.get_by_role("button", name="Calibrate", exact=True)).to_be_enabled()
         self.tap("Calibrate")
-        expect(self.status("Calibration")).to_have_text("Calibrated.")
+        expect(self.status("Calibration")).to_contain_text("Calibrated")
 
     def drive(self, robot: str = "robot-1", label: str = "my phone") -> None:
         """Everything up to a robot that listens."""

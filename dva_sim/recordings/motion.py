@@ -76,7 +76,7 @@ class MotionApp:
 
 
 @dataclass
-class Motion:
+class PhoneMotion:
     """What is in a file.
 
     Attributes:
@@ -131,13 +131,13 @@ class MotionWriter:
             self._file.write(line + "\n")
 
 
-def read_motion(path: Path) -> Motion:
+def read_motion(path: Path) -> PhoneMotion:
     """What is in a file of motion.
 
     Raises:
         ConfigError: it is none, or damaged: file and line.
     """
-    motion = Motion()
+    motion = PhoneMotion()
     try:
         with path.open(encoding="utf-8") as file:
             if file.readline().rstrip("\n") != FIRST_LINE:
@@ -151,7 +151,7 @@ def read_motion(path: Path) -> Motion:
     return motion
 
 
-def _take(motion: Motion, line: str, path: Path, number: int) -> None:
+def _take(motion: PhoneMotion, line: str, path: Path, number: int) -> None:
     try:
         if line.startswith(APP):
             motion.apps.append(_app(json.loads(line[len(APP) :])))
@@ -177,7 +177,7 @@ def _app(told: dict[str, Any]) -> MotionApp:
 
 
 def replayed(
-    motion: Motion, looks: Iterator[float] | None = None, rate_hz: float = 10.0
+    motion: PhoneMotion, looks: Iterator[float] | None = None, rate_hz: float = 10.0
 ) -> Iterator[tuple[float, TiltCommand]]:
     """The commands that the apps of a file make of its samples, with their times [s].
 
@@ -198,7 +198,7 @@ def replayed(
 
 
 def _by_app(
-    motion: Motion, app: MotionApp, until: float, looks: Iterator[float] | None, rate_hz: float
+    motion: PhoneMotion, app: MotionApp, until: float, looks: Iterator[float] | None, rate_hz: float
 ) -> Iterator[tuple[float, TiltCommand]]:
     waiting = iter([sample for sample in motion.samples if sample.came >= app.at])
     tilt, sample = _made(app, 0), next(waiting, None)

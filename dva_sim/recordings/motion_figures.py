@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.tilt.accelerometer import GRAVITY
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.recordings.motion import Motion, MotionSample
+from dva_sim.recordings.motion import MotionSample, PhoneMotion
 
 GAP: Final = 3.0  # median intervals: a longer one is a gap
 AT_REST: Final = 2.0  # the quietest stretch of so long counts as rest [s]
@@ -46,7 +46,7 @@ class MotionFigures(NamedTuple):
     largest_g: float
 
 
-def figures_of(motion: Motion, path: Path) -> MotionFigures:
+def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
     """What a file tells.
 
     Raises:

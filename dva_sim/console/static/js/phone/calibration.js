@@ -5,6 +5,7 @@ import { choices, choose } from './choices.js';
 import { isKnown, phone, sendCalibration, tilts } from './drive.js';
 import { Choice, Field, Tick, wrongNumber } from '../ui/fields.js';
 import { WORDS, ask, pose, shown, state } from './sensor.js';
+import { capital } from '../ui/words.js';
 
 const HANDS = /** @type {[string, string][]} */ ([['right', 'right'], ['left', 'left']]);
 const WAYS = /** @type {[string, string][]} */ ([
@@ -36,7 +37,7 @@ export function CalibrationScreen() {
     choose({ ...numbers, reference: tilts.peek() ? pose() : null, calibrated: true });
     const done = await sendCalibration(true);
     if (!isKnown.peek()) tell('Kept on this phone; it counts once you have registered.');
-    else if (done?.ok) tell(choices.peek().keep ? `Calibrated: ${done.text}.` : 'Calibrated.');
+    else if (done?.ok) tell(choices.peek().keep ? `${capital(done.text)}.` : 'Calibrated.');
   };
   return html`<${Sensor} />
     <${Live} />

@@ -10,7 +10,7 @@ const FAIR_MS = 250;
 /** The status, with bars that tell the same as the words. */
 export function LinkStatus() {
   const trip = seat.value?.drives[0]?.round_trip_ms ?? null;
-  const modelled = link.value ? 2 * 1000 * link.value.delay_s : null;
+  const modelled = link.value?.delay_s === undefined ? null : 2 * 1000 * link.value.delay_s;
   const known = trip ?? modelled;
   const [bars, text] = isLinkLost()
     ? [0, 'link lost']
