@@ -5,8 +5,8 @@
     meter.py --only WORD          cases whose name has the word, such as drive or start-up
 
 Both versions are measured by this list of cases and by the same interpreter. A case that one of
-them cannot do is told as such. Under callgrind a command's start is counted only where --only
-names it, since that takes minutes; its CPU time is always there.
+them cannot do is told as such. Under callgrind a command's start and the report are counted only
+where --only names them, since that takes minutes; their CPU time is always there.
 """
 
 from __future__ import annotations
@@ -69,12 +69,14 @@ def measured(roots: Sequence[Path], names: Sequence[str], counter: str) -> list[
     """What cases cost in each version: counted side by side if that takes long, timed in turns."""
     if counter != Callgrind.name:
         return [figures(root, names, counter, REPEATS) for root in roots]
+    brief = [name for name in names if len(names) == 1 or not CASES[name].takes_long]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        counted = list(pool.map(lambda root: figures(root, names, counter, 0), roots))
-    for known, root in zip(counted, roots, strict=True):
-        for name, timed in figures(root, names, Nothing.name, REPEATS).items():
-            known[name]["cpu_s"] = timed.get("cpu_s")
-    return counted
+        counted = list(pool.map(lambda root: figures(root, brief, counter, 0), roots))
+    timed = [figures(root, names, Nothing.name, REPEATS) for root in roots]
+    return [
+        {name: told | known.get(name, {}) for name, told in times.items()}
+        for known, times in zip(counted, timed, strict=True)
+    ]
 
 
 def started(root: Path, names: Iterable[str], counter: str) -> Figures:
@@ -116,9 +118,9 @@ def lines(ours: Figures, theirs: Figures) -> Iterator[str]:
             yield f"{name:38}{unit:>13}  {here['error']}"
             continue
         there: Mapping[str, Any] = theirs.get(name, {})
-        counts = here["instructions"], there.get("instructions")
+        counts = here.get("instructions"), there.get("instructions")
         cells = count(counts[0]), count(counts[1]), change(*counts)
-        cells += milliseconds(here["cpu_s"]), milliseconds(there.get("cpu_s"))
+        cells += milliseconds(here.get("cpu_s")), milliseconds(there.get("cpu_s"))
         yield f"{name:38}{unit:>13}" + "".join(f"{cell:>13}" for cell in cells)
     for name, there in theirs.items():
         if "error" in there:
@@ -128,9 +130,11 @@ def lines(ours: Figures, theirs: Figures) -> Iterator[str]:
 def ratios(found: Figures) -> Iterator[str]:
     """What costs how many times as much as something else, in instructions or else in time."""
     for what, names in RATIOS.items():
-        if all("cpu_s" in found.get(name, {}) for name in names):
-            above, below = (found[name]["instructions"] or found[name]["cpu_s"] for name in names)
-            yield f"{what}: {above / below:.2f}"
+        for measure in ("instructions", "cpu_s"):
+            above, below = (found.get(name, {}).get(measure) for name in names)
+            if above and below:
+                yield f"{what}: {above / below:.2f}"
+                break
 
 
 def echo(root: Path) -> str:
