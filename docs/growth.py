@@ -30,7 +30,7 @@ SIZES: dict[str, tuple[int, ...]] = {
     "devices": (100, 1_000, 10_000),
     "rows": (100, 1_000, 10_000, 100_000),
 }
-SECONDS = 10.0  # simulated [s]
+SECONDS = {"robots": 20.0, "guards": 10.0, "bystanders": 10.0}  # simulated [s]
 ROOM_M = 5.0  # side of the room that each has
 YARD_M = 20.0  # depth of the yard beside the rooms, where it burns
 LATITUDE, LONGITUDE = 38.66, -9.2
@@ -102,7 +102,7 @@ def a_run(kind: str, size: int, folder: Path) -> Costs:
         f"guard: {{count: {counts['guards']}}}",
         f"bystander: {{count: {counts['bystanders']}}}",
         "control: supervisory",
-        f"horizon_s: {SECONDS}",
+        f"horizon_s: {SECONDS[kind]}",
         "events: [{kind: fire, at_s: 1, room: Yard}]",
     ]
     if kind == "robots":
