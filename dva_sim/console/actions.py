@@ -138,6 +138,7 @@ class Actions:
             self._person(client).attended = True
             self._hold()
             return
+        self._phones.leaves(client)
         number = self._seats.stand_up(client)
         if number is not None:
             self._world.person(number).attended = False

@@ -74,6 +74,9 @@ class PhoneActions:
         said, phone = samples_of(line), self._phones.seat(client)
         if said is None or phone is None:
             return
+        if phone.person is None:
+            seat = self._seats.taken.get(client)
+            phone.lend(None if seat is None else self._world.person(seat.number))
         now = time.monotonic()
         if phone.driven is not None and not said.hand:
             self._stop(client, LIFTED)
@@ -82,6 +85,12 @@ class PhoneActions:
         phone.turn(said.orientation)
         if phone.take(said, now):  # a sensor that says the same again and again is silent
             self._seats.heard(client, now, said.hand)
+
+    def leaves(self, client: str) -> None:
+        """A page has left its seat of the console: another one there steers as it likes."""
+        phone = self._phones.by_client.get(client)
+        if phone is not None:
+            phone.lend(None)
 
     def forget(self, client: str) -> None:
         """Its page is gone for good: the device leaves."""

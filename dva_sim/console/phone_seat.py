@@ -40,6 +40,7 @@ class PhoneSeat:
 
     Attributes:
         person: Who it is on the wire; None before it registers.
+        operator: The console's own operator who tilts it, and needs no registration.
         registered: Whether the DVA has agreed.
         settings: How it is calibrated.
         orientation: Of its screen [deg].
@@ -59,6 +60,7 @@ class PhoneSeat:
         self._clock, self._profile_of, self._given_hz = clock, profile, given_hz
         self._attempts = attempts
         self.person: PersonAgent | None = None
+        self.operator: PersonAgent | None = None
         self.registered = False
         self.settings, self.orientation = PhoneSettings(), 0
         self._profile = profile(self.settings)
@@ -73,8 +75,22 @@ class PhoneSeat:
     @property
     def driven(self) -> HeldRobot | None:
         """The robot that is driven with it."""
-        held = self.person.robots.values() if self.person is not None else ()
-        return next((each for each in held if each.is_driven), None)
+        return next((each for each in self._held if each.is_driven), None)
+
+    @property
+    def _held(self) -> list[HeldRobot]:
+        who = self.person or self.operator
+        return [] if who is None else list(who.robots.values())
+
+    def lend(self, operator: PersonAgent | None) -> None:
+        """An operator of the console tilts it from now on, or none any more."""
+        if operator is self.operator:
+            return
+        if self.operator is not None:
+            self.operator.steer_by(None)
+        if operator is not None:
+            operator.steer_by(self.new_tilt)
+        self.operator = operator
 
     @property
     def tilts(self) -> bool:
@@ -185,8 +201,8 @@ class PhoneSeat:
         Args:
             now: Real time [s].
         """
-        person, settings, (level, turn) = self.person, self.settings, self.tilt.shown
-        held = next(iter(person.robots.values()), None) if person is not None else None
+        settings, (level, turn) = self.settings, self.tilt.shown
+        held = next(iter(self._held), None)
         profile, rate = self._profile, self.rate_hz
         fresh = rate is not None and now - self._came < FRESH
         return {

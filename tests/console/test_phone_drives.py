@@ -251,3 +251,37 @@ def test_the_scene_offers_what_a_phone_may_choose(page):
     assert {"median", "one_pole"} <= set(scene["phone"]["filters"])
     assert scene["phone"]["mappings"] == ["absolute", "differential", "leaky"]
     assert CALIBRATION["mapping"] in scene["phone"]["mappings"]
+
+
+def test_the_consoles_own_operator_tilts_a_phone_without_a_registration(monkeypatch):
+    page = PhonePage(monkeypatch)
+    assert page.do("take", robots=[0])[0]
+    held = HeldPhone(page)
+    held.tilt(0.0)
+    page.let(1.0)
+    assert page.calibrate()["ok"]
+    assert page.do("start")[0]
+    held.tilt(20.0)
+    page.let(3.0)
+    assert page.robot().body.speed > 0.2
+    assert page.phone()["registered"] is False
+    assert page.seat()["label"] == "console-1"
+    held.put_away()
+    page.let(2.0)
+    assert page.robot().controller.mode is Mode.IDLE
+    assert not page.world.recorder.violations
+
+
+def test_who_sits_there_next_steers_without_that_phone(monkeypatch):
+    page = PhonePage(monkeypatch)
+    assert page.do("take", robots=[0])[0]
+    held = HeldPhone(page)
+    held.tilt(20.0)
+    page.let(1.0)
+    assert page.do("release")[0]
+    page.let(2.0)
+    assert page.do("take", robots=[0], client="c9")[0]
+    page.let(2.0)
+    assert page.do("start", client="c9")[0]
+    page.let(3.0)
+    assert page.robot().body.speed == pytest.approx(0.0, abs=0.01)

@@ -48,7 +48,7 @@ class PersonAgent:
         tilt: Callable[[], GivenTilt | TiltSources] | None = None,
     ) -> None:
         self.device, self.console = device, console
-        self._tilt = tilt or (lambda: GivenTilt(self.console.phone))
+        self.steer_by(tilt)
         self.attended = False
         self.order: m.Order | None = None
         self.robots: dict[str, HeldRobot] = {}
@@ -66,6 +66,10 @@ class PersonAgent:
         if self.robots:
             return f"holds {' and '.join(held.label for held in self.robots.values())}"
         return "waiting" if self.attended else "nobody there"
+
+    def steer_by(self, tilt: Callable[[], GivenTilt | TiltSources] | None) -> None:
+        """What makes the commands of the next drives; None: what is wanted enters as tilt."""
+        self._tilt = tilt or (lambda: GivenTilt(self.console.phone))
 
     # --- what the person does ------------------------------------------------------------
 
@@ -102,7 +106,7 @@ class PersonAgent:
             held.ask(answers, level)
 
     def _hold(self, robot: str) -> HeldRobot:
-        console, tilt = lambda: self.console, self._tilt
+        console, tilt = lambda: self.console, lambda: self._tilt()
         return HeldRobot(self.device, robot, console, tilt, self._alert, self._let_go)
 
     def release(self, said: Said) -> None:
