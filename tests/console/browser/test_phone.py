@@ -238,9 +238,10 @@ def test_of_two_phones_the_second_is_told_who_drives(hand, world, visits) -> Non
     other.tilt(LEFT_FORWARDS)
     expect(hand.status("Radius")).to_have_text("Radius: 0°")
     expect(other.status("Radius")).to_have_text("Radius: 15°")
-    other.tap("Emergency stop")
+    with other.page.expect_request("**/api/emergency") as asked:
+        other.tap("Emergency stop")
+    assert asked.value.post_data_json["robots"] == [2]  # robot-3, its own, alone
     expect(other.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
-    assert driving(hand)  # it is its own robot alone that was stopped
     other.leave()
 
 
