@@ -143,6 +143,10 @@ class ConsoleWorld:
         for number, when in self.run.field.contained.items():
             self.show({"k": "contain", "t": round(1000 * when), "n": number})
 
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
+
     @property
     def persons(self) -> list[PersonAgent]:
         """Those of all seats, with or without somebody in them."""
@@ -286,7 +290,7 @@ class ConsoleWorld:
         if self.lag.measured(time.monotonic(), behind):
             why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
             self.hold(why)
-            self.recorder.tell(self.clock.now, "console", why, "link")
+            self.note(why)
 
     # --- the link --------------------------------------------------------------------------
 
