@@ -113,7 +113,10 @@ class ConsoleWorld:
         )
         self.guards = PlayedGuards(self.run, self.feed)
         self.recorder.on_applied = self.seat_lines.applied
-        self.hazards = HazardFeed(self.run)
+        field = self.run.field
+        self.hazards = HazardFeed(
+            self.run.stage.site, field.incidents, field.surroundings, field.contained
+        )
         self._newest: dict[str, Any] = {}
         self.clock.on_late = self._late
         self.hold: Callable[[str], object] = lambda _: None
@@ -125,7 +128,12 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
-        scene = scene_of(self.run, self.feed.things, self.name, self.seed)
+        run = self.run
+        scene = scene_of(
+            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            name=self.name,
+            seed=self.seed,
+        )
         scene["link"] = self.sliders.line()
         scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
         self.tell(scene)
