@@ -115,7 +115,10 @@ class ConsoleWorld:
         )
         self.guards = PlayedGuards(self.run, self.feed)
         self.recorder.on_applied = self.seat_lines.applied
-        self.hazards = HazardFeed(self.run)
+        field = self.run.field
+        self.hazards = HazardFeed(
+            self.run.stage.site, field.incidents, field.surroundings, field.contained
+        )
         self.logs = Logs(self.run.network, self._node_of)
         self.logs.keep("dva")
         self._newest: dict[str, Any] = {}
@@ -129,7 +132,12 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
-        scene = scene_of(self.run, self.feed.things, self.name, self.seed)
+        run = self.run
+        scene = scene_of(
+            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            name=self.name,
+            seed=self.seed,
+        )
         scene["link"] = self.sliders.line()
         scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
         self.tell(scene)
@@ -147,6 +155,10 @@ class ConsoleWorld:
         self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
         for number, when in self.run.field.contained.items():
             self.show({"k": "contain", "t": round(1000 * when), "n": number})
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
 
     @property
     def persons(self) -> list[PersonAgent]:
@@ -300,7 +312,7 @@ class ConsoleWorld:
         if self.lag.measured(time.monotonic(), behind):
             why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
             self.hold(why)
-            self.recorder.tell(self.clock.now, "console", why, "link")
+            self.note(why)
 
     # --- the link --------------------------------------------------------------------------
 
