@@ -7,7 +7,7 @@ decides. Whoever falls silent, hides the page or leaves it, asks for standstill 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,10 +144,12 @@ class RobotActions:
                 self.gone(client)
         self._windows.look()
 
-    def stop_all(self) -> None:
-        """Nobody drives on: time stands still, or the machine lags."""
-        for client in list(self._hands):
-            self.gone(client)
+    def stop(self, robots: Iterable[str]) -> None:
+        """Nobody drives these on: an emergency, or time stands still, or the machine lags."""
+        stopped = set(robots)
+        for client, hand in list(self._hands.items()):
+            if hand.robot in stopped:
+                self.gone(client)
 
     # --- faults ------------------------------------------------------------------------
 

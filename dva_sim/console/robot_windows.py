@@ -140,6 +140,10 @@ class RobotWindows:
         }
         return told
 
+    def set_usual(self, id_tag: str, seconds: float) -> None:
+        """A message usually takes a robot's computer so long from now on [s]."""
+        self.by_id[id_tag].faults.usually(lambda: seconds)
+
     def heard(self, id_tag: str, exchange: Exchange) -> None:
         """A robot has heard a message, or has answered one that it had heard before."""
         window, again = self.by_id[id_tag], exchange.number <= self.by_id[id_tag].newest
@@ -205,6 +209,7 @@ class RobotWindows:
             "hand": window.number,
             "holder": self._labels.get(robot.holder[0] or "", robot.holder[0]),
             "stands": stands(robot),
+            "link_lost": robot.controller.mode is Mode.TELEOPERATION and 0.0 < point.until <= now,
             "notice": window.notice,
             "emergency": window.emergency,
             "speed_mps": round(speed, 3),
