@@ -1,5 +1,5 @@
 /** All requests in the order of arrival, one line each; a gap says how many are not shown. */
-import { html, useLayoutEffect, useRef } from '../../vendor/preact.js';
+import { html, useEffect, useRef } from '../../vendor/preact.js';
 import { clockText } from '../ui/words.js';
 
 const HEADS = ['No.', 'Time', 'Kind', 'From', 'To', 'Session', 'Reply', 'Service', 'Payload'];
@@ -12,7 +12,7 @@ const NEAR_PX = 40;
 export function RequestTable({ rows, chosen, onChoose, older }) {
   const box = useRef(/** @type {HTMLDivElement | null} */ (null));
   const atEnd = useRef(true);
-  useLayoutEffect(() => {
+  useEffect(() => {
     if (atEnd.current && box.current) box.current.scrollTop = box.current.scrollHeight;
   }, [rows]);
   const onScroll = () => {
