@@ -21,7 +21,7 @@ Line = dict[str, Any]
 
 
 @dataclass
-class Hand:
+class PageHand:
     """A page that has a robot in hand.
 
     Attributes:
@@ -59,7 +59,7 @@ class RobotActions:
     ) -> None:
         self._windows, self._robot, self._why_not = windows, robot, why_not
         self._labels, self._deaf, self._slow = labels, deaf, slow
-        self._hands: dict[str, Hand] = {}  # by client
+        self._hands: dict[str, PageHand] = {}  # by client
         self._count = 0
         self.doers: Mapping[str, Callable[[str, Line, Said], object]] = {
             "manual_take": self._take,
@@ -83,7 +83,7 @@ class RobotActions:
         if mine is None or mine.robot != robot or window.number is None:
             self._count += 1
             window.number, window.notice = self._count, ""
-            self._hands[client] = Hand(robot)
+            self._hands[client] = PageHand(robot)
         said(True, "manual control is yours", hand=window.number)
 
     def _must(self, decision: Decision) -> None:
@@ -104,7 +104,7 @@ class RobotActions:
             self._let_go(client, hand)
         said(True, "released")
 
-    def _let_go(self, client: str, hand: Hand) -> None:
+    def _let_go(self, client: str, hand: PageHand) -> None:
         del self._hands[client]
         window = self._windows.by_id[hand.robot]
         if window.hand.let_go(client).code == m.OK:
@@ -122,7 +122,7 @@ class RobotActions:
         else:
             self._drive(client, hand, 0.0, 0.0)
 
-    def _drive(self, client: str, hand: Hand, speed: float, turn: float) -> None:
+    def _drive(self, client: str, hand: PageHand, speed: float, turn: float) -> None:
         window = self._windows.by_id[hand.robot]
         spec = window.robot.body.spec
         wanted = speed * spec.max_speed, turn * spec.max_turn_rate

@@ -30,7 +30,7 @@ WHEEL = 1 / 3  # radius of a wheel, as a share of that of the footprint; assumed
 SENSING = 1.0  # from one look at the sensors to the next [s]
 
 
-class Station(Protocol):
+class RobotStation(Protocol):
     """How far a robot has come: off, registered, listening."""
 
     def line(self) -> Line:
@@ -48,7 +48,7 @@ class AlwaysListening:
         self._robot = robot
 
     def line(self) -> Line:
-        """See `Station`."""
+        """See `RobotStation`."""
         device = self._robot.device
         state = "off" if device.silent else "listening"
         return {"state": state, "address": device.address, "dva": None, "problem": ""}
@@ -72,7 +72,7 @@ class RobotWindow:
     """
 
     robot: RobotAgent
-    station: Station
+    station: RobotStation
     faults: RobotFaults
     hand: ManualControl
     number: int | None = None
