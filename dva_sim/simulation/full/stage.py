@@ -30,7 +30,16 @@ from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
 _ANYWHERE = "robot", "guard"  # whose scenario has a key `way_m`
-_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5, "phone": 6}
+_ROOMS = {
+    "dva": 0,
+    "robot": 1,
+    "guard": 2,
+    "operator": 3,
+    "detector": 4,
+    "console": 5,
+    "phone": 6,
+    "fake": 15,
+}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -142,8 +151,8 @@ class Stage:
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
-        """What a robot can do, by its id, as its operator has been taught."""
-        spec = self._specs[robot]
+        """What a robot can do, by its id, as its operator has been taught: of a stranger, as ours."""
+        spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
     def device(self, kind: str, number: int) -> AgentDevice:
