@@ -1,6 +1,7 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
 import { clock, connection, notice, scene } from '../store.js';
+import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
@@ -15,12 +16,14 @@ import { addressOf, page } from './route.js';
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
+  devices: DevicesPage,
   drive: DrivePage,
   network: NetworkPage,
 });
