@@ -48,7 +48,9 @@
  *   faults: {processing_s: number | null, replies: boolean, freeze: boolean, camera: boolean},
  *   sensors: SensorShown[]}} RobotWindow
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
- *   people: {i: number, doing: string}[], order?: Order | null}} Rows
+ *   people: {i: number, doing: string}[], order?: Order | null, server?: Server}} Rows
+ * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
+ *   own?: boolean}} Server
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard

@@ -1,7 +1,7 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
-import { connection, events, guard, hazards, pictures, rows, scene, seat, story, tracks, windows, you } from '../store.js';
+import { connection, devices, events, guard, hazards, pictures, rows, scene, seat, story, tracks, windows, you } from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -35,6 +35,7 @@ const LINES = {
     rememberClient(line.client);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
+  devices: (line) => (devices.value = line.devices),
   log: hearLog,
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),

@@ -1,6 +1,7 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
 import { clock, connection, notice, scene } from '../store.js';
+import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
@@ -16,6 +17,7 @@ import { addressOf, page } from './route.js';
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
   ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
@@ -23,6 +25,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
+  devices: DevicesPage,
   robots: RobotsPage,
   drive: DrivePage,
   network: NetworkPage,
