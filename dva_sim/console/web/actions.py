@@ -126,6 +126,9 @@ ACTIONS: Known = {
     "tour": ({}, ()),
     "manual_take": ({"robot": robot}, ("robot",)),
     "manual_release": ({}, ()),
+    "robot_register": ({"robot": robot, "dva": text(3, 80)}, ("robot", "dva")),
+    "robot_listen": ({"robot": robot}, ("robot",)),
+    "robot_off": ({"robot": robot}, ("robot",)),
     "fault": (_FAULT, ("robot", "what", "on")),
     "phone_register": (_REGISTER, tuple(_REGISTER)),
     "phone_devices": ({}, ()),
@@ -160,7 +163,7 @@ SILENT: Known = {
 NOT_BY_PHONE = (
     *("take", "link", "pattern", "pace", "tour"),
     *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
-    *("manual_take", "manual", "fault"),
+    *("manual_take", "manual", "fault", "robot_register", "robot_listen", "robot_off"),
 )
 
 

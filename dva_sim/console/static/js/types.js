@@ -24,7 +24,7 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, dva_address?: string, phone?: PhoneOffer}} Scene
+ *   pages?: string[], lag_limit_s: number, dva_address?: string, phone?: PhoneOffer}} Scene
  * @typedef {{pipelines: Record<string, any>, filters: string[], mappings: string[],
  *   speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number}} PhoneOffer
  *

@@ -38,7 +38,7 @@ export function showApp(where) {
 }
 
 function App() {
-  const Page = BODIES[page.value];
+  const Page = BODIES[shown()];
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
     <div class="body"><${Warnings} /><${Tour} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
@@ -51,13 +51,25 @@ function skip(event) {
   document.getElementById('main')?.focus();
 }
 
+/** The pages that there are to go to: all, unless what runs has but some. */
+function pages() {
+  const some = scene.value?.pages;
+  return some ? PAGES.filter(([name]) => some.includes(name)) : PAGES;
+}
+
+/** The page that the address names, or the first that there is. */
+function shown() {
+  const names = pages().map(([name]) => name);
+  return names.includes(page.value) ? page.value : (scene.value?.pages?.[0] ?? names[0]);
+}
+
 function Rail() {
   return html`<nav class="rail" aria-label="Pages">
-    ${PAGES.map(
+    ${pages().map(
       ([name, title, icon]) => html`<a href=${addressOf(name)}
-        aria-current=${page.value === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
+        aria-current=${shown() === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
     )}
-    <${PhoneButton} /><${TourButton} />
+    ${!scene.value?.pages && html`<${PhoneButton} /><${TourButton} />`}
   </nav>`;
 }
 
