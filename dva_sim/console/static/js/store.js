@@ -35,6 +35,8 @@ export const you = signal(null);
 export const selection = signal(null);
 /** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
 export const connection = signal('connecting');
+/** Whether the socket is open on which the person's hand reaches the world. */
+export const reaches = signal(false);
 /** Why there are no camera pictures; empty while there are. */
 export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
@@ -59,7 +61,9 @@ export const robots = computed(
 /** Whether this page's address is one for driving, or for a phone. */
 export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
 /** Whether anything can be steered now. */
-export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
+export const maySteer = computed(
+  () => mayDrive.value && connection.value === 'open' && reaches.value,
+);
 
 const robotRows = computed(
   () => new Map((rows.value?.robots ?? []).map((row) => [row.i, row])),
