@@ -14,8 +14,8 @@ from contextlib import suppress
 from typing import Any
 
 MOST_WAITING = 64  # lines
-NEWEST_ONLY = frozenset({"pos", "frame", "seat", "rows", "hazards", "events"})
-KEPT = frozenset({"scene", "done", "bye", "contain"})  # lines that are never dropped
+NEWEST_ONLY = frozenset({"pos", "frame", "seat", "rows", "hazards", "events", "told"})
+KEPT = frozenset({"scene", "shelf", "done", "bye", "contain"})  # lines that are never dropped
 MOST_LINE = 1 << 20  # of one that is read [B]
 AT_ONCE = 1 << 16  # that are read [B]
 

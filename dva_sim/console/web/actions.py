@@ -106,6 +106,8 @@ ACTIONS: Known = {
     "link": (_LINK, ()),
     "pattern": ({"robot": robot, "name": word}, ("robot", "name")),
     "pace": ({"factor": number(0.01, 1000), "paused": flag}, ()),
+    "seek": ({"t_ms": whole(0, 10**10)}, ("t_ms",)),
+    "open_recording": ({"name": text(1, 255)}, ("name",)),
     "confirm": ({}, ()),
     "refute": ({}, ()),
     "decline": ({}, ()),
@@ -136,7 +138,7 @@ SILENT: Known = {
     "gone": ({}, ()),
 }
 # A phone changes nothing for others, but that it stops a robot.
-NOT_BY_PHONE = ("take", "link", "pattern", "pace", "tour")
+NOT_BY_PHONE = ("take", "link", "pattern", "pace", "tour", "seek", "open_recording")
 
 
 def check_role(role: Role, name: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
@@ -22,6 +23,7 @@ from dva_sim.console.web.access import Asked, Entrance, Role
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
+from dva_sim.console.web.report import Report
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.web.streaming import PictureStream
@@ -233,6 +235,7 @@ def make_app(
     cameras: CameraStreams,
     files: StaticFiles,
     door: PhoneDoor | None = None,
+    report: Path | None = None,
 ) -> ASGIApp:
     """The whole application.
 
@@ -242,7 +245,9 @@ def make_app(
         cameras: Pictures.
         files: Of the pages.
         door: Where phones come in, if they do.
+        report: A study's report that is shown as it is.
     """
+    told = Report(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
 
     async def see(ws: WebSocket) -> None:
@@ -259,6 +264,7 @@ def make_app(
         Route("/api/phones.svg", _for(Role.DRIVE, phones.code)),
         Route("/static/{name:path}", pages.file),
         Route(OPEN, pages.health),
+        Route("/report", told.page),
         Route("/camera/{label:path}.mjpg", pages.stream),
         Route("/camera/{label:path}.jpg", pages.still),
         Route("/api/state", rest.state),

@@ -1,6 +1,8 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
-import { connection, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import {
+  connection, events, guard, hazards, pictures, rows, scene, seat, shelf, story, tracks, you,
+} from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -18,9 +20,14 @@ const LINES = {
     tracks.put(line.p, performance.now());
     tracks.drop(line.gone ?? []);
   },
-  rows: (line) => (rows.value = line),
+  rows: (line) => {
+    if (line.clock?.jumps !== rows.value?.clock?.jumps) tracks.jump();
+    rows.value = line;
+  },
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
+  told: (line) => (story.value = line.lines),
+  shelf: (line) => (shelf.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
     if (isMine(line)) seat.value = line;
