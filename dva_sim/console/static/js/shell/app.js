@@ -9,6 +9,7 @@ import { CameraPage } from '../replay/camera_page.js';
 import { ReplayBar } from '../replay/replay_bar.js';
 import { ShelfPage } from '../replay/shelf_page.js';
 import { StoryPage } from '../replay/story_page.js';
+import { RequestsPage } from '../requests/requests_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -17,6 +18,7 @@ import { addressOf, page } from './route.js';
 
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
@@ -29,6 +31,7 @@ const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
 const SHELF = /** @type {[string, string, string]} */ (['recordings', 'Recordings', 'play']);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
+  main: RequestsPage,
   drive: DrivePage,
   network: NetworkPage,
   story: StoryPage,
