@@ -23,6 +23,7 @@ from dva_sim.simulation.scenario import robot_profiles
 
 Line = dict[str, Any]
 GONE = 1.0  # whoever was not seen for so long has left the site [s]
+ROUNDED = 0.0005  # pages know moments to the millisecond [s]
 STORY_KEPT = 200  # lines of the story up to a moment
 MOST_MARKS = 400  # moments to jump to
 MARKED = ("event", "drive", "safety", "order")  # kinds of moments that are worth a jump
@@ -242,7 +243,7 @@ class RecordedRun:
 
     def story(self, now: float) -> Line:
         """What was told up to a moment."""
-        end = bisect_right(self._moments, now)
+        end = bisect_right(self._moments, now + ROUNDED)
         told = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
         lines = [{"t": _ms(m.time), "who": m.who, "what": m.what, "kind": m.kind} for m in told]
         return {"k": "told", "t": _ms(now), "lines": lines}
@@ -284,7 +285,7 @@ class RecordedRun:
 
 def event_at(event: Event, now: float) -> Event | None:
     """An event as it stood at a moment; None if it was not known yet."""
-    times = {step: time for step, time in event.times.items() if time <= now}
+    times = {step: time for step, time in event.times.items() if time <= now + ROUNDED}
     if "detected" not in times:
         return None
     if "closed" in times:

@@ -23,7 +23,7 @@ from dva_sim.console.web.access import Asked, Entrance, Role
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
-from dva_sim.console.web.report import Report
+from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.web.streaming import PictureStream
@@ -247,7 +247,7 @@ def make_app(
         door: Where phones come in, if they do.
         report: A study's report that is shown as it is.
     """
-    told = Report(report)
+    told = StudyReport(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
 
     async def see(ws: WebSocket) -> None:

@@ -11,7 +11,7 @@ from starlette.responses import HTMLResponse, Response
 from dva_sim.console.web.rest import NOT_KEPT
 
 
-class Report:
+class StudyReport:
     """A study's report: one file with styles and pictures of its own, and no scripts.
 
     Args:
