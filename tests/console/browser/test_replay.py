@@ -48,7 +48,7 @@ def shown(page: Page) -> float:
     return 3600 * int(hours) + 60 * int(minutes) + int(seconds)
 
 
-def test_a_recording_plays_stands_and_jumps(visit, address, folder: Path) -> None:
+def test_a_recording_plays_stands_and_jumps(address, visit, folder: Path) -> None:
     page = visit.open(address("replay", folder / "drill.mcap", "--console"))
     expect(page.get_by_role("region", name="Replay")).to_be_visible()
     becomes(lambda: shown(page) >= 1)
@@ -71,7 +71,7 @@ def test_a_recording_plays_stands_and_jumps(visit, address, folder: Path) -> Non
     becomes(lambda: shown(page) > there)
 
 
-def test_nothing_in_it_can_be_told_to_act(visit, address, folder: Path) -> None:
+def test_nothing_in_it_can_be_told_to_act(address, visit, folder: Path) -> None:
     page = visit.open(address("replay", folder / "drill.mcap", "--console"))
     expect(page.get_by_role("region", name="Replay")).to_be_visible()
 
@@ -82,7 +82,7 @@ def test_nothing_in_it_can_be_told_to_act(visit, address, folder: Path) -> None:
     expect(page.get_by_role("region", name="Map")).to_be_visible()
 
 
-def test_two_people_see_the_same_moment(visits, address, folder: Path) -> None:
+def test_two_people_see_the_same_moment(address, visits, folder: Path) -> None:
     where = address("replay", folder / "drill.mcap", "--console")
     one, two = visits().open(where), visits().open(where)
     one.get_by_role("button", name="Pause").click()
@@ -92,7 +92,7 @@ def test_two_people_see_the_same_moment(visits, address, folder: Path) -> None:
     expect(two.get_by_role("button", name="Play")).to_be_visible()
 
 
-def test_a_line_of_the_story_leads_to_its_moment(visit, address, folder: Path) -> None:
+def test_a_line_of_the_story_leads_to_its_moment(address, visit, folder: Path) -> None:
     page = visit.open(address("replay", folder / "drill.mcap", "--console"))
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("link", name="Story").click()
@@ -106,7 +106,7 @@ def test_a_line_of_the_story_leads_to_its_moment(visit, address, folder: Path) -
     becomes(lambda: shown(page) == 60 * minutes + seconds)
 
 
-def test_the_camera_shows_a_picture_with_its_age(visit, address, folder: Path) -> None:
+def test_the_camera_shows_a_picture_with_its_age(address, visit, folder: Path) -> None:
     page = visit.open(address("replay", folder / "drive.mcap", "--console"))
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("link", name="Camera").click()
@@ -118,7 +118,7 @@ def test_the_camera_shows_a_picture_with_its_age(visit, address, folder: Path) -
 
 
 def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
-    visit, address, folder: Path
+    address, visit, folder: Path
 ) -> None:
     where = address("console", "--results", folder)
     page = visit.tab()
@@ -139,7 +139,7 @@ def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
 def test_axe_finds_nothing_serious_and_all_fits(
-    visits, address, folder: Path, scheme: str, width: int
+    address, visits, folder: Path, scheme: str, width: int
 ) -> None:
     page = visits(width, 800, color_scheme=scheme).tab()
     page.goto(address("console", "--results", folder))
