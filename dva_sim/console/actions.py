@@ -56,6 +56,7 @@ class Actions:
             "tour": self._tour,
             **self._phones.doers,
             **GuardActions(world).doers,
+            **world.dva.doers,
         }
 
     def take(self, line: Line) -> None:
@@ -288,6 +289,7 @@ class Actions:
     def _look(self, logs: Any, tables: Any) -> None:
         if isinstance(logs, dict) and isinstance(tables, list):
             self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
+            self._world.dva.looked = "devices" in tables
 
 
 def _nobody(ok: bool, text: str) -> None:

@@ -15,6 +15,7 @@ from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
@@ -38,7 +39,13 @@ Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
-POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next, real time [s]
+POSITIONS, ROWS, HAZARDS, DEVICES, TIDY = (
+    0.1,
+    0.5,
+    1.0,
+    1.0,
+    1.0,
+)  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -58,6 +65,7 @@ class ConsoleWorld:
         sockets: What carries the messages, if the links are real.
         run: The run.
         logs: What devices are asked, and answer.
+        dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
 
@@ -114,6 +122,7 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
         self.hazards = HazardFeed(
@@ -132,6 +141,18 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
+        self.tell_scene()
+        self.show_scene()
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(ROWS, self._tell_rows)
+        self.clock.pulse(HAZARDS, self._tell_hazards)
+        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(DEVICES, self._tell_devices)
+        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def tell_scene(self) -> None:
+        """Tell what does not change, but for where the DVA listens."""
         run = self.run
         scene = scene_of(
             *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
@@ -141,13 +162,10 @@ class ConsoleWorld:
         scene["link"] = self.sliders.line()
         scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
         self.tell(scene)
-        self.show_scene()
-        self.clock.pulse(POSITIONS, self._tell_positions)
-        self.clock.pulse(ROWS, self._tell_rows)
-        self.clock.pulse(HAZARDS, self._tell_hazards)
-        self.clock.pulse(SOON, self._tell_news)
-        self.clock.pulse(PERIOD, self._tell_logs)
-        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def _dva_moved(self, address: str) -> None:
+        self.phones.address = address
+        self.tell_scene()
 
     def show_scene(self) -> None:
         """Tell whoever draws, from the beginning, what there is to be seen."""
@@ -213,6 +231,7 @@ class ConsoleWorld:
             "clock": self.clock_line(),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
+            "server": self.dva.port.line(),
             "robots": self.feed.robots(self.lag.held),
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
@@ -223,6 +242,11 @@ class ConsoleWorld:
         """Something has changed that nobody shall wait for."""
         self._tell_rows()
         self._tell_seats()
+
+    def _tell_devices(self) -> None:
+        line = self.dva.devices(self.feed.now_ms)
+        if line is not None:
+            self.tell(line)
 
     def _tell_logs(self) -> None:
         for line in self.logs.batches():

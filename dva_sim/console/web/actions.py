@@ -69,6 +69,12 @@ _REGISTER = {
     "label": _LABEL,
     "type": one_of("Robot", "Remote Control", "Teleoperation"),
 }
+_FAKE = {
+    "label": _LABEL,
+    "type": one_of("Robot", "Guard", "TeleOp", "Remote Control"),
+    "address": text(0, 64),
+    "id_tag": text(0, 17),
+}
 _PERMISSION = {"device": word, "level": one_of("teleoperation", "missions", "both")}
 _CALIBRATE = {
     "reference_mps2": maybe(_AXES),
@@ -116,6 +122,11 @@ ACTIONS: Known = {
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
     "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key not in _OPTIONAL)),
+    "server_start": ({"port": whole(1, 65_534)}, ("port",)),
+    "server_stop": ({}, ()),
+    "revoke": ({"device": word}, ("device",)),
+    "fake_add": (_FAKE, ("label", "type")),
+    "fake_remove": ({"device": word}, ("device",)),
     "guard_join": ({"guard": _LABEL}, ("guard",)),
     "guard_leave": ({}, ()),
     "guard_answer": ({"accept": flag, "reason": text(0, 200)}, ("accept", "reason")),
@@ -138,7 +149,10 @@ SILENT: Known = {
     "gone": ({}, ()),
 }
 # A phone changes nothing for others, but that it stops a robot.
-NOT_BY_PHONE = ("take", "link", "pattern", "pace", "tour", "seek", "open_recording")
+NOT_BY_PHONE = (
+    *("take", "link", "pattern", "pace", "tour", "seek", "open_recording"),
+    *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
+)
 
 
 def check_role(role: Role, name: Any) -> None:

@@ -22,6 +22,7 @@ from starlette.websockets import WebSocket
 from dva_sim.console.web.access import Asked, Entrance, Role
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
 from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
@@ -249,6 +250,7 @@ def make_app(
     """
     told = StudyReport(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
+    logs = LogRequests(hub)
 
     async def see(ws: WebSocket) -> None:
         await hub.see(ws, ws.scope[ROLE])
@@ -270,6 +272,9 @@ def make_app(
         Route("/api/state", rest.state),
         Route("/api/site", rest.site),
         Route("/api/story", rest.story),
+        Route("/api/logs/{name}", _for(Role.LOOK, logs.lines)),
+        Route("/api/logs/{name}/export", _for(Role.DRIVE, logs.export)),
+        Route("/api/logs/{name}/{number:int}", _for(Role.DRIVE, logs.entry)),
         Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
         Route("/api/emergency", _for(Role.PHONE, rest.emergency), methods=["POST"]),
         WebSocketRoute("/ws/state", see),

@@ -1,6 +1,7 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
 import { clock, connection, isPast, notice, replay, scene, shelf } from '../store.js';
+import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
@@ -19,6 +20,7 @@ import { addressOf, page } from './route.js';
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
@@ -32,6 +34,7 @@ const SHELF = /** @type {[string, string, string]} */ (['recordings', 'Recording
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
+  devices: DevicesPage,
   drive: DrivePage,
   network: NetworkPage,
   story: StoryPage,
