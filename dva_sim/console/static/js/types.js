@@ -23,7 +23,7 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, dva_address?: string, phone?: PhoneOffer}} Scene
+ *   lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer}} Scene
  * @typedef {{pipelines: Record<string, any>, filters: string[], mappings: string[],
  *   speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number}} PhoneOffer
  *
@@ -32,7 +32,7 @@
  *   holder: string | null, holder_label?: string | null, session_age_s?: number | null,
  *   watchdog_left_s: number | null, stands: string, set_speed_mps: number,
  *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
- *   refused: number}} RobotRow
+ *   refused: number, camera?: string | null, sensors?: string[]}} RobotRow
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
  *   people: {i: number, doing: string}[], order?: Order | null, server?: Server}} Rows
  * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
