@@ -7,6 +7,7 @@ import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
 import { RequestsPage } from '../requests/requests_page.js';
+import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -17,14 +18,16 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
   ['devices', 'Devices', 'router'],
+  ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
-const NOT_ATTACHED = ['drive', 'network']; // what sends is absent where only messages are known
+const NOT_ATTACHED = ['robots', 'drive', 'network']; // what sends is absent where only messages are known
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
   devices: DevicesPage,
+  robots: RobotsPage,
   drive: DrivePage,
   network: NetworkPage,
 });
