@@ -102,6 +102,14 @@ _REPORT = {
 }
 _SAYINGS = ("departed", "arrived", "confirmed", "refuted", "contained", "help")
 
+_FAULT = {
+    "robot": robot,
+    "what": one_of("processing", "replies", "freeze", "camera", "sensor"),
+    "on": flag,
+    "seconds": number(0, 3),
+    "sensor": word,
+}
+
 # What may be asked: its arguments, and those of them that have to be there.
 ACTIONS: Known = {
     "take": ({"robots": robots}, ("robots",)),
@@ -118,6 +126,9 @@ ACTIONS: Known = {
     "refute": ({}, ()),
     "decline": ({}, ()),
     "tour": ({}, ()),
+    "manual_take": ({"robot": robot}, ("robot",)),
+    "manual_release": ({}, ()),
+    "fault": (_FAULT, ("robot", "what", "on")),
     "phone_register": (_REGISTER, tuple(_REGISTER)),
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
@@ -134,17 +145,16 @@ ACTIONS: Known = {
     "guard_place": (_PLACE, tuple(_PLACE)),
     "guard_report": (_REPORT, tuple(_REPORT)),
 }
+_INPUT = {
+    "n": whole(0, 2**53),
+    "speed": number(0, 1),
+    "turn": number(-1, 1),
+    "held": flag,
+}
 # Those that have no answer.
 SILENT: Known = {
-    "input": (
-        {
-            "n": whole(0, 2**53),
-            "speed": number(0, 1),
-            "turn": number(-1, 1),
-            "held": flag,
-        },
-        ("n", "speed", "turn", "held"),
-    ),
+    "input": (_INPUT, tuple(_INPUT)),
+    "manual": (_INPUT, tuple(_INPUT)),
     "samples": (_SAMPLES, tuple(_SAMPLES)),
     "gone": ({}, ()),
 }
@@ -152,6 +162,7 @@ SILENT: Known = {
 NOT_BY_PHONE = (
     *("take", "link", "pattern", "pace", "tour", "seek", "open_recording"),
     *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
+    *("manual_take", "manual", "fault"),
 )
 
 

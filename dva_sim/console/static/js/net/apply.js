@@ -2,7 +2,8 @@
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
 import {
-  connection, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story, tracks, you,
+  connection, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story, tracks,
+  windows, you,
 } from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
@@ -25,6 +26,7 @@ const LINES = {
     if (line.clock?.jumps !== rows.value?.clock?.jumps) tracks.jump();
     rows.value = line;
   },
+  robot: (line) => (windows.value = new Map(windows.value).set(line.i, line)),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
   told: (line) => (story.value = line.lines),
@@ -68,6 +70,7 @@ function snap(line) {
   story.value = [];
   seat.value = null;
   guard.value = null;
+  windows.value = new Map();
   const { pos, story: told, ...others } = line.state ?? {};
   if (pos) LINES.pos({ p: pos });
   if (told) story.value = told.slice(-STORY_KEPT);

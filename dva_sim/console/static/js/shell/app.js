@@ -1,6 +1,8 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
-import { clock, connection, isPast, notice, replay, scene, shelf } from '../store.js';
+import {
+  clock, connection, isAttached, isPast, notice, replay, rows, scene, shelf,
+} from '../store.js';
 import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
@@ -11,6 +13,7 @@ import { ReplayBar } from '../replay/replay_bar.js';
 import { ShelfPage } from '../replay/shelf_page.js';
 import { StoryPage } from '../replay/story_page.js';
 import { RequestsPage } from '../requests/requests_page.js';
+import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -21,9 +24,11 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
   ['devices', 'Devices', 'router'],
+  ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
+const NOT_ATTACHED = ['robots', 'drive', 'network']; // what sends is absent where only messages are known
 // What sends something is not there in a recording.
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
@@ -35,6 +40,7 @@ const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
   devices: DevicesPage,
+  robots: RobotsPage,
   drive: DrivePage,
   network: NetworkPage,
   story: StoryPage,
@@ -64,6 +70,7 @@ function skip(event) {
 
 /** The pages that there are to go to. */
 function pages() {
+  if (isAttached.value) return PAGES.filter(([name]) => !NOT_ATTACHED.includes(name));
   if (!isPast.value) return PAGES;
   const some = replay.value ? OF_A_RECORDING : [];
   return shelf.value ? [...some, SHELF] : some;
@@ -106,6 +113,8 @@ function Warnings() {
     ${connection.value === 'lost' &&
     html`<p class="warning">The connection to the world is lost; what you see is old. Robots that
       you drove have been stopped. Trying again …</p>`}
+    ${rows.value?.server?.own === false && !rows.value.server.listens &&
+    html`<p class="warning">The DVA at ${rows.value.server.address} does not answer: what you see is old. Asking again …</p>`}
     ${ended && html`<p class="warning">The world has ended: ${connection.value}</p>`}
     ${notice.value &&
     html`<p class="warning">${notice.value} <button type="button" class="plain"

@@ -1,7 +1,7 @@
 /** What is always in sight: time, link, age of the data, alarms, who one is, emergency stop. */
 import { html } from '../../vendor/preact.js';
 import {
-  clock, connection, isModelled, isPast, link, maySteer, replay, you,
+  clock, connection, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,
 } from '../store.js';
 import { act, emergencyStop } from '../net/actions.js';
 import { roundTrip } from '../net/round_trip.js';
@@ -53,7 +53,8 @@ function Link() {
   }
   if (!isModelled.value) {
     return html`<span class="item link" role="status" aria-label="Link"
-      title="Sockets lie between the console and the robots, not a model">real</span>`;
+      title=${isAttached.value ? 'What is shown runs elsewhere; here is known what messages tell' : 'Sockets lie between the console and the robots, not a model'}>
+      ${isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
   }
   const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
   const trace = setting?.trace ? `, ${setting.trace}` : '';
