@@ -22,6 +22,7 @@ let count = NaN;
 let asked = 0;
 /** @type {number[]} */
 let watched = [];
+let looked = { logs: {}, tables: /** @type {string[]} */ ([]) };
 
 /** @param {string} path */
 function address(path) {
@@ -55,6 +56,7 @@ export function connect() {
     unheard = 0;
     stopAsking = keepAsking(tell);
     tell({ do: 'watch', robots: watched });
+    if (isLooking()) tell({ do: 'look', ...looked });
   };
   socket.onmessage = (event) => {
     unheard = 0;
@@ -98,6 +100,18 @@ export function watch(robots) {
   watched = robots;
   tell({ do: 'watch', robots });
 }
+
+/**
+ * Say which logs are looked at, each with its filter, and which tables.
+ * @param {Record<string, object>} logs
+ * @param {string[]} tables
+ */
+export function look(logs, tables) {
+  looked = { logs, tables };
+  tell({ do: 'look', ...looked });
+}
+
+const isLooking = () => looked.tables.length > 0 || Object.keys(looked.logs).length > 0;
 
 /** Open the socket for driving whenever this page may, under the name that it has got. */
 export function keepDriveSocket() {

@@ -5,6 +5,7 @@ import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
+import { RequestsPage } from '../requests/requests_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -13,11 +14,13 @@ import { addressOf, page } from './route.js';
 
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
+  main: RequestsPage,
   drive: DrivePage,
   network: NetworkPage,
 });
