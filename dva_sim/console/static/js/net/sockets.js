@@ -37,7 +37,8 @@ export function connect() {
   count = NaN;
   state = socket;
   let stopAsking = () => {};
-  let unheard = 0;
+  let unheard = 0; // looks
+  let first = true;
   const end = (/** @type {{code?: number, reason?: string}} */ why) => {
     stopAsking();
     window.clearInterval(look);
@@ -60,8 +61,9 @@ export function connect() {
   };
   socket.onmessage = (event) => {
     unheard = 0;
+    if (first) connection.value = 'open';
+    first = false;
     wait = FIRST_WAIT_MS;
-    connection.value = 'open';
     receive(JSON.parse(event.data));
   };
   socket.onclose = end;
