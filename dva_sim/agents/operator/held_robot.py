@@ -239,7 +239,11 @@ class HeldRobot:
             attempts = self.device.attempts
             said(False, f"{self.label}: {self._silence()} after {attempts} attempts")
 
+        def waits(why: str) -> None:
+            self._alert(f"{self.label} does not start yet: {why}")
+
         def begun() -> None:
+            self._alert("")
             self._begin(log)
             said(True, f"{self.label} is driven")
 
@@ -252,6 +256,7 @@ class HeldRobot:
             begun=begun,
             refused=refused,
             lost=lost,
+            waits=waits,
         )
 
     def _begin(self, log: DriveLog) -> None:

@@ -69,7 +69,7 @@ class Client:
     def __init__(self, name: str, role: Role, state: RunState, page: str = "") -> None:
         self.name, self.role, self.page = name, role, page
         self.ws: WebSocket | None = None
-        self.feed = PageFeed(state, name, role.acts)
+        self.feed = PageFeed(state, name, role >= Role.DRIVE)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
         self.driver: Driver | None = None
@@ -106,7 +106,7 @@ class Clients:
         known = self._all.get(name)
         if known is not None and known.role is role and _may_come_again(known, page):
             known.is_here, known.page = True, page
-            known.feed = PageFeed(self._state, known.name, role.acts)
+            known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
             return known
         self._count += 1
         client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state, page)

@@ -29,6 +29,7 @@ OVER_THE_LINK = (
     "phone_register",
     "phone_devices",
     "phone_permission",
+    "fake_add",
     "guard_say",
     "guard_report",
 )
@@ -127,8 +128,11 @@ class Simulation:
         return self._pipe.send(asked)
 
     def ask(self, asked: Asked, told: Told) -> None:
-        """Ask for something; `told` gets the answer, which may be that there is no room."""
+        """Ask for something; `told` gets the answer: there may be no room, or nobody there."""
         key = asked["id"]
+        if self.ended.is_set():
+            told({"k": "done", "id": key, "ok": False, "text": self.why})
+            return
         waiting = self._pending.get(key)
         if waiting is not None and len(waiting) < 4:
             waiting.append(told)

@@ -15,6 +15,7 @@ const OVER_THE_LINK = [
   'phone_register',
   'phone_devices',
   'phone_permission',
+  'fake_add',
   'guard_say',
   'guard_report',
 ];
