@@ -49,6 +49,8 @@ export const clock = computed(
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
 /** Whether the link is that of a study, with sliders, and not one of sockets. */
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
+/** Whether what is shown runs at a DVA elsewhere, of which only messages are known. */
+export const isAttached = computed(() => Boolean(scene.value?.attached));
 /** How long a command takes at least [ms], as far as it is known. */
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),

@@ -24,7 +24,7 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, dva_address?: string, phone?: PhoneOffer}} Scene
+ *   lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer}} Scene
  * @typedef {{pipelines: Record<string, any>, filters: string[], mappings: string[],
  *   speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number}} PhoneOffer
  *
@@ -33,7 +33,7 @@
  *   holder: string | null, holder_label?: string | null, session_age_s?: number | null,
  *   watchdog_left_s: number | null, stands: string, set_speed_mps: number,
  *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
- *   refused: number, by_hand?: boolean}} RobotRow
+ *   refused: number, by_hand?: boolean, camera?: string | null, sensors?: string[]}} RobotRow
  * @typedef {{last_ms: number, median_ms: number, p95_ms: number, largest_ms: number,
  *   count: number}} LatencyFigures
  * @typedef {{name: string, unit: string, stuck: boolean, values?: number[],
