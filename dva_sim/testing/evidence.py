@@ -1,4 +1,7 @@
-"""Recordings and traces: their messages are valid, and every decision is made the same again."""
+"""What proves something: recordings, traces and audit logs.
+
+Messages are valid, every decision is made the same again, and a chain of rows is whole.
+"""
 
 from __future__ import annotations
 
@@ -43,6 +46,25 @@ def check_trace(path: Path) -> Found:
     *lines, rest = path.read_bytes().split(b"\n")
     replayed = _replayed(lines, path)
     return replayed.problems, [CUT] if rest else [], f"{replayed.decisions} decisions"
+
+
+def check_audit_log(path: Path) -> Found:
+    """The first row of an audit log that is wrong, what is odd in it, and its last hash.
+
+    A problem's line is the row's number.
+    """
+    from dva_sim.recordings.audit_log import verify  # late: start-up
+
+    try:
+        found = verify(path)
+    except ConfigError as error:
+        return [Problem(1, 1, error.problem)], [], ""
+    wrong = found.problem
+    problems = (
+        [] if wrong is None else [Problem(wrong.number, 1, f"row {wrong.number} {wrong.text}")]
+    )
+    rows = "1 row" if found.rows == 1 else f"{found.rows} rows"
+    return problems, list(found.doubts), f"{rows}, the last one with the hash {found.head}"
 
 
 class _Replayed(NamedTuple):
