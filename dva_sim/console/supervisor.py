@@ -21,6 +21,8 @@ from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
 
+# What else is printed at the start: an address for each of those who may do less than everything.
+ROLES = ("Dispatch only", "dispatch"), ("Drive only", "drive"), ("Look only", "look")
 WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
 LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
@@ -112,13 +114,14 @@ class ConsoleSupervisor:
             world.begin()
             world.clock.pulse(FLUSH, self._flush)
             gc.freeze()  # what stays for the whole run is not looked through again and again
-            self._say(f"Console: {serving['drive']}")
+            self._say(f"Console: {serving['supervise']}")
             if options.token:
-                self._say(f"Look only: {serving['look']}")
+                for name, role in ROLES:
+                    self._say(f"{name}: {serving[role]}")
             self._say_of_phones(serving)
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
-            self._open_browser(str(serving["drive"]))
+            self._open_browser(str(serving["supervise"]))
             if not ending.is_asked:
                 world.clock.go()
                 world.clock.run()

@@ -161,7 +161,7 @@ class FakeWorld(PhoneDesk):
     # --- actions -----------------------------------------------------------------------
 
     def do_serving(self, asked: dict[str, Any]) -> None:
-        print(f"Console: {asked['drive']}", flush=True)
+        print(f"Console: {asked['supervise']}", flush=True)
         print(f"Look only: {asked['look']}", flush=True)
         print(f"Phone: {asked['phone']}", flush=True)
         self.say(self.scene.line())

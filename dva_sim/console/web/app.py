@@ -224,7 +224,7 @@ def _for(least: Role, endpoint: Any) -> Any:
     return guarded
 
 
-_ONLY = {Role.PHONE: "drive by phone"}
+_ONLY = {Role.PHONE: "drive by phone", Role.DRIVE: "drive", Role.DISPATCH: "dispatch"}
 
 
 def make_app(

@@ -47,7 +47,13 @@ export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
 /** Whether this page's address is one for driving, or for a phone. */
-export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
+export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
+/** Whether it is one for sending people and robots to events. */
+export const mayDispatch = computed(() => roleIsOneOf('dispatch', 'supervise'));
+/** Whether it is one for taking robots from their holders. */
+export const maySupervise = computed(() => roleIsOneOf('supervise'));
+/** @param {string[]} roles */
+const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */
 export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
 

@@ -80,5 +80,5 @@ function Who() {
   const me = you.value;
   if (!me) return null;
   return html`<span class="item who" title=${`What your address allows; the world knows this page as ${me.client}`}>
-    ${me.role === 'drive' ? 'you may drive' : 'you may look'}</span>`;
+    you may ${me.role === 'phone' ? 'drive' : me.role}</span>`;
 }
