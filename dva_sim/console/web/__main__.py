@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from dva_sim.console.web.access import Entrance, Role, Tokens, rules
 from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
+from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import NoCertificate
@@ -48,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--phones-port", type=int, help="https for phones; 0 for any; else none")
     parser.add_argument("--certificates", type=Path, help="folder of those for phones")
     parser.add_argument("--name", action="append", default=[], help="another name of this machine")
+    parser.add_argument("--audit", type=Path, help="file of the audit log")
     parser.add_argument("--no-token", action="store_true", help="everybody may do everything")
     return parser
 
@@ -75,10 +77,10 @@ async def run(options: argparse.Namespace) -> None:
         await cameras.open(options.pictures_fd)
     telling = asyncio.ensure_future(cameras.keep_telling())
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
-    files, over = StaticFiles(), _after(closing)
-    serves = [serve(make_server(make_app(access, hub, cameras, files, door)), sock, over)]
+    files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
+    serves = [serve(make_server(make_app(access, hub, cameras, files, door, audit)), sock, over)]
     if phones:
-        app = make_app(phones.access, hub, cameras, files, door)
+        app = make_app(phones.access, hub, cameras, files, door, audit)
         serves.append(serve(make_server(app, phones.certificate), phones.sock, over))
     await asyncio.gather(*serves)
     telling.cancel()

@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Asked, Entrance, Role
+from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
@@ -233,6 +234,7 @@ def make_app(
     cameras: CameraStreams,
     files: StaticFiles,
     door: PhoneDoor | None = None,
+    audit: AuditPages | None = None,
 ) -> ASGIApp:
     """The whole application.
 
@@ -242,8 +244,10 @@ def make_app(
         cameras: Pictures.
         files: Of the pages.
         door: Where phones come in, if they do.
+        audit: Who did what, if that is kept.
     """
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
+    log = audit or AuditPages(None)
 
     async def see(ws: WebSocket) -> None:
         await hub.see(ws, ws.scope[ROLE])
@@ -264,6 +268,11 @@ def make_app(
         Route("/api/state", rest.state),
         Route("/api/site", rest.site),
         Route("/api/story", rest.story),
+        Route("/api/audit", log.rows),
+        Route("/api/audit/check", log.check),
+        Route("/api/audit/measures", log.measures),
+        Route("/api/audit.csv", log.as_csv),
+        Route("/api/audit.json", log.as_json),
         Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
         Route("/api/emergency", _for(Role.PHONE, rest.emergency), methods=["POST"]),
         WebSocketRoute("/ws/state", see),

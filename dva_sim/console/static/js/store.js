@@ -19,6 +19,18 @@ export const seat = signal(null);
  * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
  */
 export const guard = signal(null);
+/**
+ * How orders are given, and who decides: what control rooms share.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Control | null>}
+ */
+export const control = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').AlarmList>} */
+export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0 });
+/**
+ * How the audit log stands; its rows are asked for.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').AuditState | null>}
+ */
+export const audit = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */

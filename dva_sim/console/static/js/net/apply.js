@@ -1,6 +1,8 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
-import { connection, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import {
+  alarmList, audit, connection, control, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you,
+} from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -21,6 +23,9 @@ const LINES = {
   rows: (line) => (rows.value = line),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
+  control: (line) => (control.value = line),
+  alarms: (line) => (alarmList.value = line),
+  audit: (line) => (audit.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
     if (isMine(line)) seat.value = line;

@@ -1,7 +1,9 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
 import { clock, connection, notice, scene } from '../store.js';
+import { AuditPage } from '../audit/audit_page.js';
 import { DrivePage } from '../drive/drive_page.js';
+import { EventsPage } from '../events/events_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
@@ -14,12 +16,16 @@ import { addressOf, page } from './route.js';
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['drive', 'Drive', 'gamepad-2'],
+  ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
+  ['audit', 'Audit', 'square'],
 ]);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   drive: DrivePage,
+  events: EventsPage,
   network: NetworkPage,
+  audit: AuditPage,
 });
 
 /** @param {HTMLElement} where */

@@ -69,7 +69,7 @@ function Age() {
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/map" title="Open events, by severity">
+  return html`<a class="item alarms" href="#/events" title="Open events, by severity">
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
