@@ -69,6 +69,8 @@ class Actions:
             self._gone(client)
         elif what == "watch":
             self._watch(line.get("robots"))
+        elif what == "look":
+            self._look(line.get("logs"), line.get("tables"))
         elif isinstance(number := line.get("id"), str):
             self._once(number, client, str(what), line)
 
@@ -282,6 +284,10 @@ class Actions:
         numbers = robots if isinstance(robots, list) else []
         ids = {t["id"] for t in self._world.feed.things if t["i"] in numbers}
         self._world.screens.watch(ids)
+
+    def _look(self, logs: Any, tables: Any) -> None:
+        if isinstance(logs, dict) and isinstance(tables, list):
+            self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
 
 
 def _nobody(ok: bool, text: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.kernel.recorder import DriveLog, Recorder
-from dva_sim.live.recording import LiveRecorder
+from dva_sim.live.recording import LiveRecorder, event_facts
 from dva_sim.simulation.full.run import FILM_PERIOD, Run
 
 KEPT = 200  # of each list of a drive, and of ended drives nothing but the last
@@ -120,9 +120,7 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
             kept.put_new("contains", number, when, key=f"contained {number}")
         book = run.dva.desk.book
         for e in (*book.closed.values(), *book.open.values()):
-            at = [e.position.latitude, e.position.longitude]
-            told = e.number, e.kind, at, e.state.value, dict(e.times)
-            kept.put_new("event", *told, key=f"event {e.number}")
+            kept.put_new("event", *event_facts(e), key=f"event {e.number}")
 
     facts()
     clock.every(FILM_PERIOD, sample)

@@ -18,6 +18,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
+from dva_sim.console.logs import PERIOD, Logs
 from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
@@ -56,6 +57,7 @@ class ConsoleWorld:
         clock: Virtual time, at its pace.
         sockets: What carries the messages, if the links are real.
         run: The run.
+        logs: What devices are asked, and answer.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
 
@@ -113,7 +115,12 @@ class ConsoleWorld:
         )
         self.guards = PlayedGuards(self.run, self.feed)
         self.recorder.on_applied = self.seat_lines.applied
-        self.hazards = HazardFeed(self.run)
+        field = self.run.field
+        self.hazards = HazardFeed(
+            self.run.stage.site, field.incidents, field.surroundings, field.contained
+        )
+        self.logs = Logs(self.run.network, self._node_of)
+        self.logs.keep("dva")
         self._newest: dict[str, Any] = {}
         self.clock.on_late = self._late
         self.hold: Callable[[str], object] = lambda _: None
@@ -125,7 +132,12 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
-        scene = scene_of(self.run, self.feed.things, self.name, self.seed)
+        run = self.run
+        scene = scene_of(
+            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            name=self.name,
+            seed=self.seed,
+        )
         scene["link"] = self.sliders.line()
         scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
         self.tell(scene)
@@ -134,6 +146,7 @@ class ConsoleWorld:
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
         self.clock.pulse(TIDY, self.recorder.tidy)
 
     def show_scene(self) -> None:
@@ -142,6 +155,10 @@ class ConsoleWorld:
         self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
         for number, when in self.run.field.contained.items():
             self.show({"k": "contain", "t": round(1000 * when), "n": number})
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
 
     @property
     def persons(self) -> list[PersonAgent]:
@@ -206,6 +223,15 @@ class ConsoleWorld:
         """Something has changed that nobody shall wait for."""
         self._tell_rows()
         self._tell_seats()
+
+    def _tell_logs(self) -> None:
+        for line in self.logs.batches():
+            self.tell(line)
+
+    def _node_of(self, label: str) -> str | None:
+        """The id of a device of the run by its label."""
+        devices = self.run.stage.devices
+        return next((device.id_tag for device in devices if device.label == label), None)
 
     def _tell_hazards(self) -> None:
         self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
@@ -286,7 +312,7 @@ class ConsoleWorld:
         if self.lag.measured(time.monotonic(), behind):
             why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
             self.hold(why)
-            self.recorder.tell(self.clock.now, "console", why, "link")
+            self.note(why)
 
     # --- the link --------------------------------------------------------------------------
 

@@ -103,7 +103,7 @@ _SHIFT = 8 * 3600  # no alarm is shelved for longer [s]
 _NEEDED_EVENT = ("event",)
 # What a control room asks for: by the messages of a device of its own, or of this console.
 CONTROL_ROOM: Known = {
-    "room_join": ({"name": _LABEL}, ("name",)),
+    "room_join": ({"name": text(0, 64)}, ("name",)),
     "event_raise": (_REPORT, tuple(_REPORT)),
     "event_acknowledge": (_EVENT, _NEEDED_EVENT),
     "event_assign": (

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections import deque
 
+from dva_sim.console.web.logs import TABLES, Looks
 from dva_sim.console.web.state import LATEST, RunState, Versioned, body_of
 
 OWN_KEPT = 64  # lines for one page alone that may wait
 
 Sources = tuple[str, ...]
-SOURCES: Sources = ("seat", "guard", "d", *LATEST, "story", "others")
+SOURCES: Sources = ("seat", "guard", "d", *LATEST, "story", "others", "log", *TABLES)
 
 
 class PageFeed:
@@ -23,10 +24,15 @@ class PageFeed:
     Args:
         state: Of the run.
         seat: Of this page; its lines come in full.
+        acts: Whether the page may act.
+
+    Attributes:
+        looks: Which logs and tables it looks at.
     """
 
-    def __init__(self, state: RunState, seat: str) -> None:
+    def __init__(self, state: RunState, seat: str, acts: bool = True) -> None:
         self._state, self._seat = state, seat
+        self.looks = Looks(state.logs, acts)
         self._own: deque[str] = deque()
         self._count, self._turn = 0, 0
         self._wants_snapshot = True
@@ -83,6 +89,12 @@ class PageFeed:
             return self._told()
         if source == "others":
             return self._others()
+        if source == "log":
+            line = self.looks.next()
+            return None if line is None else body_of(line)
+        if source in TABLES:
+            looked = source in self.looks.tables
+            return self._newer(source, self._state.tables.get(source)) if looked else None
         if source == "seat":
             return self._newer("seat", self._state.seats.get(self._seat))
         if source == "guard":

@@ -84,13 +84,22 @@ class Hub:
         elif what == "watch":
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
             self.watching()
+        elif what == "look" and client.role is not Role.PHONE:
+            client.feed.looks.look(said.get("logs", {}), said.get("tables", []))
+            self._tell_looks()
         else:
-            raise BadMessage("no such message; there are: ping, resync, watch")
+            raise BadMessage("no such message; there are: ping, resync, watch, look")
         client.wake.set()
+
+    def _tell_looks(self) -> None:
+        """The simulation tells what somebody looks at, and no more."""
+        logs, tables = self.clients.looked()
+        self.simulation.send({"do": "look", "logs": logs, "tables": tables})
 
     def _leave(self, client: Client) -> None:
         """A page is gone: its robots stop, and after a while others may have them."""
         self.clients.leave(client)
+        self._tell_looks()
         self.watching()
         if client.role.acts:
             self.simulation.send({"client": client.name, "do": "gone"})

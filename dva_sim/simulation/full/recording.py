@@ -72,6 +72,7 @@ class Playback:
         contained: When incidents were dealt with [s], by their place in `incidents`.
         endings: What became of each incident, in the order of `incidents`; empty if that is not
             known, as of a recording that was cut short.
+        events: The events as the DVA knew them in the end.
     """
 
     scenario: Scenario
@@ -85,6 +86,7 @@ class Playback:
     duration: float
     contained: dict[int, float] = field(default_factory=dict)
     endings: list[Ending] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
 
     def robot_named(self, label: str) -> str | None:
         """The id of a robot, if there is one of that name."""
@@ -96,7 +98,6 @@ class Recording(Playback):
     """All that is left of one run, to be measured.
 
     Attributes:
-        events: The events as the DVA knew them.
         robots: The robots by id, as they ended.
         people: What became of the people on foot.
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
@@ -104,7 +105,6 @@ class Recording(Playback):
         persons: Numbers of the operators whose places people took.
     """
 
-    events: list[Event]
     robots: dict[str, RobotAgent]
     links: dict[str, tuple[Link, Link]]
     people: list[PersonLog] = field(default_factory=list)

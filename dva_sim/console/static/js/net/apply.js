@@ -1,5 +1,6 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
+import { hearLog } from '../logs/log_rows.js';
 import {
   alarmList, audit, connection, control, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you,
 } from '../store.js';
@@ -38,6 +39,7 @@ const LINES = {
     rememberClient(line.client);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
+  log: hearLog,
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),
 };

@@ -7,6 +7,7 @@ import { EventsPage } from '../events/events_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
+import { RequestsPage } from '../requests/requests_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -15,6 +16,7 @@ import { addressOf, page } from './route.js';
 
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
   ['drive', 'Drive', 'gamepad-2'],
   ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
@@ -22,6 +24,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
 ]);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
+  main: RequestsPage,
   drive: DrivePage,
   events: EventsPage,
   network: NetworkPage,
