@@ -14,6 +14,7 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.room_actions import AlarmActions, RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
@@ -39,6 +40,7 @@ class Actions:
         self._world = world
         self._seats, self._answers = Seats(), Answers()
         self._phones = PhoneActions(world, self._seats, self._robot, self._stop_one)
+        self._rooms = RoomActions(world, self._seats, self._robot, self._take)
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)
         self._doers: dict[str, Callable[[str, Line, Said], object]] = {
@@ -56,6 +58,8 @@ class Actions:
             "tour": self._tour,
             **self._phones.doers,
             **GuardActions(world).doers,
+            **self._rooms.doers,
+            **AlarmActions(world, self._rooms).doers,
         }
 
     def take(self, line: Line) -> None:
@@ -80,12 +84,14 @@ class Actions:
             if known is not None:
                 self._tell(known)
             return
-        said = partial(self._said, number)
+        said: Said = partial(self._said, number)
         do = self._doers.get(what)
         if do is None:
             said(False, f"no action {what!r}")
             return
         try:
+            if self._world.audited is not None:
+                said = self._world.audited.answered(what, client, line, said)
             do(client, line, said)
         except (Refused, ConfigError) as error:
             said(False, str(error))
@@ -127,6 +133,7 @@ class Actions:
     def _release(self, client: str, line: Line, said: Said) -> None:
         if str(line["id"]).startswith(BYE):
             self._phones.forget(client)
+            self._rooms.forget(client)
             self._hold()
         if client not in self._seats.taken:
             said(True, "released")

@@ -38,7 +38,7 @@ class AlarmState(StrEnum):
     RETURNED = "returned"
 
 
-class Condition(NamedTuple):
+class AlarmCondition(NamedTuple):
     """What is wrong now, and wants somebody to act.
 
     Attributes:
@@ -63,7 +63,7 @@ class Condition(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Alarm:
+class RaisedAlarm:
     """A condition, and who has seen it.
 
     Attributes:
@@ -76,7 +76,7 @@ class Alarm:
         shelved_by: Who has.
     """
 
-    condition: Condition
+    condition: AlarmCondition
     state: AlarmState
     raised: float
     is_on: bool = True
@@ -95,13 +95,13 @@ class Alarms:
     """
 
     def __init__(self) -> None:
-        self.known: dict[str, Alarm] = {}
+        self.known: dict[str, RaisedAlarm] = {}
         self.is_flood, self.left_out = False, 0
         self._raised: deque[float] = deque(maxlen=MOST_ALARMS)
 
     # --- what happens -----------------------------------------------------------------------
 
-    def update(self, conditions: Iterable[Condition], now: float) -> None:
+    def update(self, conditions: Iterable[AlarmCondition], now: float) -> None:
         """What is wrong now; what is not named is over."""
         on = sorted(conditions, key=lambda c: PRIORITIES.index(c.priority))
         self.left_out = max(0, len(on) - MOST_ALARMS)
@@ -118,14 +118,14 @@ class Alarms:
         self._unshelve_the_due(now)
         self._look_for_a_flood(now)
 
-    def _raise(self, condition: Condition, now: float, known: Alarm | None) -> None:
-        alarm = Alarm(condition, AlarmState.UNACKNOWLEDGED, now)
+    def _raise(self, condition: AlarmCondition, now: float, known: RaisedAlarm | None) -> None:
+        alarm = RaisedAlarm(condition, AlarmState.UNACKNOWLEDGED, now)
         if known is not None:  # it comes back: a shelf goes on
             alarm = replace(alarm, shelved_until=known.shelved_until, shelved_by=known.shelved_by)
         self._raised.append(now)
         self._keep(self._seen(alarm, condition.seen_by))
 
-    def _go_on(self, known: Alarm, condition: Condition, now: float) -> None:
+    def _go_on(self, known: RaisedAlarm, condition: AlarmCondition, now: float) -> None:
         alarm = replace(known, condition=condition)
         graver = PRIORITIES.index(condition.priority) < PRIORITIES.index(known.condition.priority)
         if graver and not condition.seen_by:
@@ -134,7 +134,7 @@ class Alarms:
         self._keep(self._seen(alarm, condition.seen_by))
 
     @staticmethod
-    def _seen(alarm: Alarm, by: str | None) -> Alarm:
+    def _seen(alarm: RaisedAlarm, by: str | None) -> RaisedAlarm:
         if by is None or alarm.state is not AlarmState.UNACKNOWLEDGED:
             return alarm
         return replace(alarm, state=AlarmState.ACKNOWLEDGED, seen_by=by)
@@ -146,7 +146,7 @@ class Alarms:
         else:
             self._keep(replace(alarm, state=AlarmState.RETURNED, is_on=False))
 
-    def _keep(self, alarm: Alarm) -> None:
+    def _keep(self, alarm: RaisedAlarm) -> None:
         self.known[alarm.condition.key] = alarm
         while len(self.known) > 2 * MOST_ALARMS:  # of those that are over, the oldest goes
             gone = (key for key, alarm in self.known.items() if not alarm.is_on)
@@ -211,16 +211,16 @@ class Alarms:
         found.sort(key=lambda alarm: alarm.shelved_until or 0.0)
         return [_row([alarm], now) for alarm in found]
 
-    def _folded(self, listed: Sequence[Alarm]) -> Iterator[list[Alarm]]:
+    def _folded(self, listed: Sequence[RaisedAlarm]) -> Iterator[list[RaisedAlarm]]:
         """Each for itself, or in a flood those of a kind and place together."""
-        groups: dict[str, list[Alarm]] = {}
+        groups: dict[str, list[RaisedAlarm]] = {}
         for alarm in listed:
             key = _group(alarm.condition) if self.is_flood else alarm.condition.key
             groups.setdefault(key, []).append(alarm)
         return iter(groups.values())
 
 
-def _group(condition: Condition) -> str:
+def _group(condition: AlarmCondition) -> str:
     return f"{condition.kind} at {condition.place}"
 
 
@@ -231,13 +231,13 @@ _URGENCY: Final = {
 }
 
 
-def _rank(alarms: Sequence[Alarm]) -> tuple[int, int, float, str]:
+def _rank(alarms: Sequence[RaisedAlarm]) -> tuple[int, int, float, str]:
     priority = min(PRIORITIES.index(alarm.condition.priority) for alarm in alarms)
     urgency = min(_URGENCY[alarm.state] for alarm in alarms)
     return priority, urgency, -max(alarm.raised for alarm in alarms), alarms[0].condition.key
 
 
-def _row(alarms: Sequence[Alarm], now: float) -> dict[str, Any]:
+def _row(alarms: Sequence[RaisedAlarm], now: float) -> dict[str, Any]:
     """A row of the list, for one alarm or for several that are alike."""
     first = min(alarms, key=lambda alarm: _rank([alarm]))
     condition, count = first.condition, len(alarms)

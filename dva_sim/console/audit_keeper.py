@@ -34,6 +34,7 @@ MOST_WAITING: Final = 10_000  # rows that wait for a disk; more are counted, and
 SYSTEM: Final = "console"  # author of the rows that no person is behind
 
 Then = Callable[[str], object]
+_Asked = tuple[AuditEntry | None, Then]
 
 
 def now_utc() -> str:
@@ -86,7 +87,7 @@ class AuditKeeper:
         self._log = AuditLog(self.path)
         self.number, self.head = self._log.number, self._log.head
         self.on_rows: Callable[[Sequence[AuditRow]], object] = lambda _: None
-        self._asked: queue.SimpleQueue[tuple[AuditEntry, Then] | None] = queue.SimpleQueue()
+        self._asked: queue.SimpleQueue[_Asked | None] = queue.SimpleQueue()
         self._done: deque[tuple[Sequence[AuditRow], Sequence[Then], str]] = deque()
         self._hears, self._wakes = socket.socketpair()
         self._hears.setblocking(False)
@@ -107,6 +108,10 @@ class AuditKeeper:
             then("the audit log cannot be written, and too much waits for it already")
             return
         self._asked.put((entry, then))
+
+    def when_safe(self, then: Then) -> None:
+        """`then` is told when all that was put so far is on the disk, or why it is not yet."""
+        self._asked.put((None, then))
 
     # --- in the world's thread ------------------------------------------------------------------
 
@@ -146,19 +151,19 @@ class AuditKeeper:
         waiting, is_over = list[AuditEntry](), False
         while not is_over:
             new, is_over = self._next(bool(waiting))
-            waiting += [entry for entry, _ in new]
+            waiting += [entry for entry, _ in new if entry is not None]
             rows, problem = list[AuditRow](), ""
             try:
-                rows = self._log.append(waiting)
+                rows = self._log.append(waiting) if waiting else rows
                 waiting = []
             except AuditWriteError as error:
                 problem = str(error)
             if rows or new or problem != self.problem:
                 self._tell(rows, [then for _, then in new], problem)
 
-    def _next(self, is_behind: bool) -> tuple[list[tuple[AuditEntry, Then]], bool]:
+    def _next(self, is_behind: bool) -> tuple[list[_Asked], bool]:
         """What was asked for meanwhile, and whether that was all; a while is waited for more."""
-        found = list[tuple[AuditEntry, Then]]()
+        found = list[_Asked]()
         with suppress(queue.Empty):
             asked = self._asked.get(timeout=AGAIN if is_behind else None)
             while asked is not None:

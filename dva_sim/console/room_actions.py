@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
+from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.agents.people.person_guard import SEVERITIES
-from dva_sim.console.control_rooms import NO_ANSWER, ControlRoom, why
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
 from dva_sim.console.seats import Seats
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.core.registry import ROBOT
@@ -70,7 +71,9 @@ class RoomActions:
         name = str(line.get("name", "")).strip()[:64]
         self._rooms.join(client, str(line.get("role", "look")), name, said)
 
-    def _room(self, client: str, line: Line, said: Said, then: Callable[[ControlRoom], object]) -> None:
+    def _room(
+        self, client: str, line: Line, said: Said, then: Callable[[ConsoleRoom], object]
+    ) -> None:
         """The control room of a page; it gets one with its first decision."""
         room = self._rooms.by_client.get(client)
         if room is not None and room.registered:
@@ -231,7 +234,7 @@ class RoomActions:
         body = m.Inspect(status.event_id, status.kind, status.position)
         self._room(client, line, said, partial(self._send, robot=robot, body=body, said=said))
 
-    def _send(self, room: ControlRoom, robot: str, body: m.Inspect, said: Said) -> None:
+    def _send(self, room: ConsoleRoom, robot: str, body: m.Inspect, said: Said) -> None:
         device, label = room.device, room.device.label_of(robot)
 
         def granted(reply: m.Reply) -> None:
@@ -245,7 +248,7 @@ class RoomActions:
                 said(False, f"{label}: {text}")
 
             def begun() -> None:
-                device.clock.every(ASK_PERIOD, partial(self._follow, room, robot, session))
+                self._follow(room, robot, session)
                 said(True, f"{label} goes to event {body.event_id} by itself")
 
             start(
@@ -260,16 +263,22 @@ class RoomActions:
         wish = m.PermissionRequest(robot, "missions")
         device.ask(device.dva, wish, granted, lambda: said(False, NO_ANSWER))
 
-    def _follow(self, room: ControlRoom, robot: str, session: int) -> bool:
-        """A robot whose mission is over is given back."""
-        agent = self._world.run.field.robots[robot]
-        grant = agent.controller.grant
-        if grant is None or grant.session != session:
-            return False
-        if agent.controller.mission_status.mission_state in UNDER_WAY:
-            return True
-        give_back(room.device, robot, session)
-        return False
+    @staticmethod
+    def _follow(room: ConsoleRoom, robot: str, session: int) -> None:
+        """Ask how a mission stands until it is over; then the robot is given back."""
+        device = room.device
+
+        def answered(reply: m.Reply) -> None:
+            status = reply.content
+            if isinstance(status, m.MissionStatus) and status.mission_state in UNDER_WAY:
+                device.clock.call_after(ASK_PERIOD, ask)
+            else:
+                give_back(device, robot, session)
+
+        def ask() -> None:
+            device.ask(robot, m.GetMissionStatus(), answered, session=session)
+
+        device.clock.call_after(ASK_PERIOD, ask)
 
     def _take_over(self, client: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
@@ -277,7 +286,7 @@ class RoomActions:
         self._room(client, line, said, partial(self._revoke, client, line, robot, reason, said))
 
     def _revoke(
-        self, client: str, line: Line, robot: str, reason: str, said: Said, room: ControlRoom
+        self, client: str, line: Line, robot: str, reason: str, said: Said, room: ConsoleRoom
     ) -> None:
         event = next(
             (n for n, k in self._rooms.board.events.items() if k.status.responder == robot), None
@@ -301,7 +310,7 @@ class RoomActions:
         event: int | None,
         reason: str,
         said: Said,
-        room: ControlRoom,
+        room: ConsoleRoom,
     ) -> None:
         """The robot is free: the person's seat asks for it, and gets the order it had."""
         number = self._seats.sit(client)
@@ -322,11 +331,15 @@ class RoomActions:
 
         def ordered(reply: m.Reply) -> None:
             content = reply.content
-            if reply.code == OUT_OF_ORDER and isinstance(content, m.EventStatus):
-                if content.closed_for is None and next(tries, None) is not None:
-                    assign(content.decisions)  # the policy was quicker
-                    return
-            take()
+            if (
+                reply.code == OUT_OF_ORDER
+                and isinstance(content, m.EventStatus)
+                and content.closed_for is None
+                and next(tries, None) is not None
+            ):
+                assign(content.decisions)  # the policy was quicker
+            else:
+                take()
 
         def assign(decisions: int | None) -> None:
             assert event is not None
@@ -338,3 +351,43 @@ class RoomActions:
         else:
             self._world.person(number).sit_down()
             assign(self._rooms.board.decisions(event))
+
+
+class AlarmActions:
+    """Does what people ask for about alarms.
+
+    Args:
+        world: In which.
+        rooms: Whose devices tell the DVA that an event was seen.
+    """
+
+    def __init__(self, world: ConsoleWorld, rooms: RoomActions) -> None:
+        self._world, self._desk, self._rooms = world, world.alarms, rooms
+        self.doers: Mapping[str, Doer] = {
+            "alarm_acknowledge": self._acknowledge,
+            "alarm_shelve": self._shelve,
+            "alarm_unshelve": self._unshelve,
+        }
+
+    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
+        """What an open event is behind is acknowledged at the DVA, all else here."""
+        keys = self._desk.members(line["alarm"])
+        events = self._desk.by_event(keys)
+        for key in keys:
+            if key not in events:
+                self._desk.acknowledge(key, self._world.author(client))
+        if not events:
+            said(True, "seen")
+            return
+        answers = Gathered(len(events), said)
+        for number in events.values():
+            self._rooms.doers["event_acknowledge"](client, line | {"event": number}, answers)
+
+    def _shelve(self, client: str, line: Line, said: Said) -> None:
+        keys = self._desk.members(line["alarm"])
+        self._desk.shelve(keys, line["for_s"], self._world.author(client))
+        said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
+
+    def _unshelve(self, client: str, line: Line, said: Said) -> None:
+        self._desk.unshelve(self._desk.members(line["alarm"]))
+        said(True, "back in the list")

@@ -299,6 +299,22 @@ def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
     return None
 
 
+def verify_plain(rows: Sequence[Mapping[str, Any]]) -> Verified:
+    """The same of rows that were kept elsewhere, as in a recording; they may begin anywhere."""
+    first = rows[0] if rows else {}
+    number, head, last = first.get("number", 1) - 1, first.get("before", NOTHING_BEFORE), ""
+    for plain in rows:
+        try:
+            values = [plain["number"], *_columns(plain), plain["before"], plain["hash"]]
+            wrong = _wrong(values, number + 1, head)
+        except (KeyError, TypeError, ValueError) as error:
+            wrong = f"is not whole: {error!r}"
+        if wrong:
+            return Verified(number, head, FirstWrong(number + 1, wrong))
+        number, head, last = number + 1, plain["hash"], plain["action"]
+    return Verified(number, head, None, last == END)
+
+
 def _doubts(file: sqlite3.Connection, last: str) -> Iterator[str]:
     if last != END:
         yield "its last row is not an end: a console writes it still, was killed, or it was cut"

@@ -22,6 +22,7 @@ Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was l
 def check_recording(path: Path) -> Found:
     """What is wrong with a recording, and doubts: its messages, and the decisions it holds."""
     from dva_sim.recordings import read_recording  # late: start-up
+    from dva_sim.recordings.audit_log import verify_plain  # late: start-up
 
     try:
         opened = read_recording(path)
@@ -38,6 +39,11 @@ def check_recording(path: Path) -> Found:
         replayed = _replayed([line.encode() for line in lines], path)
         problems += [Problem(1, 1, f"{who}, line {p.line}: {p.text}") for p in replayed.problems]
         note += f", {replayed.decisions} decisions of {who}"
+    if opened.audit:
+        found = verify_plain(opened.audit)
+        if wrong := found.problem:
+            problems.append(Problem(1, 1, f"audit log: row {wrong.number} {wrong.text}"))
+        note += f", an audit log whose last row is {found.rows} with the hash {found.head}"
     return problems, [] if opened.is_whole else ["was cut short"], note
 
 

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from dva_sim.console.alarms import Alarms, Condition
+from dva_sim.console.alarms import AlarmCondition, Alarms
 from dva_sim.recordings.audit_log import BEGIN, AuditEntry, AuditLog
 
 Line = dict[str, Any]
@@ -26,14 +26,15 @@ class ControlRoomDesk:
     more: Line
     hostile: bool
 
-    def open_desk(self, folder: Path) -> Path:
-        """Begin; where the audit log is."""
+    def open_desk(self, place: str) -> Path:
+        """Begin, with an audit log in a file or a folder; where it is."""
         self.decided: dict[int, Line] = {}
         self.raised: list[Line] = []
         self.rooms: dict[str, Line] = {}
         self.mode: Line = {"mode": "automatic", "decide_within_s": 20.0, "switched": None}
         self.alarms = Alarms()
-        self.log = AuditLog(folder / "audit.sqlite")
+        path = Path(place)
+        self.log = AuditLog(path / "audit.sqlite" if path.is_dir() else path)
         self.log.append([self._entry("console", BEGIN)])
         return self.log.path
 
@@ -71,9 +72,9 @@ class ControlRoomDesk:
         return {"k": "events", "events": rows}
 
     @staticmethod
-    def _condition(row: Line) -> Condition:
+    def _condition(row: Line) -> AlarmCondition:
         seen = row["acknowledged"]
-        return Condition(
+        return AlarmCondition(
             f"event {row['number']}",
             row["kind"],
             row["severity"],

@@ -108,7 +108,7 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
         words += ["--no-token"] if options.no_token else []
         self.folder = tempfile.TemporaryDirectory()
         self.hostile = options.hostile
-        words += ["--audit", str(self.open_desk(Path(self.folder.name)))]
+        words += ["--audit", str(self.open_desk(options.audit or self.folder.name))]
         if options.phones:
             words += ["--phones-host", "127.0.0.1", "--phones-port", "0"]
             words += ["--certificates", self.folder.name]
@@ -418,6 +418,7 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--people", type=int, default=100)
     parser.add_argument("--site", default="caparica", help="or office-block, campus, ...")
+    parser.add_argument("--audit", help="file of its audit log")
     parser.add_argument("--hostile", action="store_true", help="a robot is called <script>")
     world = FakeWorld(parser.parse_args())
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

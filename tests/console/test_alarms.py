@@ -12,15 +12,17 @@ from dva_sim.console.alarms import (
     LONGEST_SHELF,
     MOST_ALARMS,
     PRIORITIES,
+    AlarmCondition,
     Alarms,
     AlarmState,
-    Condition,
 )
 
 
-def fire(number: int = 1, priority: str = "high", **more: Any) -> Condition:
+def fire(number: int = 1, priority: str = "high", **more: Any) -> AlarmCondition:
     room = more.pop("place", "Corridor 2")
-    return Condition(f"event {number}", "fire", priority, room, f"fire {number}, {room}", **more)
+    return AlarmCondition(
+        f"event {number}", "fire", priority, room, f"fire {number}, {room}", **more
+    )
 
 
 def states(alarms: Alarms) -> dict[str, str]:

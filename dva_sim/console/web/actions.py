@@ -119,7 +119,7 @@ CONTROL_ROOM: Known = {
         {"mode": one_of("automatic", "ask_first"), "reason": _REASON},
         ("mode",),
     ),
-    "mission": ({"robot": robot, **_PLACE}, ("robot", *_PLACE)),
+    "mission": ({"robot": robot, **_EVENT}, ("robot", "event")),
     "take_over": ({"robot": robot, "reason": text(1, 256)}, ("robot", "reason")),
     "alarm_acknowledge": (_ALARM, ("alarm",)),
     "alarm_shelve": (_ALARM | {"for_s": number(1, _SHIFT)}, ("alarm", "for_s")),
@@ -172,7 +172,8 @@ SILENT: Known = {
 NEEDS = {
     **dict.fromkeys(("take", "link", "pattern", "pace", "tour"), Role.DRIVE),
     **dict.fromkeys(CONTROL_ROOM, Role.DISPATCH),
-    "take_over": Role.SUPERVISE,
+    **dict.fromkeys(("room_join", "event_raise", "event_proposal", "mission"), Role.DRIVE),
+    **dict.fromkeys(("dispatch_mode", "take_over"), Role.SUPERVISE),
 }
 
 

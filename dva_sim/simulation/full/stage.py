@@ -30,7 +30,16 @@ from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
 _ANYWHERE = "robot", "guard"  # whose scenario has a key `way_m`
-_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5, "phone": 6}
+_ROOMS = {
+    "dva": 0,
+    "robot": 1,
+    "guard": 2,
+    "operator": 3,
+    "detector": 4,
+    "console": 5,
+    "phone": 6,
+    "room": 7,
+}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -76,6 +85,7 @@ TYPES = {
     "detector": DETECTOR,
     "console": OPERATOR,
     "phone": OPERATOR,
+    "room": "ControlRoom",
 }
 
 

@@ -6,7 +6,13 @@ import pytest
 from page_faults import faults
 from playwright.sync_api import Response, expect
 
-PAGES = {"map": "Map", "drive": "Drive", "network": "Network"}
+PAGES = {
+    "map": "Map",
+    "drive": "Drive",
+    "events": "Events",
+    "network": "Network",
+    "audit": "Audit",
+}
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -133,7 +139,7 @@ def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit) -> N
 
 def test_every_page_obeys_its_content_security_policy(fake, visit) -> None:
     page = visit.open(fake().drive)
-    for name in ("Drive", "Network", "Map"):
+    for name in ("Drive", "Events", "Network", "Audit", "Map"):
         page.get_by_role("link", name=name).click()
         expect(page.get_by_role("heading", name=name, level=1)).to_be_attached()
 

@@ -1,6 +1,6 @@
 /** One event: how it stands, whom the policy would send, and all that can be done about it. */
 import { html, useRef, useState } from '../../vendor/preact.js';
-import { mayDispatch, maySteer, maySupervise, robots, rowOf, selection } from '../store.js';
+import { mayDispatch, maySteer, maySupervise, robots, rowOf, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { worldNow } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -71,7 +71,7 @@ function Doing({ event }) {
       onInput=${(/** @type {any} */ typed) => (reason.value = typed.currentTarget.value)} />
     <div class="buttons" role="group" aria-label="What to do">
       ${!over && html`<${Sending} event=${event} off=${off} tell=${tell} />`}
-      ${!over && event.assigned.map((who, n) => html`<button type="button" disabled=${off} title=${`Calls ${who} off`}
+      ${!over && sentTo(event).map((who, n) => html`<button type="button" disabled=${off} title=${`Calls ${who} off`}
         onClick=${() => ask('event_take_off', { ...about, device: who, reason: words })}>
         ${n ? `Take off ${who}` : 'Take off'}</button>`)}
       ${!over && html`<button type="button" disabled=${off}
@@ -85,6 +85,10 @@ function Doing({ event }) {
     <p role="status" aria-label="Done">${told}</p></div>`;
 }
 
+/** Who is on the way or there; not who drives a robot. @param {SiteEvent} event */
+const sentTo = (event) =>
+  event.assigned.filter((who) => ['robot', 'guard'].includes(thingNamed(who)?.kind ?? ''));
+
 /** @param {{event: SiteEvent, off: boolean, tell: (text: string) => void}} props */
 function Sending({ event, off, tell }) {
   const guard = nearestGuard.value;
@@ -94,7 +98,7 @@ function Sending({ event, off, tell }) {
     tell(done.ok ? done.text : '');
   };
   const mission = async () => {
-    const done = await act('mission', { robot, x_m: event.x_m, y_m: event.y_m });
+    const done = await act('mission', { robot, event: event.number });
     tell(done.ok ? done.text : '');
   };
   return html`<button type="button" disabled=${off || !guard} title=${guard ? `Sends ${guard}` : 'No guard can go'}

@@ -29,7 +29,7 @@ NO_ANSWER: Final = "the DVA does not answer"
 
 
 @dataclass
-class ControlRoom:
+class ConsoleRoom:
     """A person's share in the control of a run.
 
     Attributes:
@@ -116,7 +116,7 @@ class EventBoard:
         if known is None:
             return {"decisions": None, "acknowledged": None, "decided": None, "note": None}
         status, at = known.status, known.at
-        last = status.decided
+        last = status.last_decision
         return {
             "decisions": status.decisions,
             "acknowledged": _by(status.acknowledged, at),
@@ -151,7 +151,7 @@ def _by(whom: m.ByWhom | None, at: float) -> Line | None:
     return None if whom is None else {"label": whom.label, "at_ms": _ms(at - whom.ago)}
 
 
-class ControlRooms:
+class ConsoleRooms:
     """All control rooms of a console.
 
     Args:
@@ -167,7 +167,7 @@ class ControlRooms:
     def __init__(self, run: Run, appoint: Appoint) -> None:
         self._run, self._appoint = run, appoint
         self.board = EventBoard()
-        self.by_client: dict[str, ControlRoom] = {}
+        self.by_client: dict[str, ConsoleRoom] = {}
         self.joined: Callable[[str, str], object] = lambda *_: None
         self._used = {LISTENER}
         self._device = run.stage.device("room", LISTENER)
@@ -237,7 +237,7 @@ class ControlRooms:
 
         room.device.register_once(answered, unreachable)
 
-    def _new(self, role: str, name: str) -> ControlRoom | None:
+    def _new(self, role: str, name: str) -> ConsoleRoom | None:
         number = next((n for n in range(1, MOST_ROOMS + 1) if n not in self._used), None)
         if number is None:
             return None
@@ -246,9 +246,9 @@ class ControlRooms:
         self._name(device, name or f"{role}-{number - LISTENER}")
         self._appoint(device.id_tag, role)
         self.joined(device.id_tag, device.label)
-        return ControlRoom(number, device, role)
+        return ConsoleRoom(number, device, role)
 
-    def _drop(self, client: str, room: ControlRoom) -> None:
+    def _drop(self, client: str, room: ConsoleRoom) -> None:
         if self.by_client.get(client) is room:
             self.leave(client)
 
@@ -259,7 +259,7 @@ class ControlRooms:
             room.device.leave()
             room.device.clock.call_after(RESTS, self._forget, room)
 
-    def _forget(self, room: ControlRoom) -> None:
+    def _forget(self, room: ConsoleRoom) -> None:
         for peer in (room.device.dva, *self._run.field.robots):
             room.device.forget(peer)
         self._run.stage.devices.remove(room.device)
