@@ -50,7 +50,7 @@ function Head() {
   }
   const me = control.value?.rooms?.find((room) => room.client === you.value?.client);
   const asked = control.value?.dispatch;
-  return html`<section class="events-head" aria-label="Control room">
+  return html`<section class="events-head" aria-label="You">
     <${Field} name="Your name" value=${ownName.value} onInput=${rename}
       hint=${me ? `The log calls you ${me.label}` : 'As it stands in the log'} />
     <button type="button" onClick=${join}>Use this name</button>
