@@ -44,7 +44,6 @@ class Audited:
         keeper: Of the file.
         author: What the person of a page is called.
         label: The name of a device, by its id.
-        facts: What the DVA has decided since this was last asked.
     """
 
     def __init__(
@@ -52,10 +51,9 @@ class Audited:
         keeper: AuditKeeper,
         author: Callable[[str], str],
         label: Callable[[str], str],
-        facts: Callable[[], list[Fact]],
     ) -> None:
         self.keeper = keeper
-        self._author, self._label, self._facts = author, label, facts
+        self._author, self._label = author, label
 
     def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
         """Whoever takes the answer to an action, once that is in the log.
@@ -71,7 +69,6 @@ class Audited:
         def told(ok: bool, text: str, /, **more: Any) -> None:
             if what in ACTIONS:
                 self._note(what, client, line, ok, text)
-            self.take_facts()
             if what in STOPS:
                 said(ok, text, **more)
                 return
@@ -104,10 +101,9 @@ class Audited:
             )
         )
 
-    def take_facts(self) -> None:
-        """Keep what the DVA has decided meanwhile."""
-        for fact in self._facts():
-            self.keeper.put(self._entry(fact))
+    def decided(self, fact: Fact) -> None:
+        """Keep what the DVA, or somebody at it, has decided."""
+        self.keeper.put(self._entry(fact))
 
     def _entry(self, fact: Fact) -> AuditEntry:
         ok = fact.code == m.OK

@@ -148,7 +148,7 @@ class RoomActions:
     def _seen(self, line: Line) -> int | None:
         """How many decisions the asker knows: what the page says, else what is known here."""
         given = line.get("decisions")
-        return given if given is not None else self._rooms.board.decisions(line["event"])
+        return given if given is not None else self._rooms.decisions(line["event"])
 
     def _assign(self, client: str, line: Line, said: Said) -> None:
         number, label = line["event"], str(line["device"])
@@ -227,10 +227,10 @@ class RoomActions:
 
     def _mission(self, client: str, line: Line, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
-        known = self._rooms.board.events.get(line["event"])
-        if known is None:
+        status = self._rooms.listener.events.get(line["event"])
+        if status is None:
             raise Refused(f"there is no event {line['event']}")
-        robot, status = self._robot(line["robot"]), known.status
+        robot = self._robot(line["robot"])
         body = m.Inspect(status.event_id, status.kind, status.position)
         self._room(client, line, said, partial(self._send, robot=robot, body=body, said=said))
 
@@ -289,7 +289,7 @@ class RoomActions:
         self, client: str, line: Line, robot: str, reason: str, said: Said, room: ConsoleRoom
     ) -> None:
         event = next(
-            (n for n, k in self._rooms.board.events.items() if k.status.responder == robot), None
+            (n for n, e in self._rooms.listener.events.items() if _works_at(e, robot)), None
         )
 
         def revoked(reply: m.Reply) -> None:
@@ -350,7 +350,11 @@ class RoomActions:
             take()
         else:
             self._world.person(number).sit_down()
-            assign(self._rooms.board.decisions(event))
+            assign(self._rooms.decisions(event))
+
+
+def _works_at(event: m.EventStatus, robot: str) -> bool:
+    return event.closed_for is None and event.responder == robot
 
 
 class AlarmActions:

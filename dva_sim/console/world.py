@@ -26,13 +26,11 @@ from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
-from dva_sim.console.rooms import ConsoleRooms
+from dva_sim.console.rooms import ConsoleRooms, about_event
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
-from dva_sim.core.audit import AuditTrail
-from dva_sim.core.roles import Roles
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
@@ -121,8 +119,7 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
-        self.rooms = ConsoleRooms(self.run, Roles().appoint)
-        self.rooms.joined = lambda id_tag, label: self.feed.add(id_tag, label, "operator")
+        self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
         self.alarms = AlarmDesk(self.run)
         self.audited: Audited | None = None
         self._events: list[Line] = []
@@ -176,8 +173,8 @@ class ConsoleWorld:
 
     def keep_audit(self, keeper: AuditKeeper) -> None:
         """Keep what people do, and what the DVA decides, from now on."""
-        trail = AuditTrail()
-        self.audited = Audited(keeper, self.author, self._named, trail.take)
+        self.audited = Audited(keeper, self.author, self._named)
+        self.run.dva.on_fact = self.audited.decided
         keeper.on_rows = self._audit_written
         self.clock.watch(keeper.fileno(), keeper.take)
 
@@ -313,12 +310,10 @@ class ConsoleWorld:
         """Events with what was decided on them, and who decides."""
         line = self.feed.events()
         self._events = line["events"] = [
-            event | self.rooms.board.about(event["number"]) for event in line["events"]
+            event | about_event(self.rooms.listener, event["number"]) for event in line["events"]
         ]
         self._tell_new(line, but="t")
         self._tell_new(self.rooms.line(self.feed.now_ms), but="t")
-        if self.audited is not None:
-            self.audited.take_facts()
 
     def _tell_alarms(self, robots: list[Line]) -> None:
         self._tell_new(self.alarms.look(self._events, robots, self.feed.now_ms), but="t")

@@ -106,9 +106,11 @@ class AuditTrail:
     """The facts that nobody has taken yet, oldest first.
 
     Attributes:
+        keeps: Whether facts are wanted at all.
         lost: How many were forgotten, as nobody took them in time.
     """
 
+    keeps: bool = True
     lost: int = 0
     _facts: deque[Fact] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
 from functools import partial
 
-from dva_sim.agents.device import HEARTBEAT, STATUS, AgentDevice
+from dva_sim.agents.device import AUDIT, EVENT, HEARTBEAT, STATUS, AgentDevice
 from dva_sim.agents.robot.sensors import sensor_topic
+from dva_sim.core.audit import MOST_KEPT, Fact
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
+from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Subscription
@@ -30,6 +32,8 @@ class DvaAgent:
         beats: Heartbeats heard, by device.
         leave_after: Who is silent is listened to for so much longer [s].
         events: Every event there ever was, by number, where `keep_events`.
+        facts: What was decided; the last of it, unless `keep_events`.
+        on_fact: Is told of each fact as it is taken from the desk.
     """
 
     def __init__(
@@ -37,6 +41,9 @@ class DvaAgent:
     ) -> None:
         self.device, self.desk = device, desk
         self.events: dict[int, Event] = {}
+        self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
+        self.on_fact: Callable[[Fact], object] = self.facts.append
+        self._asks = desk.dispatcher.questions.asks
         self._memory, self._keep_events = memory, keep_events
         self._told: dict[int, State] = {}
         self._policy_failures = 0
@@ -183,6 +190,22 @@ class DvaAgent:
             if self._keep_events:
                 self.events[event.number] = event
             self._tell(event)
+        self._tell_control_rooms(changed)
+
+    def _tell_control_rooms(self, changed: Iterable[Event]) -> None:
+        """Publish what is new, if anybody is there who listens for it; facts are kept anyway."""
+        desk, now, facts = self.desk, self.device.clock.now, self.desk.trail.take()
+        for fact in facts:
+            self.on_fact(fact)
+        if not any(desk.registry.of_type(CONTROL_ROOM)):
+            return
+        for event in changed:
+            self.device.publish(EVENT, desk.control_rooms.event_status(event, now))
+        for fact in facts:
+            self.device.publish(AUDIT, fact.record())
+        if self._asks != desk.dispatcher.questions.asks:
+            self._asks = desk.dispatcher.questions.asks
+            self.device.publish(EVENT, desk.control_rooms.status(now))
 
     def _count_failures(self) -> None:
         """Count what a policy got wrong, and tell of the first time."""

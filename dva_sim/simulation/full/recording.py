@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.core.sensing import REACH
 from dva_sim.kernel.recorder import Recorder
@@ -103,6 +104,7 @@ class Recording(Playback):
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
             `datagram`.
         persons: Numbers of the operators whose places people took.
+        facts: What was decided, by whom and why.
     """
 
     robots: dict[str, RobotAgent]
@@ -110,6 +112,7 @@ class Recording(Playback):
     people: list[PersonLog] = field(default_factory=list)
     depth: str = "message"
     persons: tuple[int, ...] = ()
+    facts: list[Fact] = field(default_factory=list)
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""

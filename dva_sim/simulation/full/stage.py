@@ -15,7 +15,7 @@ import shapely
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
-from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
@@ -38,7 +38,7 @@ _ROOMS = {
     "detector": 4,
     "console": 5,
     "phone": 6,
-    "room": 7,
+    "control-room": 7,
 }
 
 
@@ -85,7 +85,7 @@ TYPES = {
     "detector": DETECTOR,
     "console": OPERATOR,
     "phone": OPERATOR,
-    "room": "ControlRoom",
+    "control-room": CONTROL_ROOM,
 }
 
 
