@@ -29,8 +29,8 @@ class AlarmDesk:
         alarms: What decides.
     """
 
-    def __init__(self, run: Run, clock: Callable[[], float] = time.monotonic) -> None:
-        self._run, self._clock = run, clock
+    def __init__(self, run: Run, clock: Callable[[], float] | None = None) -> None:
+        self._run, self._clock = run, clock or (lambda: time.monotonic())
         self.alarms = Alarms()
         self._since: dict[str, int] = {}
 

@@ -114,10 +114,10 @@ class Audited:
             "arrival_s": fact.arrival_in,
             "waited_s": fact.waited,
         }
-        details: Line = {key: value for key, value in told.items() if value is not None}
+        details: Line = {key: _short(value) for key, value in told.items() if value is not None}
         if fact.action == "assign":
             details["advised"] = fact.advised and self._label(fact.advised)
-            details["advised_s"] = fact.advised_in
+            details["advised_s"] = _short(fact.advised_in)
         if not ok:
             details["code"] = fact.code
         said = (fact.text, fact.outcome)
@@ -133,3 +133,8 @@ class Audited:
             text=": ".join(text for text in said if text),
             details=details,
         )
+
+
+def _short(value: Any) -> Any:
+    """A time to the millisecond; all else as it is."""
+    return round(value, 3) if isinstance(value, float) else value

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from dva_sim.agents.control_room import ControlRoomAgent
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.refusal import Said
 from dva_sim.core.registry import FORGET_AFTER
@@ -24,6 +24,7 @@ LISTENER: Final = 1000  # number of the device that listens for the pages; a sce
 MOST_ROOMS: Final = 250
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of one until its id is given out again [s]
 JOINED_WITHIN: Final = 30.0  # a person is told by then whether the DVA knows the device [s]
+LOOK: Final = 0.05  # from one look whether it does to the next [s]
 NO_ANSWER: Final = "the DVA does not answer"
 
 
@@ -147,18 +148,20 @@ class ConsoleRooms:
             return
         self.by_client[client] = room
 
-        def joined(status: m.DispatchStatus) -> None:
-            if not room.registered and status.role is not None:
+        clock = room.device.clock
+        ends = clock.now + JOINED_WITHIN
+
+        def looks_again() -> bool:
+            status = room.agent.dispatch
+            if status is not None and status.role is not None:
                 room.registered = True
                 said(True, f"you are {room.device.label}, and may {status.role}")
-
-        def look() -> None:
-            if not room.registered:
+            elif clock.now >= ends:
                 said(False, NO_ANSWER)
+            return not room.registered and clock.now < ends
 
-        room.agent.on_dispatch = joined
         room.agent.start()
-        room.device.clock.call_after(JOINED_WITHIN, look)
+        clock.every(LOOK, looks_again)
 
     def _new(self, role: str, name: str) -> ConsoleRoom | None:
         number = next((n for n in range(1, MOST_ROOMS + 1) if n not in self._used), None)

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from dva_sim.console.web.actions import CONTROL_ROOM
 from dva_sim.console.web.checks import Labels
 from dva_sim.console.web.outbox import Asked
 from dva_sim.console.web.pipes import Lines, PipeEnd
@@ -20,7 +21,7 @@ from dva_sim.console.web.state import RunState
 
 PATIENCE = 5.0  # for an answer [s]
 LONG = 60.0  # for one that the DVA gives, or does not give after all attempts [s]
-BY_THE_DVA = ("phone_register", "phone_devices", "phone_permission")
+BY_THE_DVA = ("phone_register", "phone_devices", "phone_permission", *CONTROL_ROOM)
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
 MOST_PENDING = 256  # questions without an answer

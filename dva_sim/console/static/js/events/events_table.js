@@ -38,10 +38,10 @@ function Row({ event }) {
   return html`<tr class=${`${mine ? 'mine' : ''} ${open ? '' : 'over'}`} aria-selected=${mine} onClick=${choose}>
     <th scope="row"><button type="button" class="plain" aria-label=${`Event ${event.number}`}
       aria-pressed=${mine} onClick=${choose}>${event.number}</button></th>
-    <td><${SeverityMark} severity=${event.severity} quiet=${!open} />${capital(plain(event.kind))}
+    <td><span class="pair"><${SeverityMark} severity=${event.severity} quiet=${!open} />${capital(plain(event.kind))}</span>
       <small>${event.severity}</small></td>
     <td class="aside">${event.room || 'outdoors'}</td>
-    <td><${StateMark} state=${event.state} />${plain(event.state)}</td>
+    <td><span class="pair"><${StateMark} state=${event.state} />${plain(event.state)}</span></td>
     <td class="aside">${open ? ageText(worldNow() - event.since_ms) : ''}</td>
     <td>${event.assigned.join(', ')}</td>
     <td class="aside">${event.acknowledged?.label ?? ''}</td>

@@ -10,6 +10,7 @@ import { reason } from './shared.js';
 /** @typedef {import('../types.js').Proposal} Proposal */
 
 const AGAIN_MS = 4000;
+const SOON_MS = 500; // where it could not be asked, as while the page connects
 
 const known = signal(/** @type {Proposal | null} */ (null));
 const wanted = signal('');
@@ -88,15 +89,13 @@ function keepAsking(event) {
   if (!mayDispatch.peek() || connection.peek() !== 'open' || !isOpen(event)) return undefined;
   let over = false;
   const ask = async () => {
-    const done = await askQuietly('event_proposal', { event: event.number });
-    if (!over && done.ok && done.proposal) known.value = done.proposal;
+    const done = document.hidden ? null : await askQuietly('event_proposal', { event: event.number });
+    if (over) return;
+    if (done?.ok && done.proposal) known.value = done.proposal;
+    window.setTimeout(ask, done?.ok ? AGAIN_MS : SOON_MS);
   };
   ask();
-  const timer = window.setInterval(() => {
-    if (!document.hidden) ask();
-  }, AGAIN_MS);
   return () => {
     over = true;
-    window.clearInterval(timer);
   };
 }

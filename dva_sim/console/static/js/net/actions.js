@@ -6,7 +6,7 @@ import { steer } from './wire.js';
 
 const PATIENCE_MS = 8000;
 const LONG_MS = 65000; // for what the DVA answers, or does not after all attempts
-const BY_THE_DVA = ['phone_register', 'phone_devices', 'phone_permission'];
+const BY_THE_DVA = /^(phone_(register|devices|permission)|room_|event_|dispatch_|mission|take_over)/;
 const ENDS = ['stop', 'release'];
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */
@@ -43,7 +43,7 @@ export async function ask(what, more = {}) {
     return { ok: false, text: 'There is no connection to the world; nothing was sent.' };
   }
   const answer = new Promise((resolve) => waiting.set(id, resolve));
-  const patience = BY_THE_DVA.includes(what) ? LONG_MS : PATIENCE_MS;
+  const patience = BY_THE_DVA.test(what) ? LONG_MS : PATIENCE_MS;
   const timer = window.setTimeout(
     () => settle({ id, ok: false, text: `No answer to “${what}” within ${patience / 1000} s.` }),
     patience,
