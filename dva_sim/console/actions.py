@@ -60,6 +60,7 @@ class Actions:
             **GuardActions(world).doers,
             **self._rooms.doers,
             **AlarmActions(world, self._rooms).doers,
+            **world.dva.doers,
         }
 
     def take(self, line: Line) -> None:
@@ -295,6 +296,7 @@ class Actions:
     def _look(self, logs: Any, tables: Any) -> None:
         if isinstance(logs, dict) and isinstance(tables, list):
             self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
+            self._world.dva.looked = "devices" in tables
 
 
 def _nobody(ok: bool, text: str) -> None:

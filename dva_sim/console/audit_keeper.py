@@ -133,6 +133,8 @@ class AuditKeeper:
 
     def close(self) -> None:
         """Write the last row; what can still not be written is lost."""
+        if not self._thread.is_alive():
+            return
         lost = f"rows that found no room: {self._lost}" if self._lost else ""
         self.put(self.entry(END, text=lost))
         self._asked.put(None)

@@ -24,6 +24,7 @@ ACTIONS: Final = frozenset(
         *("phone_register", "phone_permission", "guard_join", "guard_leave", "guard_answer"),
         *("guard_say", "guard_report", "room_join"),
         *("alarm_acknowledge", "alarm_shelve", "alarm_unshelve"),
+        *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
     ]
 )
 DECISIONS: Final = frozenset(

@@ -18,6 +18,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.audited import Audited
+from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
@@ -43,7 +44,13 @@ Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
-POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next, real time [s]
+POSITIONS, ROWS, HAZARDS, DEVICES, TIDY = (
+    0.1,
+    0.5,
+    1.0,
+    1.0,
+    1.0,
+)  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -63,6 +70,7 @@ class ConsoleWorld:
         sockets: What carries the messages, if the links are real.
         run: The run.
         logs: What devices are asked, and answer.
+        dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
 
@@ -123,6 +131,7 @@ class ConsoleWorld:
         self.alarms = AlarmDesk(self.run)
         self.audited: Audited | None = None
         self._events: list[Line] = []
+        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
         self.hazards = HazardFeed(
@@ -141,6 +150,18 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
+        self.tell_scene()
+        self.show_scene()
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(ROWS, self._tell_rows)
+        self.clock.pulse(HAZARDS, self._tell_hazards)
+        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(DEVICES, self._tell_devices)
+        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def tell_scene(self) -> None:
+        """Tell what does not change, but for where the DVA listens."""
         run = self.run
         scene = scene_of(
             *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
@@ -150,13 +171,10 @@ class ConsoleWorld:
         scene["link"] = self.sliders.line()
         scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
         self.tell(scene)
-        self.show_scene()
-        self.clock.pulse(POSITIONS, self._tell_positions)
-        self.clock.pulse(ROWS, self._tell_rows)
-        self.clock.pulse(HAZARDS, self._tell_hazards)
-        self.clock.pulse(SOON, self._tell_news)
-        self.clock.pulse(PERIOD, self._tell_logs)
-        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def _dva_moved(self, address: str) -> None:
+        self.phones.address = address
+        self.tell_scene()
 
     def show_scene(self) -> None:
         """Tell whoever draws, from the beginning, what there is to be seen."""
@@ -261,6 +279,7 @@ class ConsoleWorld:
             "clock": self.clock_line(),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
+            "server": self.dva.port.line(),
             "robots": self.feed.robots(self.lag.held),
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
@@ -273,6 +292,11 @@ class ConsoleWorld:
         self._tell_rows()
         self._tell_seats()
         self._tell_audit()
+
+    def _tell_devices(self) -> None:
+        line = self.dva.devices(self.feed.now_ms)
+        if line is not None:
+            self.tell(line)
 
     def _tell_logs(self) -> None:
         for line in self.logs.batches():

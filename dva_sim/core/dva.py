@@ -207,6 +207,14 @@ class Dva:
         """What to say again after what an earlier life knew was recalled."""
         return self._and_revocations(self.orders.again())
 
+    def dismiss(self, device: str, now: float) -> list[Send]:
+        """A device is to be there no more: what it held is free, and it is forgotten at once."""
+        if device not in self.registry.entries:
+            return []
+        sends = self._gone(device, now)
+        self._forget(device)
+        return self._and_revocations(sends)
+
     def close(self) -> list[Send]:
         """The DVA closes: all sessions are over."""
         self.sessions.take_back_everything()

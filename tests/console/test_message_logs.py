@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from console_served import HOSTILE, scene
+from logged_messages import DVA, PHONE, ROBOT, asks, batch, line, said
+from lxml import etree
 
 from dva_sim.console.logs import BATCH, BATCH_BYTES, CUT, Logs
 from dva_sim.console.pipes import MOST_WAITING, LineOutbox
@@ -18,30 +21,10 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Request
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.codec import encode
 
-DVA, PHONE, ROBOT = "02:00:00:00:00:01", "02:00:00:06:00:01", "02:00:00:01:00:01"
-
-
-def said(number: int, body: m.Body, session: int | None = 0, source: str = PHONE) -> bytes:
-    return encode(m.Message(DVA, number, source, "12:00:00", session, body))
-
-
-def line(number: int, data: bytes, code: int | None = m.OK, published: bool = False) -> list:
-    reply = None
-    if code is not None:
-        answer = m.Message(PHONE, number, DVA, "12:00:01", 0, m.Reply(number, code, "so"))
-        reply = encode(answer).decode("latin-1")
-    return [number, 1000 * number, data.decode("latin-1"), reply, 250, int(published)]
-
-
-def batch(*lines: list, log: str = "dva") -> dict:
-    return {"k": "log", "log": log, "lines": list(lines)}
-
-
-def asks(first: int, last: int) -> list[list]:
-    return [line(n, said(n, m.GetDeviceList())) for n in range(first, last + 1)]
-
+SAMPLES = Path(__file__).parents[2] / "protocol" / "samples" / "valid"
+HEADER = {"DestinationID", "MessageID", "SourceID", "Timestamp", "SessionID"}
+GROUPS = {"Access", "Dispatch", "Event", "Mission", "Sensor", "TeleOp"}  # of several kinds
 
 # --- in the world ----------------------------------------------------------------------------
 
@@ -282,3 +265,14 @@ def test_only_pages_that_look_get_logs_and_tables():
 def test_nonsense_is_refused(given):
     with pytest.raises(BadMessage):
         Looks(KeptLogs(), True).look(*given)
+
+
+@pytest.mark.parametrize("file", sorted(SAMPLES.glob("*.xml")), ids=lambda file: file.stem)
+def test_every_kind_of_message_is_called_as_its_element(file):
+    message = etree.fromstring(file.read_bytes())[0]
+    payload = [child for child in message if child.tag not in HEADER]
+    name = message.tag
+    if name == "SimpleMsg":
+        group = payload[0]
+        name = group[0].tag if group.tag in GROUPS else group.tag
+    assert Entry.of(line(1, file.read_bytes())).kind == name

@@ -69,6 +69,12 @@ _REGISTER = {
     "label": _LABEL,
     "type": one_of("Robot", "Remote Control", "Teleoperation"),
 }
+_FAKE = {
+    "label": _LABEL,
+    "type": one_of("Robot", "Guard", "TeleOp", "Remote Control"),
+    "address": text(0, 64),
+    "id_tag": text(0, 17),
+}
 _PERMISSION = {"device": word, "level": one_of("teleoperation", "missions", "both")}
 _CALIBRATE = {
     "reference_mps2": maybe(_AXES),
@@ -145,6 +151,11 @@ ACTIONS: Known = {
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
     "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key not in _OPTIONAL)),
+    "server_start": ({"port": whole(1, 65_534)}, ("port",)),
+    "server_stop": ({}, ()),
+    "revoke": ({"device": word}, ("device",)),
+    "fake_add": (_FAKE, ("label", "type")),
+    "fake_remove": ({"device": word}, ("device",)),
     "guard_join": ({"guard": _LABEL}, ("guard",)),
     "guard_leave": ({}, ()),
     "guard_answer": ({"accept": flag, "reason": text(0, 200)}, ("accept", "reason")),
@@ -171,9 +182,10 @@ SILENT: Known = {
 # nothing for others, but that it stops a robot.
 NEEDS = {
     **dict.fromkeys(("take", "link", "pattern", "pace", "tour"), Role.DRIVE),
+    **dict.fromkeys(("server_start", "server_stop", "fake_add", "fake_remove"), Role.DRIVE),
     **dict.fromkeys(CONTROL_ROOM, Role.DISPATCH),
     **dict.fromkeys(("room_join", "event_raise", "event_proposal", "mission"), Role.DRIVE),
-    **dict.fromkeys(("dispatch_mode", "take_over"), Role.SUPERVISE),
+    **dict.fromkeys(("dispatch_mode", "take_over", "revoke"), Role.SUPERVISE),
 }
 
 

@@ -64,7 +64,7 @@ class Client:
 
     def __init__(self, name: str, role: Role, state: RunState) -> None:
         self.name, self.role = name, role
-        self.feed = PageFeed(state, name, role.acts)
+        self.feed = PageFeed(state, name, role >= Role.DRIVE)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
         self.driver: Driver | None = None
@@ -100,7 +100,7 @@ class Clients:
         known = self._all.get(name)
         if known is not None and known.role is role and not known.is_here:
             known.is_here = True
-            known.feed = PageFeed(self._state, known.name, role.acts)
+            known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
             return known
         self._count += 1
         client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state)

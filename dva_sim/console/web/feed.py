@@ -24,7 +24,7 @@ class PageFeed:
     Args:
         state: Of the run.
         seat: Of this page; its lines come in full.
-        acts: Whether the page may act.
+        acts: Whether the page may drive.
 
     Attributes:
         looks: Which logs and tables it looks at.

@@ -105,7 +105,7 @@ class Entry:
 
 _ELEMENT: Final = re.compile(rb"<(\w{1,64})\s*/?>")
 _ENDS: Final = ("SessionID", "Timestamp")
-_GROUPS: Final = frozenset({"Access", "TeleOp", "Mission", "Sensor", "Event"})
+_GROUPS: Final = frozenset({"Access", "Dispatch", "Event", "Mission", "Sensor", "TeleOp"})
 
 
 def kind_of(data: bytes) -> str:

@@ -157,12 +157,15 @@ class KeptLogs:
     """All logs that were ever told.
 
     Attributes:
-        names: Labels of devices by id: those of the scene, and of those who have registered.
+        names: Labels of devices by id: of the scene, of the table, of who has registered.
     """
 
     def __init__(self) -> None:
         self._logs: dict[str, KeptLog] = {}
         self.names: dict[str, str] = {}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._logs
 
     def of(self, name: str) -> KeptLog:
         """A log by its name, empty if nothing was told of it."""
@@ -170,12 +173,18 @@ class KeptLogs:
             del self._logs[next(iter(self._logs))]
         return self._logs.setdefault(name, KeptLog(name))
 
+    def meet(self, names: Names) -> None:
+        """Learn labels; of those that nobody can remember all, the oldest are forgotten."""
+        self.names |= names
+        while len(self.names) > MOST_NAMES:
+            del self.names[next(iter(self.names))]
+
     def take(self, line: Line) -> None:
         """A line of the kind `log`."""
         entries = [Entry.of(one) for one in line["lines"]]
         for entry in entries:
-            if entry.kind == "RegMsg" and entry.code == m.OK and len(self.names) < MOST_NAMES:
-                self.names[entry.header["SourceID"]] = entry.label
+            if entry.kind == "RegMsg" and entry.code == m.OK:
+                self.meet({entry.header["SourceID"]: entry.label})
         self.of(str(line["log"])).take(entries)
 
 
@@ -184,7 +193,7 @@ class Looks:
 
     Args:
         logs: All there are.
-        acts: Whether the page may act: who may not does not learn of sessions, by which one acts.
+        acts: Whether the page may drive: who may not does not learn of sessions, by which one does.
 
     Attributes:
         wanted: The logs it looks at.

@@ -96,6 +96,7 @@ class RunState:
             self.logs.take(line)
         elif kind in TABLES:
             self.tables[kind] = Versioned(self.version, body_of(line))
+            self.logs.meet({str(one["id"]): one["label"] for one in line["devices"]})
         elif kind in LATEST:
             self.lines[kind] = line
             self.latest[kind] = Versioned(self.version, body_of(line))
@@ -106,7 +107,7 @@ class RunState:
     def _take_scene(self, line: Line) -> None:
         self.scene = {key: value for key, value in line.items() if key not in ("k", "t")}
         self.scene_text, self.scene_version = encode(self.scene), self.version
-        self.logs.names |= {str(thing["id"]): thing["label"] for thing in line.get("things", ())}
+        self.logs.meet({str(thing["id"]): thing["label"] for thing in line.get("things", ())})
 
     def _take_places(self, line: Line) -> None:
         here = {row[0]: row for row in line["p"]}

@@ -68,6 +68,15 @@ class DvaAgent:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""
         self._carry_out(self.desk.close())
 
+    def silence(self, silent: bool) -> None:
+        """Say and decide nothing for a while, though the devices are still heard; or go on."""
+        self.device.silent = silent
+
+    def dismiss(self, device: str) -> None:
+        """Forget a device at once, as if it had been silent for long."""
+        self._carry_out(self.desk.dismiss(device, self.device.clock.now))
+        self._attend()
+
     def revoke(self, robot: str, takes: str | None, holder_told: bool) -> None:
         """End the permission for a robot while it is in use, as a scenario wants.
 
@@ -142,13 +151,17 @@ class DvaAgent:
 
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
-        if message is not None:
+        if message is not None and self.device.silent:
+            self.desk.registry.heard(source, self.device.clock.now)
+        elif message is not None:
             self.beats[source] += isinstance(message.body, m.Heartbeat)
             sends = self.desk.note(message, self.device.clock.now)
             if sends or isinstance(message.body, m.SensorValue):
                 self._carry_out(sends)
 
     def _tick(self) -> None:
+        if self.device.silent:
+            return
         self._carry_out(self.desk.tick(self.device.clock.now))
         self._attend()
 

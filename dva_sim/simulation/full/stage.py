@@ -39,6 +39,7 @@ _ROOMS = {
     "console": 5,
     "phone": 6,
     "control-room": 7,
+    "fake": 15,
 }
 
 
@@ -152,8 +153,8 @@ class Stage:
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
-        """What a robot can do, by its id, as its operator has been taught."""
-        spec = self._specs[robot]
+        """What a robot can do, as its operator has been taught; a stranger, what ours can."""
+        spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
     def device(self, kind: str, number: int) -> AgentDevice:

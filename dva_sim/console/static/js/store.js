@@ -10,6 +10,11 @@ export const rows = signal(null);
 export const hazards = signal({ hazards: [], fields: [] });
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').SiteEvent[]>} */
 export const events = signal([]);
+/**
+ * What the DVA knows of each device, while a page shows it.
+ * @type {import('../vendor/preact.js').Signal<any[]>}
+ */
+export const devices = signal([]);
 /** @type {import('../vendor/preact.js').Signal<{t: number, who: string, what: string}[]>} */
 export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */

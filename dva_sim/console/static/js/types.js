@@ -34,7 +34,9 @@
  *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
  *   refused: number}} RobotRow
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
- *   people: {i: number, doing: string}[], order?: Order | null}} Rows
+ *   people: {i: number, doing: string}[], order?: Order | null, server?: Server}} Rows
+ * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
+ *   own?: boolean}} Server
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard

@@ -6,7 +6,8 @@ import { steer } from './wire.js';
 
 const PATIENCE_MS = 8000;
 const LONG_MS = 65000; // for what the DVA answers, or does not after all attempts
-const BY_THE_DVA = /^(phone_(register|devices|permission)|room_|event_|dispatch_|mission|take_over)/;
+const BY_THE_DVA =
+  /^(phone_(register|devices|permission)|fake_add|room_|event_|dispatch_|mission|take_over)/;
 const ENDS = ['stop', 'release'];
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */

@@ -2,7 +2,8 @@
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
 import {
-  alarmList, audit, connection, control, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you,
+  alarmList, audit, connection, control, devices, events, guard, hazards, pictures, rows, scene, seat, story, tracks,
+  you,
 } from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
@@ -39,6 +40,7 @@ const LINES = {
     rememberClient(line.client);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
+  devices: (line) => (devices.value = line.devices),
   log: hearLog,
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),

@@ -2,7 +2,7 @@
 import { html, useEffect, useRef } from '../../vendor/preact.js';
 import { clockText } from '../ui/words.js';
 
-const HEADS = ['No.', 'Time', 'Kind', 'From', 'To', 'Session', 'Reply', 'Service', 'Payload'];
+const HEADS = ['No.', 'Time', 'Kind', 'From', 'Reply', 'Service', 'Payload', 'Session', 'To'];
 const NEAR_PX = 40;
 
 /**
@@ -53,12 +53,12 @@ function Row({ row, isChosen, isReachable, onChoose }) {
       aria-pressed=${isChosen} aria-label=${`Request ${row.n}`}>${row.n}</button></td>
     <td class="n">${timeText(row.t)}</td>
     <td>${row.kind}</td>
-    <td><${End} label=${row.from_label} id=${row.from} /></td>
-    <td><${End} label=${row.to_label} id=${row.to} /></td>
-    <td class="n">${row.session || '–'}</td>
-    <td>${replyText(row)}</td>
+    <td class="end"><${End} label=${row.from_label} id=${row.from} /></td>
+    <td class="reply">${replyText(row)}</td>
     <td class="n">${serviceText(row.service_us)}</td>
     <td class="payload">${row.payload}</td>
+    <td class="n">${row.session || '–'}</td>
+    <td class="end"><${End} label=${row.to_label} id=${row.to} /></td>
   </tr>`;
 }
 

@@ -2,6 +2,7 @@
 import { html, render } from '../../vendor/preact.js';
 import { clock, connection, notice, scene } from '../store.js';
 import { AuditPage } from '../audit/audit_page.js';
+import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { EventsPage } from '../events/events_page.js';
 import { Help } from '../help/help.js';
@@ -17,6 +18,7 @@ import { addressOf, page } from './route.js';
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
   ['drive', 'Drive', 'gamepad-2'],
   ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
@@ -25,6 +27,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
+  devices: DevicesPage,
   drive: DrivePage,
   events: EventsPage,
   network: NetworkPage,
