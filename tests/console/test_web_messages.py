@@ -250,7 +250,7 @@ def test_a_phone_may_do_what_a_phone_does_and_who_looks_nothing():
 
 
 def test_who_drives_sends_nobody_and_only_a_supervisor_takes_a_robot_from_its_holder():
-    for name in CONTROL_ROOM:
+    for name in (name for name in CONTROL_ROOM if NEEDS[name] > Role.DRIVE):
         with pytest.raises(BadMessage, match=f"may not {name.replace('_', ' ')}; an address "):
             check_role(Role.DRIVE, name)
         check_role(Role.SUPERVISE, name)
