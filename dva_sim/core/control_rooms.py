@@ -45,7 +45,7 @@ Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class RoomAnswer:
     """What is answered, and what follows; a code other than OK means that nothing was done."""
 
     code: int = m.OK
@@ -89,21 +89,21 @@ class ControlRooms:
 
     # --- what comes in -----------------------------------------------------------------
 
-    def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> Answer:
-        """Answer what a device has asked, or decided."""
+    def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> RoomAnswer:
+        """RoomAnswer what a device has asked, or decided."""
         need, action = NEEDS.get(type(body), (R.SUPERVISE, ""))
         if not action:
             name = type(body).__name__
-            return Answer(m.NOT_SUPPORTED, f"{name} is what the DVA says")
+            return RoomAnswer(m.NOT_SUPPORTED, f"{name} is what the DVA says")
         if sender.device_type != CONTROL_ROOM:
-            return Answer(m.NOT_PERMITTED, f"{sender.label} is no control room")
+            return RoomAnswer(m.NOT_PERMITTED, f"{sender.label} is no control room")
         if (refusal := self.may(sender, need, action)) is not None:
             return self._refuse(body, sender, action, m.NOT_PERMITTED, refusal, now)
         match body:
             case m.GetEventList():
-                return Answer(content=self._list(body.event_id or 0, now))
+                return RoomAnswer(content=self._list(body.event_id or 0, now))
             case m.GetDispatch():
-                return Answer(content=self.status(now, sender))
+                return RoomAnswer(content=self.status(now, sender))
             case m.SetDispatch():
                 return self._set_dispatch(body, sender, now)
             case m.Revoke():
@@ -136,13 +136,13 @@ class ControlRooms:
 
     # --- about one event ---------------------------------------------------------------
 
-    def _about_event(self, body: Any, sender: m.Device, action: str, now: float) -> Answer:
+    def _about_event(self, body: Any, sender: m.Device, action: str, now: float) -> RoomAnswer:
         event = self._book.get(body.event_id)
         if event is None:
             text = f"no event {body.event_id}"
             return self._refuse(body, sender, action, m.UNKNOWN_EVENT, text, now)
         if isinstance(body, m.GetProposal):
-            return Answer(content=proposal(self._dispatcher, event, now))
+            return RoomAnswer(content=proposal(self._dispatcher, event, now))
         advised = self._dispatcher.advised(event, now) if action in _ON_HANDS else None
         try:
             self._check(body, event, sender, action, now)
@@ -151,10 +151,10 @@ class ControlRooms:
             answer = self._refuse(body, sender, action, refused.code, str(refused), now, advised)
             return replace(answer, content=self.event_status(event, now))
         if isinstance(done, str):  # it was so already
-            return Answer(m.OK, done, self.event_status(event, now))
+            return RoomAnswer(m.OK, done, self.event_status(event, now))
         self._decided(body, event, sender, action, advised, now)
         sends = [*done, *self._dispatcher.decide(now)]
-        return Answer(m.OK, "", self.event_status(event, now), tuple(sends))
+        return RoomAnswer(m.OK, "", self.event_status(event, now), tuple(sends))
 
     def _check(
         self, body: Decision, event: Event, sender: m.Device, action: str, now: float
@@ -330,31 +330,31 @@ class ControlRooms:
 
     # --- about all events, or none -----------------------------------------------------
 
-    def _set_dispatch(self, body: m.SetDispatch, sender: m.Device, now: float) -> Answer:
+    def _set_dispatch(self, body: m.SetDispatch, sender: m.Device, now: float) -> RoomAnswer:
         questions, asks = self._dispatcher.questions, body.dispatch_mode == "ask_first"
         if questions.asks == asks:
-            return Answer(m.OK, "it is so already", self.status(now, sender))
+            return RoomAnswer(m.OK, "it is so already", self.status(now, sender))
         questions.asks = asks
         reason = body.reason or ""
         questions.switched = Choice(sender.id_tag, sender.label, "set_dispatch", now, reason)
         self._note(sender, "set_dispatch", now, mode=body.dispatch_mode, cause=reason)
         sends = self._dispatcher.decide(now)
-        return Answer(m.OK, "", self.status(now, sender), tuple(sends))
+        return RoomAnswer(m.OK, "", self.status(now, sender), tuple(sends))
 
-    def _revoke(self, body: m.Revoke, sender: m.Device, now: float) -> Answer:
+    def _revoke(self, body: m.Revoke, sender: m.Device, now: float) -> RoomAnswer:
         entry, sessions = self._orders.registry.entries.get(body.device), self._orders.sessions
         if entry is None or entry.device.device_type != ROBOT:
             text = f"no robot {body.device}"
             return self._refuse(body, sender, "revoke", m.UNKNOWN_DEVICE, text, now)
         grant = sessions.permissions.grants.get(body.device)
         if grant is None or grant.holder == sessions.permissions.own:
-            return Answer(m.OK, "nobody holds it")
+            return RoomAnswer(m.OK, "nobody holds it")
         holder = self._orders.label_of(grant.holder)
         sends = self._orders.taken_away(body.device, now)
         sessions.revoke(grant)
         told = f"{holder} held it"
         self._note(sender, "revoke", now, device=body.device, cause=body.reason or "", outcome=told)
-        return Answer(m.OK, told, None, (*sends, *self._dispatcher.decide(now)))
+        return RoomAnswer(m.OK, told, None, (*sends, *self._dispatcher.decide(now)))
 
     # --- what is kept of it ------------------------------------------------------------
 
@@ -414,11 +414,11 @@ class ControlRooms:
         text: str,
         now: float,
         advised: Advised | None = None,
-    ) -> Answer:
+    ) -> RoomAnswer:
         fact = self._fact(body, sender, action, advised, now)
         if not isinstance(body, m.GetEventList | m.GetDispatch | m.GetProposal):
             self._orders.trail.note(replace(fact, code=code, outcome=text))
-        return Answer(code, text)
+        return RoomAnswer(code, text)
 
     def _fact(
         self, body: Any, sender: m.Device, action: str, advised: Advised | None, now: float
