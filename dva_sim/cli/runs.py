@@ -26,6 +26,7 @@ from dva_sim.cli.options import (
     takes,
 )
 from dva_sim.cli.verbosity import loudness
+from dva_sim.kernel.errors import ConfigError
 
 _MOST_PORT = 64_999
 LINKS = "modelled", "real"
@@ -135,9 +136,13 @@ def live(
 
 def console(
     scenario: Annotated[
-        str,
-        Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path."),
-    ] = "hands-on",
+        str | None,
+        Argument(
+            metavar="SCENARIO",
+            autocompletion=SCENARIOS,
+            help="A scenario by name or path; hands-on if none is named.",
+        ),
+    ] = None,
     port: Annotated[
         int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)
     ] = 8765,
@@ -150,6 +155,13 @@ def console(
     dva_port: Annotated[
         int, count("With real links: port of the DVA; 0: any.", metavar="PORT", most=_MOST_PORT)
     ] = 0,
+    dva: Annotated[
+        str | None,
+        Option(metavar="HOST:PORT", help="Show what runs at this DVA; SCENARIO gives the plan."),
+    ] = None,
+    keys: Annotated[
+        Path | None, folder("With --dva: keys, one of a control room, from `dva-sim keys`.")
+    ] = None,
     phones: Annotated[
         bool, Option("--phones", help="An address for phones, by https, with a QR code.")
     ] = False,
@@ -189,15 +201,35 @@ def console(
         dva-sim console --audit audit.sqlite  # who decided what, for `check`
         dva-sim console -o results/mine  # tables of the drives, for `show` and `report`
         dva-sim console --links real  # over sockets, which other devices may join
+        dva-sim console --dva 127.0.0.1:5600  # what a `dva-sim live` does, here or elsewhere
         dva-sim console --phones  # prints an address to be scanned by a phone
     """
-    from dva_sim.console.options import ConsoleOptions  # late: start-up
+    from dva_sim.console.attached.options import AttachOptions, refuse_with_dva  # late: start-up
+    from dva_sim.console.attached.supervisor import attach  # late: start-up
+    from dva_sim.console.options import DEFAULT, ConsoleOptions  # late: start-up
     from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
     from dva_sim.testing.scenario_mistakes import mistakes_of  # late: start-up
 
     changes = tuple(set_ or ())
+    if dva is not None:
+        own = {"--links": links != "modelled", "--phones": phones, "--record": record, "-o": out}
+        refuse_with_dva([name for name, given in own.items() if given])
+        where = AttachOptions(
+            dva=dva,
+            keys=keys,
+            scenario=scenario,
+            changes=changes,
+            host=host,
+            port=port,
+            token=not no_token,
+            open=not no_open,
+        )
+        attach(where, _say_at_once)
+        return
+    if keys is not None:
+        raise ConfigError("--keys is for --dva: devices of a console encrypt nothing")
     options = ConsoleOptions(
-        scenario=scenario,
+        scenario=scenario or DEFAULT,
         seed=seed,
         changes=changes,
         host=host,
@@ -215,7 +247,7 @@ def console(
         keep_motion=keep_motion,
         overwrite=overwrite,
     )
-    with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):
+    with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), seed):
         ConsoleSupervisor(options, _say_at_once).run()
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from dva_sim.agents.observation import Cameras
@@ -15,6 +16,7 @@ from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.audited import Audited
@@ -27,11 +29,13 @@ from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.console.robot_windows import RobotWindows
 from dva_sim.console.rooms import ConsoleRooms, about_event
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
+from dva_sim.console.stands import why_stands
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
@@ -44,7 +48,8 @@ Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
-POSITIONS, ROWS, HAZARDS, DEVICES, TIDY = (
+POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = (
+    0.1,
     0.1,
     0.5,
     1.0,
@@ -70,6 +75,7 @@ class ConsoleWorld:
         sockets: What carries the messages, if the links are real.
         run: The run.
         logs: What devices are asked, and answer.
+        windows: Those of the robots.
         dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
@@ -104,7 +110,8 @@ class ConsoleWorld:
         self.feed, self.lag = Feed(self.run), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Tell = lambda *_: None
-        self.sliders = LinkSliders(self.run)
+        self.windows = self._windows()
+        self.sliders = LinkSliders(self.run, self.windows.set_usual)
         self.dropped: Callable[[], int] = lambda: 0
         self._console = Console(
             setup=setup_of(self.run.stage, scenario),
@@ -139,9 +146,30 @@ class ConsoleWorld:
         )
         self.logs = Logs(self.run.network, self._node_of)
         self.logs.keep("dva")
+        for id_tag, robot in field.robots.items():
+            hears = partial(self.windows.heard, id_tag)
+            self.logs.listen(robot.device.label, hears, publications=True)
         self._newest: dict[str, Any] = {}
         self.clock.on_late = self._late
         self.hold: Callable[[str], object] = lambda _: None
+
+    def _windows(self) -> RobotWindows:
+        """The robots' windows; a reply that is dropped is told to the audit, like any that goes."""
+        run, recorder = self.run, self.recorder
+        recorder.robots = run.field.robots.keys()
+
+        def lost(robot: str, reply: bytes) -> None:
+            run.audit.sent(run.clock.now, robot, "", reply)
+
+        about = self.feed.numbers, run.stage.labels
+        windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
+        for id_tag in run.field.robots:
+            self.feed.things[self.feed.numbers[id_tag]] |= windows.about(id_tag)
+        return windows
+
+    def deafen(self, robot: str, on: bool) -> None:
+        """The audit is told that a robot hears nothing, or hears again."""
+        (self.run.audit.deaf.add if on else self.run.audit.deaf.discard)(robot)
 
     def serve_cameras(self, base: str) -> None:
         """The robots' pictures are to be had below this URL from now on."""
@@ -153,6 +181,7 @@ class ConsoleWorld:
         self.tell_scene()
         self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(WINDOWS, self._tell_windows)
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
@@ -292,6 +321,13 @@ class ConsoleWorld:
         self._tell_rows()
         self._tell_seats()
         self._tell_audit()
+
+    def _tell_windows(self) -> None:
+        def stands(robot: RobotAgent) -> str:
+            return why_stands(robot, self.clock.now, self.lag.held)
+
+        for line in self.windows.lines(self.screens.watched, stands):
+            self._tell_new(line, but="t", key=str(line["i"]))
 
     def _tell_devices(self) -> None:
         line = self.dva.devices(self.feed.now_ms)

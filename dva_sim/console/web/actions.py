@@ -133,6 +133,14 @@ CONTROL_ROOM: Known = {
 }
 _SAYINGS = ("departed", "arrived", "confirmed", "refuted", "contained", "help")
 
+_FAULT = {
+    "robot": robot,
+    "what": one_of("processing", "replies", "freeze", "camera", "sensor"),
+    "on": flag,
+    "seconds": number(0, 3),
+    "sensor": word,
+}
+
 # What may be asked: its arguments, and those of them that have to be there.
 ACTIONS: Known = {
     "take": ({"robots": robots}, ("robots",)),
@@ -147,6 +155,9 @@ ACTIONS: Known = {
     "refute": ({}, ()),
     "decline": ({}, ()),
     "tour": ({}, ()),
+    "manual_take": ({"robot": robot}, ("robot",)),
+    "manual_release": ({}, ()),
+    "fault": (_FAULT, ("robot", "what", "on")),
     "phone_register": (_REGISTER, tuple(_REGISTER)),
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
@@ -164,17 +175,16 @@ ACTIONS: Known = {
     "guard_report": (_REPORT, tuple(_REPORT)),
     **CONTROL_ROOM,
 }
+_INPUT = {
+    "n": whole(0, 2**53),
+    "speed": number(0, 1),
+    "turn": number(-1, 1),
+    "held": flag,
+}
 # Those that have no answer.
 SILENT: Known = {
-    "input": (
-        {
-            "n": whole(0, 2**53),
-            "speed": number(0, 1),
-            "turn": number(-1, 1),
-            "held": flag,
-        },
-        ("n", "speed", "turn", "held"),
-    ),
+    "input": (_INPUT, tuple(_INPUT)),
+    "manual": (_INPUT, tuple(_INPUT)),
     "samples": (_SAMPLES, tuple(_SAMPLES)),
     "gone": ({}, ()),
 }
@@ -183,6 +193,7 @@ SILENT: Known = {
 NEEDS = {
     **dict.fromkeys(("take", "link", "pattern", "pace", "tour"), Role.DRIVE),
     **dict.fromkeys(("server_start", "server_stop", "fake_add", "fake_remove"), Role.DRIVE),
+    **dict.fromkeys(("manual_take", "manual", "fault"), Role.DRIVE),
     **dict.fromkeys(CONTROL_ROOM, Role.DISPATCH),
     **dict.fromkeys(("room_join", "event_raise", "event_proposal", "mission"), Role.DRIVE),
     **dict.fromkeys(("dispatch_mode", "take_over", "revoke"), Role.SUPERVISE),

@@ -85,6 +85,7 @@ class Hub:
             client.feed.resync()
         elif what == "watch":
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
+            client.feed.watches = client.watches
             self.watching()
         elif what == "look" and client.role is not Role.PHONE:
             client.feed.looks.look(said.get("logs", {}), said.get("tables", []))

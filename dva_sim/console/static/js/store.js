@@ -20,6 +20,11 @@ export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */
 export const seat = signal(null);
 /**
+ * What the windows of robots show, of those that the page looks at.
+ * @type {import('../vendor/preact.js').Signal<Map<number, import('./types.js').RobotWindow>>}
+ */
+export const windows = signal(new Map());
+/**
  * What the guard knows whom this page stands for.
  * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
  */
@@ -56,6 +61,8 @@ export const clock = computed(
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
 /** Whether the link is that of a study, with sliders, and not one of sockets. */
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
+/** Whether what is shown runs at a DVA elsewhere, of which only messages are known. */
+export const isAttached = computed(() => Boolean(scene.value?.attached));
 /** How long a command takes at least [ms], as far as it is known. */
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),
@@ -95,4 +102,4 @@ export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
  * The mode of a robot, as its driver hears it first, else as everybody does.
  * @param {number} i
  */
-export const modeOf = (i) => driveOf(i)?.mode || rowOf(i)?.mode || 'Idle';
+export const modeOf = (i) => (rowOf(i)?.by_hand ? 'Manual' : driveOf(i)?.mode || rowOf(i)?.mode || 'Idle');

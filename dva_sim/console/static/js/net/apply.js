@@ -3,7 +3,7 @@ import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
 import {
   alarmList, audit, connection, control, devices, events, guard, hazards, pictures, rows, scene, seat, story, tracks,
-  you,
+  windows, you,
 } from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
@@ -23,6 +23,7 @@ const LINES = {
     tracks.drop(line.gone ?? []);
   },
   rows: (line) => (rows.value = line),
+  robot: (line) => (windows.value = new Map(windows.value).set(line.i, line)),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
   control: (line) => (control.value = line),
@@ -67,6 +68,7 @@ function snap(line) {
   story.value = [];
   seat.value = null;
   guard.value = null;
+  windows.value = new Map();
   const { pos, story: told, ...others } = line.state ?? {};
   if (pos) LINES.pos({ p: pos });
   if (told) story.value = told.slice(-STORY_KEPT);

@@ -1,6 +1,6 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
-import { clock, connection, notice, scene } from '../store.js';
+import { clock, connection, isAttached, notice, rows, scene } from '../store.js';
 import { AuditPage } from '../audit/audit_page.js';
 import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
@@ -9,6 +9,7 @@ import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
 import { RequestsPage } from '../requests/requests_page.js';
+import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -19,15 +20,18 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
   ['devices', 'Devices', 'router'],
+  ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
   ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
   ['audit', 'Audit', 'square'],
 ]);
+const NOT_ATTACHED = ['robots', 'drive', 'network']; // what sends is absent where only messages are known
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
   main: RequestsPage,
   devices: DevicesPage,
+  robots: RobotsPage,
   drive: DrivePage,
   events: EventsPage,
   network: NetworkPage,
@@ -41,7 +45,7 @@ export function showApp(where) {
 }
 
 function App() {
-  const Page = BODIES[page.value];
+  const Page = BODIES[isAttached.value && NOT_ATTACHED.includes(page.value) ? 'map' : page.value];
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
     <div class="body"><${Warnings} /><${Tour} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
@@ -56,7 +60,7 @@ function skip(event) {
 
 function Rail() {
   return html`<nav class="rail" aria-label="Pages">
-    ${PAGES.map(
+    ${PAGES.filter(([name]) => !(isAttached.value && NOT_ATTACHED.includes(name))).map(
       ([name, title, icon]) => html`<a href=${addressOf(name)}
         aria-current=${page.value === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
     )}
@@ -85,6 +89,8 @@ function Warnings() {
     ${connection.value === 'lost' &&
     html`<p class="warning">The connection to the world is lost; what you see is old. Robots that
       you drove have been stopped. Trying again …</p>`}
+    ${rows.value?.server?.own === false && !rows.value.server.listens &&
+    html`<p class="warning">The DVA at ${rows.value.server.address} does not answer: what you see is old. Asking again …</p>`}
     ${ended && html`<p class="warning">The world has ended: ${connection.value}</p>`}
     ${notice.value &&
     html`<p class="warning">${notice.value} <button type="button" class="plain"

@@ -1,6 +1,6 @@
 /** What is always in sight: time, link, age of the data, alarms, who one is, emergency stop. */
 import { html } from '../../vendor/preact.js';
-import { clock, connection, isModelled, link, maySteer, you } from '../store.js';
+import { clock, connection, isAttached, isModelled, link, maySteer, scene, you } from '../store.js';
 import { act, emergencyStop } from '../net/actions.js';
 import { roundTrip } from '../net/round_trip.js';
 import { pageAge, worldNow } from '../net/world_time.js';
@@ -46,7 +46,8 @@ function Link() {
   const setting = link.value;
   if (!isModelled.value) {
     return html`<span class="item link" role="status" aria-label="Link"
-      title="Sockets lie between the console and the robots, not a model">real</span>`;
+      title=${isAttached.value ? 'What is shown runs elsewhere; here is known what messages tell' : 'Sockets lie between the console and the robots, not a model'}>
+      ${isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
   }
   const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
   const trace = setting?.trace ? `, ${setting.trace}` : '';
