@@ -84,6 +84,7 @@ class ConsoleProcesses:
         self,
         subject: ConsoleSubject,
         take: Callable[[Line], object],
+        report: Path | None = None,
         audit: Path | None = None,
     ) -> None:
         """Start both, connect them with what is shown, say where it is, and begin.
@@ -92,11 +93,12 @@ class ConsoleProcesses:
             subject: What is shown.
             take: Does what a line of a page asks for.
             audit: File of the audit log that pages show, if there is one.
+            report: A study's report that pages may show.
 
         Raises:
             ChildFailed: the web process could not begin.
         """
-        web = self._start_web(audit)
+        web = self._start_web(report, audit)
         pictures = self._start_pictures()
         self.serving = web.first_line()
         subject.serve_cameras(str(self.serving["base"]))
@@ -124,13 +126,14 @@ class ConsoleProcesses:
         for child in self._children:
             child.make_sure(deadline)
 
-    def _start_web(self, audit: Path | None) -> Child:
+    def _start_web(self, report: Path | None, audit: Path | None) -> Child:
         options = self._options
         ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += [] if options.token else ["--no-token"]
         words += [] if audit is None else ["--audit", str(audit)]
+        words += [] if report is None else ["--report", str(report)]
         if options.phones:
             words += ["--phones-host", options.phones_host]
             words += ["--phones-port", str(options.phones_port)]

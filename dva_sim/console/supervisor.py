@@ -107,7 +107,7 @@ class ConsoleSupervisor:
         with ending_when_asked(world.clock, supervised=False) as ending:
             actions = Actions(world)
             path = None if world.audited is None else world.audited.keeper.path
-            self._processes.start(world, actions.take, path)
+            self._processes.start(world, actions.take, audit=path)
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
             if not ending.is_asked:

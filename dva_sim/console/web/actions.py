@@ -151,6 +151,8 @@ ACTIONS: Known = {
     "link": (_LINK, ()),
     "pattern": ({"robot": robot, "name": word}, ("robot", "name")),
     "pace": ({"factor": number(0.01, 1000), "paused": flag}, ()),
+    "seek": ({"t_ms": whole(0, 10**10)}, ("t_ms",)),
+    "open_recording": ({"name": text(1, 255)}, ("name",)),
     "confirm": ({}, ()),
     "refute": ({}, ()),
     "decline": ({}, ()),
@@ -191,7 +193,9 @@ SILENT: Known = {
 # The least role that may ask for it; whoever acts at all may ask for the others. A phone changes
 # nothing for others, but that it stops a robot.
 NEEDS = {
-    **dict.fromkeys(("take", "link", "pattern", "pace", "tour"), Role.DRIVE),
+    **dict.fromkeys(
+        ("take", "link", "pattern", "pace", "tour", "seek", "open_recording"), Role.DRIVE
+    ),
     **dict.fromkeys(("server_start", "server_stop", "fake_add", "fake_remove"), Role.DRIVE),
     **dict.fromkeys(("manual_take", "manual", "fault"), Role.DRIVE),
     **dict.fromkeys(CONTROL_ROOM, Role.DISPATCH),

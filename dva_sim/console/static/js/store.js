@@ -52,6 +52,12 @@ export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
 export const notice = signal('');
 
+/**
+ * The recordings that can be chosen, if any can.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Shelf | null>}
+ */
+export const shelf = signal(null);
+
 /** Where everything that moves is; not a signal, for it is drawn, not rendered. */
 export const tracks = new Tracks();
 
@@ -67,6 +73,10 @@ export const isAttached = computed(() => Boolean(scene.value?.attached));
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),
 );
+/** What is known of the recording that is shown; null where something runs. */
+export const replay = computed(() => scene.value?.replay ?? null);
+/** Whether the past is shown, in which nobody can be told anything. */
+export const isPast = computed(() => Boolean(scene.value && 'replay' in scene.value));
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
@@ -79,7 +89,11 @@ export const maySupervise = computed(() => roleIsOneOf('supervise'));
 /** @param {string[]} roles */
 const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */
-export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
+export const maySteer = computed(
+  () => mayDrive.value && connection.value === 'open' && !isPast.value,
+);
+/** Whether this page may say which moment of a recording is shown. */
+export const maySteerReplay = computed(() => mayDrive.value && connection.value === 'open');
 
 const robotRows = computed(
   () => new Map((rows.value?.robots ?? []).map((row) => [row.i, row])),
