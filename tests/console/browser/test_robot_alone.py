@@ -67,7 +67,7 @@ def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_of
     robot, page, address = a_robot(programs, visit)
     assert state(page) == "off"
     expect(page.get_by_role("button", name="Open port")).to_be_disabled()
-    page.get_by_role("button", name="Take manual control").click()
+    expect(page.get_by_role("button", name="Take manual control")).to_be_disabled()
     expect(page.get_by_text("registered and listening first")).to_be_visible()
 
     page.get_by_label("DVA").fill(dva)
