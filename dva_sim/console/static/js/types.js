@@ -24,11 +24,20 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer}} Scene
+ *   lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer,
+ *   replay?: ReplayAbout | null}} Scene
+ * @typedef {{t: number, who: string, what: string, kind: string}} Mark
+ * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[]}} ReplayAbout
+ * @typedef {{name: string, bytes: number, part: string, person: number | null,
+ *   trial: number | null, levels: unknown[], values: unknown[]}} ShelfEntry
+ * @typedef {{folder: string, question: string, report: boolean, factors: string[],
+ *   measures: {title: string, unit: string}[], worst_by: string,
+ *   recordings: ShelfEntry[]}} Shelf
  * @typedef {{pipelines: Record<string, any>, filters: string[], mappings: string[],
  *   speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number}} PhoneOffer
  *
- * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean}} Clock
+ * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean,
+ *   jumps?: number}} Clock
  * @typedef {{i: number, mode: string, pattern: string, battery: number | null,
  *   holder: string | null, holder_label?: string | null, session_age_s?: number | null,
  *   watchdog_left_s: number | null, stands: string, set_speed_mps: number,
@@ -59,7 +68,33 @@
  *
  * @typedef {{number: number, kind: string, x_m: number, y_m: number, room: string,
  *   severity: string, state: string, since_ms: number, reported_ms: number,
- *   assigned: string[], over?: boolean}} SiteEvent
+ *   assigned: string[], over?: boolean, decisions?: number, note?: string | null,
+ *   acknowledged?: {label: string, at_ms: number} | null,
+ *   decided?: {label: string, action: string, at_ms: number, reason: string} | null}} SiteEvent
+ *
+ * @typedef {{label: string, role: string, client: string}} ControlRoom
+ * @typedef {{dispatch: {mode: string, decide_within_s: number,
+ *   switched: {label: string, at_ms: number} | null} | null, rooms: ControlRoom[]}} Control
+ * @typedef {{label: string, robot: boolean, can: boolean, reason: string,
+ *   arrival_s: number | null}} Candidate
+ * @typedef {{event: number, policy: string, reason: string, task: string | null, label: string,
+ *   arrival_s: number | null, decide_within_s: number | null, candidates: Candidate[]}} Proposal
+ * @typedef {{key: string, priority: string, state: string, text: string, place: string,
+ *   count: number, event: number | null, since_ms: number, is_new: boolean, seen_by: string,
+ *   left_s: number | null, shelved_by: string}} AlarmRow
+ * @typedef {{alarms: AlarmRow[], shelved: AlarmRow[], flood: boolean, rate: number}} AlarmList
+ * @typedef {{rows: number, hash: string, problem: string, lasting: boolean, file: string}} AuditState
+ * @typedef {{number: number, time_s: number, at_utc: string, author: string, device: string,
+ *   role: string, action: string, event: number | null, subject: string, cause: string,
+ *   outcome: string, text: string, details: Record<string, any>, hash: string}} AuditRow
+ * @typedef {{rows: number, hash: string, problem: {row: number, text: string} | null,
+ *   doubts: string[]}} AuditCheck
+ * @typedef {{events: number, median_s: number | null, largest_s: number | null}} Times
+ * @typedef {{acknowledge: Times, assign: Times, assigned_by_people: number,
+ *   assigned_by_policy: number, overrides: number, lost_s: number | null,
+ *   newest_overrides: {number: number, event: number, author: string, did: string,
+ *   did_s: number | null, advised: string | null, advised_s: number | null,
+ *   cause: string}[]}} AuditMeasures
  *
  * @typedef {{i: number, pattern: string, phase: string, mode: string, session?: number,
  *   wanted: number[], command: number[], sent: number, answered: number, timeouts: number,
@@ -83,7 +118,7 @@
  *
  * @typedef {{client: string, role: string}} You
  * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
- *   address: string}, devices?: Device[], hand?: number}} Done
+ *   address: string}, devices?: Device[], proposal?: Proposal, event?: number, hand?: number}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
  */
 export {};
