@@ -32,6 +32,7 @@ from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
 from dva_sim.console.stands import why_stands
+from dva_sim.console.strangers import Strangers
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run, Watched
@@ -129,6 +130,7 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.strangers = Strangers(self.run, self.feed)
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
@@ -250,9 +252,13 @@ class ConsoleWorld:
         }
 
     def _tell_positions(self) -> None:
-        self._tell_new(self.feed.positions(), but="t")
+        line = self.feed.positions()
+        line["p"] += self.strangers.positions()
+        self._tell_new(line, but="t")
 
     def _tell_rows(self) -> None:
+        if self.strangers.come():
+            self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         rows = {
             "k": "rows",
@@ -261,7 +267,7 @@ class ConsoleWorld:
             "link": self.sliders.line(),
             "dropped": self.dropped(),
             "server": self.dva.port.line(),
-            "robots": self.feed.robots(self.lag.held),
+            "robots": [*self.feed.robots(self.lag.held), *self.strangers.robots()],
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
         }

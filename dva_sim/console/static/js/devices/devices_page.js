@@ -52,7 +52,7 @@ function Row({ device }) {
     <th scope="row">${device.label}${device.fake && html` <span class="tag">fake</span>`}</th>
     <td>${device.type}</td><td>${device.id}</td><td>${device.address}</td>
     <td><${Health} device=${device} /></td>
-    <td>${device.doing ?? UNKNOWN}</td>
+    <td>${device.doing ?? (isAttached.value ? UNKNOWN : '–')}</td>
     <td class="n">${number(device.heard_s, 1)}</td><td class="n">${number(device.beats_hz, 1)}</td>
     <td class="n">${number(device.commands_hz, 1)}</td><td class="n">${number(device.refused, 0)}</td>
     <td class="n">${number(device.picture_age_s, 1)}</td>
