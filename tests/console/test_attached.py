@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import re
 import signal
-import socket
-import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 from patience import becomes
 from programs import Program, Programs, all_gone_after
 
@@ -119,19 +118,6 @@ def test_keys_without_one_of_a_control_room_are_not_enough(tmp_path):
 @pytest.fixture
 def programs(tmp_path: Path) -> Iterator[Programs]:
     yield from all_gone_after(tmp_path)
-
-
-def free_port() -> int:
-    """The first of two that are free, below those that systems give out by themselves."""
-    for port in range(21_000, 30_000, 2):
-        with socket.socket() as one, socket.socket() as other:
-            try:
-                one.bind(("127.0.0.1", port))
-                other.bind(("127.0.0.1", port + 1))
-            except OSError:
-                continue
-        return port
-    raise AssertionError("no port is free")
 
 
 class Attached:

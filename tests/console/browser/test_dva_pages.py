@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import zmq
+from free_ports import free_port
 from page_faults import faults
 from patience import PATIENCE_S
 from playwright.sync_api import Page, expect
@@ -290,9 +291,8 @@ def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
 @pytest.fixture
 def elsewhere(programs: Programs) -> tuple[str, Program]:
     """The address of a DVA that runs elsewhere, and its program; robots and guards know it."""
-    first = programs.start("live", "hands-on", "--only", "dva", "--for", "1000")
-    first.wait_to_say("DVA")
-    (dva,) = re.findall(r"127\.0\.0\.1:\d+", first.said)[:1]
+    dva = f"127.0.0.1:{free_port()}"
+    first = programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
     programs.start("live", "hands-on", "--only", "world", "--dva", dva, "--for", "1000")
     return dva, first
 
@@ -319,8 +319,7 @@ def test_an_attached_console_shows_what_messages_tell_and_the_rest_as_unknown(
 
     first.process.kill()
     expect(page.get_by_role("alert")).to_contain_text("does not answer", timeout=SLOW)
-    port = dva.rpartition(":")[2]
-    programs.start("live", "hands-on", "--only", "dva", "--dva", f"127.0.0.1:{port}")
+    programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
     expect(page.get_by_role("alert")).not_to_contain_text("does not answer", timeout=SLOW)
     page.get_by_role("link", name="Devices").click()
     expect(robot).to_contain_text("Idle", timeout=SLOW)
