@@ -29,6 +29,18 @@ export const windows = signal(new Map());
  * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
  */
 export const guard = signal(null);
+/**
+ * How orders are given, and who decides: what control rooms share.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Control | null>}
+ */
+export const control = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').AlarmList>} */
+export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0 });
+/**
+ * How the audit log stands; its rows are asked for.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').AuditState | null>}
+ */
+export const audit = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
@@ -69,7 +81,13 @@ export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
 /** Whether this page's address is one for driving, or for a phone. */
-export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
+export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
+/** Whether it is one for sending people and robots to events. */
+export const mayDispatch = computed(() => roleIsOneOf('dispatch', 'supervise'));
+/** Whether it is one for taking robots from their holders. */
+export const maySupervise = computed(() => roleIsOneOf('supervise'));
+/** @param {string[]} roles */
+const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */
 export const maySteer = computed(
   () => mayDrive.value && connection.value === 'open' && !isPast.value,
