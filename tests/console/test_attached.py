@@ -162,7 +162,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
 
     def robots() -> list[tuple[str, str]]:
         return sorted(
-            (one["label"], one["mode"]) for one in console.state()["robots"] if "x_m" in one
+            (one["label"], one.get("mode")) for one in console.state()["robots"] if "x_m" in one
         )
 
     assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
@@ -173,6 +173,10 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     assert not refused["ok"]
     assert "runs elsewhere" in refused["text"]
     assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
+
+    fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")
+    noted = console.act("event_note", event=fire, text="seen from outside")
+    assert noted["text"] == "control room has the role look; to note needs dispatch"
 
     first.process.send_signal(signal.SIGKILL)
     assert becomes(lambda: any("dva does not answer" in line for line in console.story()))
@@ -195,11 +199,16 @@ def test_a_fake_device_is_added_to_a_dva_elsewhere_and_taken_away(programs: Prog
 def test_with_keys_it_attaches_as_the_control_room_of_its_key(programs: Programs, tmp_path: Path):
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])
-    live(programs, dva, "dva", "--keys", str(keys))
+    role = "dva.control_rooms={control-room-1: dispatch}"
+    live(programs, dva, "dva", "--keys", str(keys), "--set", role)
     live(programs, dva, "world", "--keys", str(keys))
     console = Attached(programs, dva, "--keys", str(keys))
 
     assert becomes(lambda: len([r for r in console.state()["robots"] if "x_m" in r]) == 2)
+    assert becomes(lambda: console.act("room_join", name="")["text"].endswith("may dispatch"))
+    assert becomes(lambda: console.state()["events"] != [])
+    number = console.state()["events"][0]["number"]
+    assert console.act("event_note", event=number, text="seen from elsewhere")["ok"]
     assert "pretend" in console.act("fake_add", label="ghost", type="Robot")["text"]
 
 
