@@ -174,7 +174,7 @@ def test_a_phone_that_chooses_a_fake_robot_is_told_that_nobody_answers(page):
     assert page.do("phone_permission", device=GHOST, level="both")[0]
     ok, told = page.do("start", within=PATIENCE_S)
     assert not ok
-    assert "no answer at 192.168.15.2 after 3 attempts" in told
+    assert told.startswith("ghost")
 
 
 def test_a_fake_device_speaks_as_others_do(page):

@@ -284,7 +284,7 @@ def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
     expect(phone.get_by_text("Permission is held")).to_be_visible()
     phone.evaluate("location.hash = '#/teleoperation'")
     phone.get_by_role("button", name="Start", exact=True).click()
-    expect(phone.get_by_role("alert")).to_contain_text("no answer at", timeout=SLOW)
+    expect(phone.get_by_role("alert")).to_contain_text("ghost", timeout=SLOW)
     expect(phone.get_by_role("button", name="Start", exact=True)).to_be_enabled()
 
 
