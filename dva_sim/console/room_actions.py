@@ -10,7 +10,7 @@ from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.agents.people.person_guard import SEVERITIES
 from dva_sim.console.refusal import Refused, Said
-from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, proposed, why
 from dva_sim.console.seats import Seats
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.core.registry import ROBOT
@@ -187,35 +187,11 @@ class RoomActions:
 
     def _proposal(self, client: str, line: Line, said: Said) -> None:
         body = m.GetProposal(line["event"])
-        self._ask(client, line, said, body, "", self._proposed)
+        self._ask(client, line, said, body, "", partial(proposed, is_robot=self._is_robot))
 
-    def _proposed(self, reply: m.Reply) -> Line:
-        proposal = reply.content
-        if not isinstance(proposal, m.Proposal):
-            return {}
-        label = next((c.label for c in proposal.candidates if c.device == proposal.device), "")
-        return {
-            "proposal": {
-                "event": proposal.event_id,
-                "policy": proposal.policy,
-                "reason": proposal.reason,
-                "task": proposal.task,
-                "label": label,
-                "arrival_s": proposal.arrival_in,
-                "decide_within_s": proposal.decide_within,
-                "candidates": [self._candidate(each) for each in proposal.candidates],
-            }
-        }
-
-    def _candidate(self, who: m.Candidate) -> Line:
-        entry = self._world.run.dva.desk.registry.entries.get(who.device)
-        return {
-            "label": who.label,
-            "robot": entry is not None and entry.device.device_type == ROBOT,
-            "can": who.arrival_in is not None,
-            "reason": who.reason,
-            "arrival_s": who.arrival_in,
-        }
+    def _is_robot(self, device: str) -> bool:
+        entry = self._world.run.dva.desk.registry.entries.get(device)
+        return entry is not None and entry.device.device_type == ROBOT
 
     def _mode(self, client: str, line: Line, said: Said) -> None:
         mode = str(line["mode"])

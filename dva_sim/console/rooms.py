@@ -103,6 +103,36 @@ def _by(whom: m.ByWhom | None, at: float) -> Line | None:
     return None if whom is None else {"label": whom.label, "at_ms": _ms(at - whom.ago)}
 
 
+def proposed(reply: m.Reply, is_robot: Callable[[str], bool]) -> Line:
+    """What a page is told of the policy's proposal; nothing if the reply holds none."""
+    proposal = reply.content
+    if not isinstance(proposal, m.Proposal):
+        return {}
+    label = next((c.label for c in proposal.candidates if c.device == proposal.device), "")
+    return {
+        "proposal": {
+            "event": proposal.event_id,
+            "policy": proposal.policy,
+            "reason": proposal.reason,
+            "task": proposal.task,
+            "label": label,
+            "arrival_s": proposal.arrival_in,
+            "decide_within_s": proposal.decide_within,
+            "candidates": [_candidate(one, is_robot(one.device)) for one in proposal.candidates],
+        }
+    }
+
+
+def _candidate(who: m.Candidate, is_robot: bool) -> Line:
+    return {
+        "label": who.label,
+        "robot": is_robot,
+        "can": who.arrival_in is not None,
+        "reason": who.reason,
+        "arrival_s": who.arrival_in,
+    }
+
+
 class ConsoleRooms:
     """All control rooms of a console.
 

@@ -9,8 +9,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from dva_sim.agents.people.person_guard import SEVERITIES
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.room_actions import CERTAIN
+from dva_sim.console.rooms import proposed, why
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -33,6 +36,8 @@ class AttachedDecisions:
             "event_false_alarm": partial(self._do, self._false_alarm, "a false alarm"),
             "event_escalate": partial(self._do, self._escalate, "escalated"),
             "event_note": partial(self._do, self._note, "noted"),
+            "event_proposal": self._proposal,
+            "event_raise": self._raise,
             "dispatch_mode": self._mode,
         }
 
@@ -44,10 +49,18 @@ class AttachedDecisions:
     def _do(self, make: Callable[[Line], m.Body], done: str, line: Line, said: Said) -> None:
         self._ask(make(line), f"event {line['event']} is {done}", said)
 
-    def _ask(self, body: m.Body, done: str, said: Said) -> None:
+    def _ask(
+        self,
+        body: m.Body,
+        done: str,
+        said: Said,
+        then: Callable[[m.Reply], Line] = lambda _: {},
+    ) -> None:
         def answered(reply: m.Reply) -> None:
-            words = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-            said(reply.code == m.OK, done if reply.code == m.OK else words)
+            if reply.code == m.OK:
+                said(True, done, **then(reply))
+            else:
+                said(False, why(reply))
 
         self._system.agent.ask(body, answered, partial(said, False, "the DVA does not answer"))
 
@@ -82,6 +95,16 @@ class AttachedDecisions:
         mode = line["mode"]
         told = "the policy asks first" if mode == "ask_first" else "the policy decides by itself"
         self._ask(m.SetDispatch(mode, line.get("reason") or None), told, said)
+
+    def _proposal(self, line: Line, said: Said) -> None:
+        told = partial(proposed, is_robot=self._system.robots().__contains__)
+        self._ask(m.GetProposal(line["event"]), "", said, told)
+
+    def _raise(self, line: Line, said: Said) -> None:
+        place = m.Position(*self._system.to_latlon(line["x_m"], line["y_m"]))
+        severity = SEVERITIES[line["severity"]]
+        body = m.EventReport(None, line["kind"], place, severity, CERTAIN, "detected")
+        self._ask(body, f"{line['kind'].replace('_', ' ')} is raised", said)
 
     def _seen(self, line: Line) -> int | None:
         """How many decisions the asker knows: what the page says, else what is known here."""

@@ -146,6 +146,10 @@ class AttachedSystem:
         told = self.told.devices.get(id_tag)
         return id_tag if told is None else told.device.label
 
+    def to_latlon(self, x: float, y: float) -> tuple[float, float]:
+        """Where on earth a place of the map lies [deg], given in metres."""
+        return self._frame.to_latlon(x, y)
+
     def number_of(self, id_tag: str) -> int | None:
         """By which pages know a device."""
         return self._numbers.get(id_tag)
