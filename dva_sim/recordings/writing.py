@@ -206,6 +206,7 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.beliefs(playback)
     yield from channels.fixes(playback)
     yield from channels.told(playback)
+    yield from channels.audited(playback)
     yield from channels.commanded(playback)
     yield from channels.said(playback)
     yield from channels.applied(playback)
