@@ -125,6 +125,7 @@ class Feed:
         return {
             "i": self.numbers[id_tag],
             "mode": mode.value,
+            "by_hand": robot.controller.by_hand is not None,
             "pattern": self.pattern_of(id_tag),
             "battery": round(robot.charge, 3),
             "holder": holder,

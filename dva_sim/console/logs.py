@@ -41,12 +41,13 @@ class MessageLog:
 
     Attributes:
         kept: Whether it is written though nobody looks.
+        wants_all: Whether it is written with publications, whoever looks.
         listeners: Who else takes each exchange.
     """
 
     def __init__(self, name: str, node: str, transport: Transport) -> None:
         self.name, self._node, self._transport = name, node, transport
-        self.kept = False
+        self.kept = self.wants_all = False
         self.listeners: list[Take] = []
         self._tap = Tap(transport.clock, self._take, publications=False)
         self._waiting: deque[Exchange] = deque(maxlen=BATCH)
@@ -55,7 +56,7 @@ class MessageLog:
     def look(self, looks: bool, publications: bool) -> None:
         """Whether somebody looks, and wants publications, too."""
         taps = self._transport.taps
-        self._tap.publications = publications
+        self._tap.publications = publications or self.wants_all
         if looks or self.kept or self.listeners:
             taps[self._node] = self._tap
         elif taps.get(self._node) is self._tap:
@@ -118,11 +119,12 @@ class Logs:
             log.kept = True
             self._apply(log)
 
-    def listen(self, name: str, take: Take) -> None:
+    def listen(self, name: str, take: Take, publications: bool = False) -> None:
         """Let somebody in this process have each exchange of a device; it must not wait."""
         log = self._log(name)
         if log is not None:
             log.listeners.append(take)
+            log.wants_all |= publications
             self._apply(log)
 
     def look(self, looked: Mapping[str, bool]) -> None:

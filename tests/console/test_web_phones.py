@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from console_served import Answer, Served, serving
 from patience import PATIENCE_S
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from dva_sim.console.qr_code import half_blocks, svg
@@ -181,7 +181,8 @@ def test_what_a_phone_asks_reaches_the_world_and_the_answer_comes_back_whole(con
     you, drive = phone
     drive.send(json.dumps({"id": "reg-1", "do": "phone_register", **REGISTER}))
     asked = console.next_asked("phone_register")
-    assert asked == {"id": "reg-1", "do": "phone_register", "client": you["client"], **REGISTER}
+    by = {"id": "reg-1", "client": you["client"], "role": "phone"}
+    assert asked == {"do": "phone_register", **by, **REGISTER}
     more = {"phone": {"id": "02:00", "label": "my phone", "address": "127.0.0.1:5700"}}
     console.say({"k": "done", "id": "reg-1", "ok": True, "text": "registered", **more})
     assert json.loads(drive.recv(PATIENCE_S))["phone"] == more["phone"]
@@ -224,6 +225,22 @@ def test_a_phone_that_is_gone_stops(console):
         with wss(console, f"/ws/drive?client={you['client']}", console.phone):
             pass
         assert console.next_asked("gone")["client"] == you["client"]
+
+
+def test_a_page_that_lost_its_connection_unnoticed_keeps_its_name_and_a_copy_gets_another(console):
+    """As on a change of network: the old connection is dead, and nobody has said so here."""
+    with wss(console, "/ws/state?page=one", console.phone) as old:
+        name = json.loads(old.recv(PATIENCE_S))["client"]
+        with wss(console, f"/ws/state?client={name}&page=copy", console.phone) as copy:
+            assert json.loads(copy.recv(PATIENCE_S))["client"] != name
+        with wss(console, f"/ws/state?client={name}&page=one", console.phone) as again:
+            assert json.loads(again.recv(PATIENCE_S))["client"] == name
+            with pytest.raises(ConnectionClosed):
+                list(old)
+            with wss(console, f"/ws/drive?client={name}", console.phone):  # it is still here
+                console.say({"k": "seat", "seat": name, "drives": [], "phase": "held"})
+                while json.loads(again.recv(PATIENCE_S)).get("phase") != "held":
+                    pass
 
 
 def test_the_line_of_a_guard_reaches_its_page_alone(console):

@@ -16,7 +16,11 @@ Line = dict[str, Any]
 
 STORY_KEPT = 1000  # lines
 STORY_SHOWN = 200  # of them in a snapshot
-LATEST = ("rows", "hazards", "events", "pictures")  # kinds of which only the newest counts
+# Kinds of which only the newest counts.
+LATEST = (
+    *("rows", "hazards", "events", "control", "alarms", "audit", "pictures"),
+    *("told", "shelf"),
+)
 SHORT = ("seat", "phase", "order", "label")  # what others may know of a seat
 MOST_SEATS = 256  # of which anything is remembered
 
@@ -49,6 +53,7 @@ class RunState:
         places: Where everybody is, by index: a row of `pos`.
         seats: What each seat's holder knows, and what others may.
         guards: What each page of a guard knows.
+        windows: What the windows of a robot show, by its index.
         tables: The newest line of each kind that only some pages look at.
         logs: What devices were asked, and answered.
     """
@@ -69,6 +74,7 @@ class RunState:
         self.seats: dict[str, Versioned] = {}
         self.seats_short: dict[str, Versioned] = {}
         self.guards: dict[str, Versioned] = {}
+        self.windows: dict[int, Versioned] = {}
         self.tables: dict[str, Versioned] = {}
         self.logs = KeptLogs()
         self._deltas: dict[int, str] = {}
@@ -88,6 +94,8 @@ class RunState:
             self._take_seat(line)
         elif kind == "guard":
             self._take_guard(line)
+        elif kind == "robot":
+            self.windows[line["i"]] = Versioned(self.version, body_of(line))
         elif kind == "story":
             self.told += 1
             self.story.append(line)
