@@ -140,7 +140,9 @@ def test_a_dva_whose_control_rooms_decided_is_replayed_from_its_trace(tmp_path: 
     staffed = Staffed(lines.append)
     staffed.until(8.0)
     staffed.ask(0, m.GetProposal(1), m.Assign(1, GUARD, decisions=0), m.SetDispatch("automatic"))
-    staffed.ask(1, m.TakeOff(1, GUARD), m.Escalate(1))
+    staffed.run.dva.desk.roles.appoint(id_of("control-room", 2), "supervise")
+    staffed.ask(1, m.TakeOff(1, GUARD), m.SetDispatch("ask_first"), m.Escalate(1))
+    staffed.run.dva.dismiss(id_of("control-room", 1))
     again = list(replay_dva(lines, tmp_path / "dva.jsonl"))
     assert len(again) > 50
     assert [one for one in again if one.then != one.now] == []
