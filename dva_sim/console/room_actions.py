@@ -12,10 +12,10 @@ from dva_sim.agents.people.person_guard import SEVERITIES
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
 from dva_sim.console.seats import Seats
+from dva_sim.console.takeover import Takeover
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.core.registry import ROBOT
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.reply_codes import OUT_OF_ORDER
 
 Line = dict[str, Any]
 Doer = Callable[[str, Line, Said], object]
@@ -23,8 +23,6 @@ Doer = Callable[[str, Line, Said], object]
 CERTAIN: Final = 0.9  # of what somebody in a control room reports
 ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
 UNDER_WAY: Final = ("under_way", "waiting", "replanning")
-TAKE_AGAIN: Final = 0.5  # while a robot is brought to a standstill [s]
-MOST_TRIES: Final = 40
 
 
 class RoomActions:
@@ -283,78 +281,26 @@ class RoomActions:
     def _take_over(self, client: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
         robot, reason = self._robot(line["robot"]), str(line["reason"])
-        self._room(client, line, said, partial(self._revoke, client, line, robot, reason, said))
 
-    def _revoke(
-        self, client: str, line: Line, robot: str, reason: str, said: Said, room: ConsoleRoom
-    ) -> None:
-        event = next(
-            (n for n, e in self._rooms.listener.events.items() if _works_at(e, robot)), None
-        )
-
-        def revoked(reply: m.Reply) -> None:
-            if reply.code == m.NOT_PERMITTED:
-                said(False, why(reply))
+        def begin(room: ConsoleRoom) -> None:
+            number = self._seats.sit(client)
+            if number is None:
+                said(False, "all seats are taken")
                 return
-            self._sit_down(client, line, robot, event, reason, said, room)
+            seat = self._world.person(number)
+            label = self._world.run.stage.labels[robot]
+            take = partial(self._take, client, line | {"robots": [label]})
 
-        room.device.ask(
-            room.device.dva, m.Revoke(robot, reason), revoked, lambda: said(False, NO_ANSWER)
-        )
+            def ended(ok: bool, text: str, /, **more: Any) -> None:
+                if not ok and not seat.robots:
+                    self._seats.stand_up(client)
+                    seat.attended = client in self._world.client_of.values()
+                said(ok, text, **more)
 
-    def _sit_down(
-        self,
-        client: str,
-        line: Line,
-        robot: str,
-        event: int | None,
-        reason: str,
-        said: Said,
-        room: ConsoleRoom,
-    ) -> None:
-        """The robot is free: the person's seat asks for it, and gets the order it had."""
-        number = self._seats.sit(client)
-        if number is None:
-            said(False, "all seats are taken")
-            return
-        operator = self._world.person(number).device.id_tag
-        tries = iter(range(MOST_TRIES))
+            event = self._rooms.event_of(robot)
+            Takeover(room, robot, reason, event, seat.device.id_tag, take, ended).begin()
 
-        def take() -> None:
-            self._take(client, line | {"robots": [room.device.label_of(robot)]}, taken)
-
-        def taken(ok: bool, text: str, /, **_: Any) -> None:
-            if ok or next(tries, None) is None:
-                said(ok, text)
-            else:  # it is still brought to a standstill
-                room.device.clock.call_after(TAKE_AGAIN, take)
-
-        def ordered(reply: m.Reply) -> None:
-            content = reply.content
-            if (
-                reply.code == OUT_OF_ORDER
-                and isinstance(content, m.EventStatus)
-                and content.closed_for is None
-                and next(tries, None) is not None
-            ):
-                assign(content.decisions)  # the policy was quicker
-            else:
-                take()
-
-        def assign(decisions: int | None) -> None:
-            assert event is not None
-            body = m.Assign(event, robot, operator, None, reason, decisions)
-            room.device.ask(room.device.dva, body, ordered, take)
-
-        if event is None:
-            take()
-        else:
-            self._world.person(number).sit_down()
-            assign(self._rooms.decisions(event))
-
-
-def _works_at(event: m.EventStatus, robot: str) -> bool:
-    return event.closed_for is None and event.responder == robot
+        self._room(client, line, said, begin)
 
 
 class AlarmActions:

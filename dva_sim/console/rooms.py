@@ -199,6 +199,11 @@ class ConsoleRooms:
         status = self.listener.events.get(number)
         return None if status is None else status.decisions
 
+    def event_of(self, robot: str) -> m.EventStatus | None:
+        """How that stands which a robot was sent to, and is not over."""
+        every = self.listener.events.values()
+        return next((e for e in every if e.closed_for is None and e.responder == robot), None)
+
     def line(self, now_ms: int) -> Line:
         """How orders are given, and who decides."""
         rooms = [
