@@ -47,6 +47,8 @@ export const you = signal(null);
 export const selection = signal(null);
 /** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
 export const connection = signal('connecting');
+/** Whether the socket is open on which the person's hand reaches the world. */
+export const reaches = signal(false);
 /** Why there are no camera pictures; empty while there are. */
 export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
@@ -90,7 +92,7 @@ export const maySupervise = computed(() => roleIsOneOf('supervise'));
 const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */
 export const maySteer = computed(
-  () => mayDrive.value && connection.value === 'open' && !isPast.value,
+  () => mayDrive.value && connection.value === 'open' && reaches.value && !isPast.value,
 );
 /** Whether this page may say which moment of a recording is shown. */
 export const maySteerReplay = computed(() => mayDrive.value && connection.value === 'open');
