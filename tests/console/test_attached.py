@@ -186,6 +186,8 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     refused = console.act("take", robots=["robot-1"])
     assert not refused["ok"]
     assert "runs elsewhere" in refused["text"]
+    refused = console.act("event_acknowledge", event=1)
+    assert "has the role look; to acknowledge needs dispatch" in refused["text"]
     assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
 
     first.process.send_signal(signal.SIGKILL)
@@ -206,15 +208,25 @@ def test_a_fake_device_is_added_to_a_dva_elsewhere_and_taken_away(programs: Prog
     assert console.act("fake_remove", device=id_of("fake", 1))["ok"]
 
 
-def test_with_keys_it_attaches_as_the_control_room_of_its_key(programs: Programs, tmp_path: Path):
+def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(
+    programs: Programs, tmp_path: Path
+):
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])
-    live(programs, dva, "dva", "--keys", str(keys))
+    may = "dva.control_rooms={control-room-1: dispatch}"
+    live(programs, dva, "dva", "--keys", str(keys), "--set", may)
     live(programs, dva, "world", "--keys", str(keys))
     console = Attached(programs, dva, "--keys", str(keys))
 
     assert becomes(lambda: len([r for r in console.state()["robots"] if "x_m" in r]) == 2)
     assert "pretend" in console.act("fake_add", label="ghost", type="Robot")["text"]
+    assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
+    assert console.act("event_acknowledge", event=1)["ok"]
+    done = console.act("event_assign", event=1, device="guard-1", reason="is near")
+    assert done["text"] == "guard-1 is sent to event 1"
+    assert becomes(lambda: "guard-1" in console.state()["events"][0]["assigned"])
+    refused = console.act("dispatch_mode", mode="ask_first")
+    assert "to set dispatch needs supervise" in refused["text"]
 
 
 @pytest.mark.parametrize(
