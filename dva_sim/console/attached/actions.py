@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
+from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.seats import Answers
 from dva_sim.protocol import messages as m
@@ -31,9 +31,7 @@ class AttachedActions:
             "fake_add": self._add_fake,
             "fake_remove": self._remove_fake,
             "release": lambda _, said: said(True, "released"),
-            "room_join": self._join,
-            "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self._decide),
+            **AttachedDecisions(system).doers,
         }
 
     def take(self, line: Line) -> None:
@@ -97,40 +95,6 @@ class AttachedActions:
 
         failed = partial(said, False, "the DVA does not answer")
         self._system.agent.ask(m.Revoke(robot), answered, failed)
-
-    # --- events -----------------------------------------------------------------------------
-
-    def _join(self, _: Line, said: Said) -> None:
-        """All who decide here share the console's own control room."""
-        said(True, f"you are {self._system.device.label}, and may {self._system.role}")
-
-    def _raise(self, line: Line, said: Said) -> None:
-        self._ask(*report_of(line, self._system.place_of(line["x_m"], line["y_m"])), said)
-
-    def _decide(self, line: Line, said: Said) -> None:
-        system = self._system
-
-        def seen(number: int) -> int | None:
-            status = system.agent.events.get(number)
-            return None if status is None else status.decisions
-
-        self._ask(*decision_of(line, self._device, seen), said)
-
-    def _device(self, label: str) -> str:
-        found = (i for i, told in self._system.told.devices.items() if told.device.label == label)
-        id_tag = next(found, None)
-        if id_tag is None:
-            raise Refused(f"the DVA has listed no device {label!r}")
-        return id_tag
-
-    def _ask(self, body: m.Body, done: str, said: Said) -> None:
-        def answered(reply: m.Reply) -> None:
-            ok = reply.code == m.OK
-            why = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-            more = answer_of(reply, lambda device: device in self._system.robots()) if ok else {}
-            said(ok, done if ok else why, **more)
-
-        self._system.agent.ask(body, answered, partial(said, False, "the DVA does not answer"))
 
     def _add_fake(self, line: Line, said: Said) -> None:
         if self._system.options.keys is not None:
