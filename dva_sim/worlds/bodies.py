@@ -175,7 +175,8 @@ class Ticks:
 
     def tick_at(self, time: float) -> float:
         """The first tick that begins at `time` [s] or later."""
-        return math.inf if time == math.inf else -(round(-max(time, 0.0) * US) // self._tick_us)
+        time = time if time > 0.0 else 0.0
+        return math.inf if time == math.inf else -(round(-time * US) // self._tick_us)
 
     @property
     def time(self) -> float:
@@ -184,7 +185,8 @@ class Ticks:
 
     def next_tick(self) -> int:
         """The first tick that a set point given now can reach."""
-        return max(self._tick, -(-self._now_us // self._tick_us))
+        due = -(-self._now_us // self._tick_us)
+        return due if due > self._tick else self._tick
 
     def advance_to(self, time: float) -> None:
         """Let the bodies move up to `time` [s], in whole ticks; never back."""
@@ -436,8 +438,10 @@ class RobotBody(Body):
         if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
             self._asked.put(start, STOP)
         else:
-            speed = min(max(speed, 0.0), spec.max_speed)
-            turn_rate = min(max(turn_rate, -spec.max_turn_rate), spec.max_turn_rate)
+            most, fastest = spec.max_speed, spec.max_turn_rate
+            speed = 0.0 if speed < 0.0 else most if speed > most else speed
+            if not -fastest <= turn_rate <= fastest:
+                turn_rate = math.copysign(fastest, turn_rate)
             speed, turn_rate = self.motors.set_point(speed, turn_rate)
             self._asked.put(start, TickTarget(speed, turn_rate, world.tick_at(until)))
         world.wake(self)

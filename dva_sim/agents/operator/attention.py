@@ -15,6 +15,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, repeat
 from typing import Protocol
 
 import numpy as np
@@ -241,5 +242,4 @@ class DriverSeat:
 
 def _normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
     """Standard normal numbers without end, drawn in blocks."""
-    while True:
-        yield from rng.normal(size=block).tolist()
+    return chain.from_iterable(rng.normal(size=block).tolist() for _ in repeat(None))

@@ -63,11 +63,13 @@ class Adaptive(Strategy):
         """See `Strategy`."""
         seen, person = view.seen, self.person
         left = route.remaining(seen.x, seen.y) - stop_before
-        delay = max(view.delay, SHORTEST)
+        left = left if left > 0.0 else 0.0
+        delay = view.delay if view.delay > SHORTEST else SHORTEST
         pace = min(self._most, person.caution * FARTHEST_LOOK / delay)
         turn = 1.0 / gain_at(person.crossover, person.margin, delay)
-        count = max(left / self._moves.trusted, 1.0)
-        self._choose(view.now, max(left, 0.0) / pace + turn, self._waiting(left, count, delay))
+        count = left / self._moves.trusted
+        waiting = self._waiting(left, count if count > 1.0 else 1.0, delay)
+        self._choose(view.now, left / pace + turn, waiting)
         wanted = self._now.drive(route, view, stop_before)
         self._has_asked = self._has_asked or any(wanted)
         return wanted
