@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.population import Person
+from dva_sim.kernel.makers import maker
 
 REACH = 2.0  # on a route in a building, one looks for one's place so far ahead of the last [m]
 BENT = 1.5  # way along a route to what one moves straight; around a right angle, up to 1.41
@@ -47,6 +48,9 @@ class Ahead(NamedTuple):
     distance: float
     remaining: float
     offset: float
+
+
+_make_ahead = maker(Ahead)
 
 
 class _Leg(NamedTuple):
@@ -82,6 +86,9 @@ class _Place(NamedTuple):
     x: float
     y: float
     offset: float
+
+
+_make_place = maker(_Place)
 
 
 ROUNDED = 1e-6  # far more than lengths are rounded by [m]
@@ -147,7 +154,7 @@ class _Line:
                 farther = math.sqrt(far) - math.sqrt(nearest) - ROUNDED
                 i = bisect_right(at, along + farther, i + 2) - 1
         leg, along, away_x, away_y = found
-        return _Place(leg, along, x, y, math.hypot(away_x, away_y))
+        return _make_place(leg, along, x, y, math.hypot(away_x, away_y))
 
 
 class Route:
@@ -200,7 +207,7 @@ class Route:
         tx, ty = self.point_at(place.along + look_ahead)
         bearing = wrap(math.atan2(ty - y, tx - x) - heading)
         distance = math.hypot(tx - x, ty - y)
-        return Ahead(bearing, distance, self.length - place.along, place.offset)
+        return _make_ahead(bearing, distance, self.length - place.along, place.offset)
 
     def remaining(self, x: float, y: float) -> float:
         """Way left from the place on the route where one is who is here [m], as `ahead` tells."""
@@ -240,11 +247,17 @@ class View(NamedTuple):
     delay: float
 
 
+make_view = maker(View)
+
+
 class Intent(NamedTuple):
     """What a driver wants the robot to do now: speed [m/s], turn rate [rad/s]."""
 
     speed: float
     turn_rate: float
+
+
+make_intent = maker(Intent)
 
 
 @dataclass(frozen=True)
@@ -341,7 +354,7 @@ class PurePursuit:
         most = IN_CURVES * self.reach.turn_rate
         if abs(curvature) * speed > most:
             speed = most / abs(curvature)
-        return Intent(speed, self._clamp(curvature * speed))
+        return make_intent(speed, self._clamp(curvature * speed))
 
     def _clamp(self, turn_rate: float) -> float:
         most = self.reach.turn_rate

@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, get_args
 
+from dva_sim.kernel.makers import maker
+
 OK: Final = 0
 BAD_MESSAGE: Final = 1
 NOT_REGISTERED: Final = 2
@@ -100,6 +102,9 @@ class SetTeleOp(NamedTuple):
     speed: float
     turn_rate: float
     seen_tick: int | None = None
+
+
+make_set_tele_op = maker(SetTeleOp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -589,3 +594,6 @@ class Message(NamedTuple):
     timestamp: str
     session: int | None
     body: Body
+
+
+make_message = maker(Message)

@@ -31,8 +31,9 @@ from typing import Final, Generic, NamedTuple, TypeVar
 import pymunk
 from pymunk._chipmunk_cffi import lib
 
+from dva_sim.kernel.makers import maker
 from dva_sim.worlds.drives import DriveSpec
-from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.geo import Pose, make_pose
 
 SAME_CONTACT: Final = 0.5  # touching again within this time is the same contact [s]
 JAM_TIME: Final = 5.0  # asked to move for so long, in contact [s]; assumed
@@ -107,6 +108,7 @@ get_velocity, get_position = lib.cpBodyGetVelocity, lib.cpBodyGetPosition
 get_spin, get_angle = lib.cpBodyGetAngularVelocity, lib.cpBodyGetAngle
 set_velocity, set_spin = lib.cpBodySetVelocity, lib.cpBodySetAngularVelocity
 set_force, set_torque = lib.cpBodySetForce, lib.cpBodySetTorque
+step_space = lib.cpSpaceStep
 
 
 class AskedFor(Generic[T]):
@@ -161,6 +163,7 @@ class Ticks:
 
     def __init__(self, dt: float) -> None:
         self.dt, self.space = dt, pymunk.Space()
+        self._raw_space, self._have_changed = self.space._space, True
         self._tick_us = round(dt * US)
         self._tick, self._now_us = 0, 0
         self._awake: dict[Body, None] = {}  # a set that keeps its order
@@ -168,6 +171,10 @@ class Ticks:
     def wake(self, body: Body) -> None:
         """A body was asked for something, or was touched: it is pushed from the next tick on."""
         self._awake[body] = None
+
+    def change(self) -> None:
+        """Shapes or bodies have come or gone."""
+        self._have_changed = True
 
     def forget(self, body: Body) -> None:
         """A body is not pushed any more."""
@@ -195,19 +202,24 @@ class Ticks:
             return
         self._now_us = now_us
         due = now_us // self._tick_us
-        step, dt, awake = self.space.step, self.dt, self._awake
-        while self._tick < due and awake:
-            stand = []
-            for body in awake:
-                if not body.push(self._tick, dt):
-                    stand.append(body)
+        tick, dt, awake = self._tick, self.dt, self._awake
+        while tick < due and awake:
+            stand = [body for body in awake if not body.push(tick, dt)]
             for body in stand:
                 del awake[body]
             if awake:
-                step(dt)
-            self._tick += 1
-        if self._tick < due:
+                self._step(dt)
+            self._tick = tick = tick + 1
+        if tick < due:
             self._tick = due
+
+    def _step(self, dt: float) -> None:
+        """Let the library step: without its care for what callbacks add or remove, as none do."""
+        if self._have_changed:
+            self.space.step(dt)
+            self._have_changed = False
+        else:
+            step_space(self._raw_space, dt)
 
 
 class Body:
@@ -294,6 +306,9 @@ class TickTarget(NamedTuple):
     speed: float
     turn_rate: float
     end: float
+
+
+_make_target = maker(TickTarget)
 
 
 STOP = TickTarget(0.0, 0.0, math.inf)
@@ -404,7 +419,7 @@ class RobotBody(Body):
     def pose(self) -> Pose:
         """Where it is, as of the last whole tick; the heading counts full turns."""
         place = get_position(self._raw)
-        return Pose(place.x, place.y, get_angle(self._raw))
+        return make_pose(place.x, place.y, get_angle(self._raw))
 
     @property
     def grip(self) -> float:
@@ -443,7 +458,7 @@ class RobotBody(Body):
             if not -fastest <= turn_rate <= fastest:
                 turn_rate = math.copysign(fastest, turn_rate)
             speed, turn_rate = self.motors.set_point(speed, turn_rate)
-            self._asked.put(start, TickTarget(speed, turn_rate, world.tick_at(until)))
+            self._asked.put(start, _make_target(speed, turn_rate, world.tick_at(until)))
         world.wake(self)
 
     @property

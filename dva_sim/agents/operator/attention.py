@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.agents.observation import Observation, topic_in
+from dva_sim.agents.observation import Observation, make_observation, topic_in
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
 from dva_sim.agents.population import Person
@@ -228,7 +228,7 @@ class DriverSeat:
     def judge(self, seen: Observation) -> Observation:
         """A frame as the person takes it: place and heading with an error."""
         person, error = self.person, self._errors
-        return Observation(
+        return make_observation(
             seen.tick,
             seen.x + person.position_error * next(error),
             seen.y + person.position_error * next(error),

@@ -24,12 +24,11 @@ from dva_sim.agents.operator.strategies import (
     Reach,
     Strategy,
     Truth,
-    View,
     gain_at,
 )
 from dva_sim.agents.operator.supervision import REFUSED, Work
 from dva_sim.agents.population import Person
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.route_following import Route, make_view
 from dva_sim.agents.tilt import Phone
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
@@ -246,7 +245,7 @@ class Teleoperation(Work):
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
             drive, delay = self._strategy.drive, seat.delay.value
-            view = View(now, judged, delay)
+            view = make_view(now, judged, delay)
             usual = lambda keep: drive(route, view, keep)  # noqa: E731
             self._intend(self._steer(judged, delay, usual), judged.tick)
 

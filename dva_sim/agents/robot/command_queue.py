@@ -21,6 +21,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.config import Config
+from dva_sim.kernel.makers import maker
 from dva_sim.network.messaging import Answer, Request
 from dva_sim.network.zmtp import Flow
 from dva_sim.protocol.codec import decode
@@ -72,6 +73,9 @@ class Letter(NamedTuple):
     def peer(self) -> Hashable:
         """The connection that it came by."""
         return PUBLISHED if self.request is None else self.request.peer
+
+
+_make_letter = maker(Letter)
 
 
 StandingOf = Callable[[Letter], Standing]
@@ -250,7 +254,7 @@ class CommandQueue:
             urgent, moves = isinstance(message.body, Emergency), isinstance(message.body, SetTeleOp)
         else:
             urgent, moves = looks_urgent and _is_emergency(data), b"<SetTeleOp>" in data
-        self._put(Letter(data, self._clock.now, request, message, moves), urgent)
+        self._put(_make_letter(data, self._clock.now, request, message, moves), urgent)
 
     def _has_room(self, peer: Hashable) -> bool:
         """For one more emergency; those that wait will stop the robot as well."""
@@ -261,7 +265,7 @@ class CommandQueue:
         """A command has arrived that nobody waits to be answered; who has read it, says so."""
         if self.latest_wins:
             self.superseded += self.forget_published()
-        self._put(Letter(data, self._clock.now, None, message))
+        self._put(_make_letter(data, self._clock.now, None, message, True))
         waiting, limit = self._waiting, self._limit
         is_full = len(waiting) >= limit and waiting.count(holders=True) >= limit
         if is_full and self.flow is not None:

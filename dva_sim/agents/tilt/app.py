@@ -17,6 +17,7 @@ from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration, Readin
 from dva_sim.agents.tilt.filters import BATCH, Filter, load_guarded_filter
 from dva_sim.agents.tilt.mappings import load_guarded_mapping
 from dva_sim.agents.tilt.profile import PhoneProfile
+from dva_sim.kernel.makers import maker
 
 TIE: Final = 1e-9  # moments nearer than this are the same [s]
 _TICK: Final = 1e-6  # who looks by a clock that rounds may come so much too soon [s]
@@ -49,6 +50,9 @@ class TiltCommand(NamedTuple):
     turn_rate: float
     sample_age: float
     captured: float
+
+
+_make_command = maker(TiltCommand)
 
 
 class Trail:
@@ -190,7 +194,8 @@ class TiltApp:
             return None
         self._last_key = key
         age = now - self._stems_from
-        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age, self._captured)
+        speed = level * SPEED_PER_LEVEL
+        return _make_command(speed, math.radians(turn), age, self._captured)
 
     @property
     def failures(self) -> int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dva_sim.agents.robot.field_of_view import HazardSpot
+from dva_sim.agents.robot.field_of_view import HazardSpot, make_spot
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.full.stage import Stage
@@ -67,7 +67,7 @@ class RunHazard:
         """What a camera may see of it at `now` [s], when it has begun."""
         hazard = self.hazard
         x, y = hazard.position
-        return HazardSpot(self.kind, x, y, hazard.radius(now), hazard.shines)
+        return make_spot(self.kind, x, y, hazard.radius(now), hazard.shines)
 
 
 def draw_incidents(
