@@ -119,8 +119,6 @@ class _Line:
             y: Position [m].
             reach: How far ahead, beyond what one may have come [m].
         """
-        if x == last.x and y == last.y and last.offset < math.inf:
-            return last
         if last is not self._last or x != self._found.x or y != self._found.y:
             self._last, self._found = last, self._nearest(last, x, y, reach)
         return self._found
@@ -219,7 +217,9 @@ class Route:
 
     def _go_to(self, x: float, y: float) -> _Place:
         """One's place on the route who is here now [m]."""
-        self._place = place = self._line.next_place(self._place, x, y, self._reach)
+        place = self._place
+        if x != place.x or y != place.y or place.offset == math.inf:
+            self._place = place = self._line.next_place(place, x, y, self._reach)
         return place
 
     def point_at(self, along: float) -> tuple[float, float]:
@@ -292,7 +292,8 @@ def gain_at(limit: float, margin: float, delay: float) -> float:
         margin: The person's own.
         delay: [s]
     """
-    return min(limit, margin / max(delay, SHORTEST))
+    gain = margin / (delay if delay > SHORTEST else SHORTEST)
+    return gain if gain < limit else limit
 
 
 NEAREST_LOOK, FARTHEST_LOOK = 0.8, 1.8  # look-ahead inside a building [m]
@@ -325,9 +326,11 @@ class PurePursuit:
             stop_before: Where to stop: so far before the end of the route [m].
         """
         person, reach, seen = self.person, self.reach, view.seen
-        delay = max(view.delay, SHORTEST)
+        delay = view.delay if view.delay > SHORTEST else SHORTEST
         wanted = person.pace * reach.speed
-        look = min(max(wanted * delay / person.caution, NEAREST_LOOK), FARTHEST_LOOK)
+        look = wanted * delay / person.caution
+        look = look if look > NEAREST_LOOK else NEAREST_LOOK
+        look = look if look < FARTHEST_LOOK else FARTHEST_LOOK
         ahead = route.ahead(seen.x, seen.y, seen.heading, look)
         limit = TURN_UNTIL if self._turning else TURN_FROM
         self._turning = abs(ahead.bearing) > limit
@@ -350,7 +353,8 @@ class PurePursuit:
             look: How far ahead on the route it lies [m].
             speed: As fast as one may [m/s].
         """
-        curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.2)
+        distance = ahead.distance
+        curvature = 2.0 * math.sin(ahead.bearing) / (distance if distance > 0.2 else 0.2)
         most = IN_CURVES * self.reach.turn_rate
         if abs(curvature) * speed > most:
             speed = most / abs(curvature)

@@ -119,6 +119,9 @@ class Doubts:
             stopped: Who was driving until then, and does not any longer.
             word: How much was said in the DVA's name so far.
         """
+        if isinstance(message.body, m.SetTeleOp):
+            self.unasked = None
+            return
         who, before = None, self._stranger
         match message.body:
             case m.PermissionGrant() if decision.code == m.BAD_SESSION or stopped:
@@ -455,7 +458,8 @@ class RobotController:
             return Decision(m.STALE, "no picture of that tick was taken yet")
         else:
             seen_at = body.seen_tick / 1000 - self.clock_offset
-            until = min(until, seen_at + self.limits.max_age)
+            oldest = seen_at + self.limits.max_age
+            until = until if until < oldest else oldest
         if until <= now:
             return Decision(m.STALE, "too old to obey")
         self.last_valid = now

@@ -403,13 +403,14 @@ class RobotAgent:
             self._ask_about(self.controller.doubts.unasked)
         if decision.set_point is not None:
             self._move(decision.set_point)
-        if decision.code == m.OK:
+        is_command = isinstance(message.body, m.SetTeleOp)
+        if decision.code == m.OK and not is_command:
             decision = self._follow_up(message, decision)
         if decision.code != m.OK:
             self.refused += 1
             name = m.CODE_NAMES[decision.code]
             self.device.recorder.counters[f"robot refused: {name}"] += 1
-        elif isinstance(message.body, m.SetTeleOp):
+        elif is_command:
             self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
             self._mode_changed(message.source)

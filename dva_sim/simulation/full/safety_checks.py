@@ -198,7 +198,8 @@ class SafetyAudit:
         at_event: float,
         tick: float,
     ) -> None:
-        self._recorder, self._limits, self._robots = recorder, limits, robots
+        self._recorder, self._robots = recorder, robots
+        self._watchdog, self._max_age = limits.watchdog_s, limits.max_age_s
         self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
         self._ledger, self._tick = EventLedger(book, rules, dva, place_of, at_event), tick
         self._witnesses: dict[str, Witness] = {}
@@ -341,13 +342,13 @@ class SafetyAudit:
 
     def accepted(self, command: Accepted) -> None:
         """A robot has accepted a command to drive, from whomever."""
-        witness, limits = self.witness(command.robot), self._limits
+        witness = self.witness(command.robot)
         found: list[Broken] = []
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
         if broken is not None:
             found.append(broken)
         source, session, number = command.source, command.session, command.message_id
-        if witness.stopped > max(witness.ordered, -0.5):
+        if witness.stopped > witness.ordered and witness.stopped > -0.5:
             found.append(("S3", "obeys a command after an emergency, before a new order"))
         elif witness.does != (source, session, "teleoperation"):
             found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
@@ -355,12 +356,13 @@ class SafetyAudit:
             found.append(("S1", "obeys a command again, or after a newer one"))
         witness.newest = source, session, number
         arrived = witness.arrivals.pop((source, number), command.arrived)
-        witness.allowed = arrived + limits.watchdog_s
+        witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
             found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
         elif command.seen_tick is not None and witness.offset is not None:
             pictured = command.seen_tick / 1000 + witness.offset
-            witness.allowed = min(witness.allowed, pictured + limits.max_age_s)
+            oldest = pictured + self._max_age
+            witness.allowed = witness.allowed if witness.allowed < oldest else oldest
             if pictured > command.time + ROUNDED:
                 found.append(("S1", "obeys a command behind a picture that was not taken yet"))
         self._report(found, command.time, self._robots[command.robot].device.label)

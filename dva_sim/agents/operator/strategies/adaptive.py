@@ -111,12 +111,13 @@ class Adaptive(Strategy):
     def _waiting(self, way: float, moves: float, delay: float) -> float:
         """Expected time to finish by so many moves, each with its wait [s]."""
         a_move = SHORT + self._moves.moves.usual_wait(delay)
-        return max(way, 0.0) / self._most + moves * a_move
+        return (way if way > 0.0 else 0.0) / self._most + moves * a_move
 
     def _choose(self, now: float, closed: float, waiting: float) -> None:
         """Change the way of steering if the other one takes clearly less time [s]."""
         if self._last is not None:
-            self._times[self.using] += min(now - self._last, GAP)
+            gap = now - self._last
+            self._times[self.using] += gap if gap < GAP else GAP
         self._last = now
         if self.using == "closed" and waiting < BETTER * closed:
             self.using = "move_and_wait"
