@@ -18,6 +18,8 @@ from dva_sim.worlds.geo import GeoFrame
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
 STATUS = "status|"
 HOLDER = "holder|"
+EVENT = "event|"
+AUDIT = "audit|"
 HEARTBEAT_PERIOD = 2.0  # [s]
 REGISTER_AGAIN = 2.0  # pause after a registration that was not answered, or refused [s]
 LONGEST_BID = 1e6  # no offer to go somewhere is longer [s]

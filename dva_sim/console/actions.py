@@ -14,6 +14,7 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
@@ -39,6 +40,14 @@ class Actions:
         self._world = world
         self._seats, self._answers = Seats(), Answers()
         self._phones = PhoneActions(world, self._seats, self._robot, self._stop_one)
+        self._at_robots = RobotActions(
+            world.windows,
+            self._robot,
+            why_not=self._why_not,
+            labels=world.run.stage.labels,
+            deaf=world.deafen,
+            slow=world.run.audit.expect,
+        )
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)
         self._doers: dict[str, Callable[[str, Line, Said], object]] = {
@@ -55,7 +64,9 @@ class Actions:
             "decline": self._decline,
             "tour": self._tour,
             **self._phones.doers,
+            **self._at_robots.doers,
             **GuardActions(world).doers,
+            **world.dva.doers,
         }
 
     def take(self, line: Line) -> None:
@@ -63,12 +74,16 @@ class Actions:
         what, client = line.get("do"), str(line.get("client", ""))
         if what == "input":
             self._input(client, line)
+        elif what == "manual":
+            self._at_robots.input(client, line)
         elif what == "samples":
             self._phones.samples(client, line)
         elif what == "gone":
             self._gone(client)
         elif what == "watch":
             self._watch(line.get("robots"))
+        elif what == "look":
+            self._look(line.get("logs"), line.get("tables"))
         elif isinstance(number := line.get("id"), str):
             self._once(number, client, str(what), line)
 
@@ -171,12 +186,16 @@ class Actions:
 
     # --- drives ----------------------------------------------------------------------------
 
+    def _why_not(self) -> str:
+        """Why nobody may drive now; empty: one may."""
+        if self._world.lag.held:
+            return "held: this machine cannot keep up with real time"
+        return "time stands still: go on first" if self._world.clock.paused else ""
+
     def _start(self, client: str, _: Line, said: Said) -> None:
-        person, world = self._person(client), self._world
-        if world.lag.held:
-            raise Refused("held: this machine cannot keep up with real time")
-        if world.clock.paused:
-            raise Refused("time stands still: go on first")
+        person = self._person(client)
+        if why := self._why_not():
+            raise Refused(why)
         person.alert = ""
         person.start(said)
 
@@ -188,6 +207,7 @@ class Actions:
         if "robots" not in line and seat is not None:
             line = {"robots": list(self._world.person(seat.number).robots)}
         robots = self._robots(line)
+        self._at_robots.stop(robots)
         # Who drives a robot from here learns of its end at once, whoever pressed the button.
         own = self._world.person(0 if seat is None else seat.number)
         for person in self._world.persons:
@@ -211,9 +231,11 @@ class Actions:
 
     def _gone(self, client: str) -> None:
         """The page is hidden, or its socket closed: nobody has a hand on it."""
+        self._at_robots.gone(client)
         self._stop_one(client, "stopped: the page was hidden, left or cut off")
 
     def _look_for_the_silent(self) -> None:
+        self._at_robots.look_for_the_silent()
         why = f"stopped: the page was silent for {SILENT_AFTER:g} s while it held on"
         for client in self._seats.silent(time.monotonic()):
             self._stop_one(client, why)
@@ -225,6 +247,7 @@ class Actions:
             self._world.person(seat.number).stop(_nobody, why)
 
     def _stop_all(self, why: str) -> None:
+        self._at_robots.stop(self._world.run.field.robots)
         for client in list(self._seats.taken):
             self._stop_one(client, why)
 
@@ -282,6 +305,11 @@ class Actions:
         numbers = robots if isinstance(robots, list) else []
         ids = {t["id"] for t in self._world.feed.things if t["i"] in numbers}
         self._world.screens.watch(ids)
+
+    def _look(self, logs: Any, tables: Any) -> None:
+        if isinstance(logs, dict) and isinstance(tables, list):
+            self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
+            self._world.dva.looked = "devices" in tables
 
 
 def _nobody(ok: bool, text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dva_sim.agents.people.bystander import SAFE
@@ -15,6 +15,7 @@ from dva_sim.core.events import FINAL, Event, State
 from dva_sim.kernel.recorder import Moment
 from dva_sim.live.parts import Rate
 from dva_sim.simulation.full.run import Run
+from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
 SEVERITIES = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
@@ -124,6 +125,7 @@ class Feed:
         return {
             "i": self.numbers[id_tag],
             "mode": mode.value,
+            "by_hand": robot.controller.by_hand is not None,
             "pattern": self.pattern_of(id_tag),
             "battery": round(robot.charge, 3),
             "holder": holder,
@@ -160,28 +162,10 @@ class Feed:
         return {
             "k": "events",
             "t": self.now_ms,
-            "events": [self._event(event) for event in (*over, *book.open.values())],
-        }
-
-    def _event(self, event: Event) -> Line:
-        run, where = self._run, event.position
-        x, y = run.stage.site.frame.to_xy(where.latitude, where.longitude)
-        detected = event.times.get("detected", 0.0)
-        return {
-            "number": event.number,
-            "kind": event.kind,
-            "x_m": round(x, 2),
-            "y_m": round(y, 2),
-            "latitude_deg": where.latitude,
-            "longitude_deg": where.longitude,
-            "room": run.stage.site.room_at(x, y),
-            "severity": next(name for least, name in SEVERITIES if event.severity >= least),
-            "severity_value": round(event.severity, 2),
-            "state": str(event.state),
-            "over": not event.open,
-            "since_ms": round(1000 * _since(event)),
-            "reported_ms": round(1000 * detected),
-            "assigned": [run.stage.labels.get(name, name) for name in _sent(event)],
+            "events": [
+                event_line(event, self._run.stage.site, self._run.stage.labels)
+                for event in (*over, *book.open.values())
+            ],
         }
 
     def story(self) -> Iterator[Line]:
@@ -190,6 +174,28 @@ class Feed:
         moments, recorder.timeline = recorder.timeline, list[Moment]()
         for time, who, what, kind in moments:
             yield {"k": "story", "t": round(1000 * time), "who": who, "what": what, "kind": kind}
+
+
+def event_line(event: Event, site: Site, labels: Mapping[str, str]) -> Line:
+    """How an event stands; labels by id."""
+    where = event.position
+    x, y = site.frame.to_xy(where.latitude, where.longitude)
+    return {
+        "number": event.number,
+        "kind": event.kind,
+        "x_m": round(x, 2),
+        "y_m": round(y, 2),
+        "latitude_deg": where.latitude,
+        "longitude_deg": where.longitude,
+        "room": site.room_at(x, y),
+        "severity": next(name for least, name in SEVERITIES if event.severity >= least),
+        "severity_value": round(event.severity, 2),
+        "state": str(event.state),
+        "over": not event.open,
+        "since_ms": round(1000 * _since(event)),
+        "reported_ms": round(1000 * event.times.get("detected", 0.0)),
+        "assigned": [labels.get(name, name) for name in _sent(event)],
+    }
 
 
 _BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}

@@ -20,22 +20,38 @@ DEFAULT, DEFAULT_PORT, PHONES_PORT = "hands-on", 8765, 8766
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConsoleOptions:
-    """What to run, and where it is to be seen.
+class PageOptions:
+    """Where pages are to be seen, and by whom.
 
     Attributes:
-        scenario: By name or path.
-        seed: Decides all luck.
-        changes: Of the scenario, `KEY=VALUE`.
         host: Address to listen on.
         port: 0: any that is free.
         token: Whether the address has to hold a secret.
         phones: Whether phones have an address of their own, by https.
         phones_host: Address to listen on for them.
         phones_port: 0: any that is free.
+        open: Whether a browser is opened, where there is one.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = DEFAULT_PORT
+    token: bool = True
+    phones: bool = False
+    phones_host: str = "0.0.0.0"
+    phones_port: int = PHONES_PORT
+    open: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConsoleOptions(PageOptions):
+    """What to run, and where it is to be seen.
+
+    Attributes:
+        scenario: By name or path.
+        seed: Decides all luck.
+        changes: Of the scenario, `KEY=VALUE`.
         links: `modelled` as in a study, or `real`: sockets, which others may join.
         dva_port: Port of the DVA on real links; 0: any that is free.
-        open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
         results: Folder for the tables of what people did, if any.
         keep_motion: Folder for the samples of phones whose person agrees, if any.
@@ -45,15 +61,8 @@ class ConsoleOptions:
     scenario: str = DEFAULT
     seed: int = 1
     changes: tuple[str, ...] = ()
-    host: str = "127.0.0.1"
-    port: int = DEFAULT_PORT
-    token: bool = True
-    phones: bool = False
-    phones_host: str = "0.0.0.0"
-    phones_port: int = PHONES_PORT
     links: str = "modelled"
     dva_port: int = 0
-    open: bool = True
     record: Path | None = None
     results: Path | None = None
     keep_motion: Path | None = None

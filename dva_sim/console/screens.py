@@ -55,6 +55,11 @@ class Screens:
         self._watched = robots & self._run.field.robots.keys()
         self._subscribe()
 
+    @property
+    def watched(self) -> list[str]:
+        """Who is looked at, by id."""
+        return sorted(self._watched)
+
     def hold(self, robots: set[str]) -> None:
         """Whose frames come to a seat anyway."""
         self._held = robots

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from dva_sim.agents.observation import Cameras
@@ -15,17 +16,22 @@ from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
+from dva_sim.console.logs import PERIOD, Logs
 from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.console.robot_windows import RobotWindows
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
+from dva_sim.console.stands import why_stands
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run, Watched
@@ -37,7 +43,14 @@ Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
-POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next, real time [s]
+POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = (
+    0.1,
+    0.1,
+    0.5,
+    1.0,
+    1.0,
+    1.0,
+)  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -56,6 +69,9 @@ class ConsoleWorld:
         clock: Virtual time, at its pace.
         sockets: What carries the messages, if the links are real.
         run: The run.
+        logs: What devices are asked, and answer.
+        windows: Those of the robots.
+        dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
 
@@ -89,7 +105,8 @@ class ConsoleWorld:
         self.feed, self.lag = Feed(self.run), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Tell = lambda *_: None
-        self.sliders = LinkSliders(self.run)
+        self.windows = self._windows()
+        self.sliders = LinkSliders(self.run, self.windows.set_usual)
         self.dropped: Callable[[], int] = lambda: 0
         self._console = Console(
             setup=setup_of(self.run.stage, scenario),
@@ -112,11 +129,38 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
-        self.hazards = HazardFeed(self.run)
+        field = self.run.field
+        self.hazards = HazardFeed(
+            self.run.stage.site, field.incidents, field.surroundings, field.contained
+        )
+        self.logs = Logs(self.run.network, self._node_of)
+        self.logs.keep("dva")
+        for id_tag, robot in field.robots.items():
+            hears = partial(self.windows.heard, id_tag)
+            self.logs.listen(robot.device.label, hears, publications=True)
         self._newest: dict[str, Any] = {}
         self.clock.on_late = self._late
         self.hold: Callable[[str], object] = lambda _: None
+
+    def _windows(self) -> RobotWindows:
+        """The robots' windows; a reply that is dropped is told to the audit, like any that goes."""
+        run, recorder = self.run, self.recorder
+        recorder.robots = run.field.robots.keys()
+
+        def lost(robot: str, reply: bytes) -> None:
+            run.audit.sent(run.clock.now, robot, "", reply)
+
+        about = self.feed.numbers, run.stage.labels
+        windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
+        for id_tag in run.field.robots:
+            self.feed.things[self.feed.numbers[id_tag]] |= windows.about(id_tag)
+        return windows
+
+    def deafen(self, robot: str, on: bool) -> None:
+        """The audit is told that a robot hears nothing, or hears again."""
+        (self.run.audit.deaf.add if on else self.run.audit.deaf.discard)(robot)
 
     def serve_cameras(self, base: str) -> None:
         """The robots' pictures are to be had below this URL from now on."""
@@ -125,16 +169,32 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
-        scene = scene_of(self.run, self.feed.things, self.name, self.seed)
-        scene["link"] = self.sliders.line()
-        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
-        self.tell(scene)
+        self.tell_scene()
         self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(WINDOWS, self._tell_windows)
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(DEVICES, self._tell_devices)
         self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def tell_scene(self) -> None:
+        """Tell what does not change, but for where the DVA listens."""
+        run = self.run
+        scene = scene_of(
+            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            name=self.name,
+            seed=self.seed,
+        )
+        scene["link"] = self.sliders.line()
+        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
+        self.tell(scene)
+
+    def _dva_moved(self, address: str) -> None:
+        self.phones.address = address
+        self.tell_scene()
 
     def show_scene(self) -> None:
         """Tell whoever draws, from the beginning, what there is to be seen."""
@@ -142,6 +202,10 @@ class ConsoleWorld:
         self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
         for number, when in self.run.field.contained.items():
             self.show({"k": "contain", "t": round(1000 * when), "n": number})
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
 
     @property
     def persons(self) -> list[PersonAgent]:
@@ -196,6 +260,7 @@ class ConsoleWorld:
             "clock": self.clock_line(),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
+            "server": self.dva.port.line(),
             "robots": self.feed.robots(self.lag.held),
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
@@ -206,6 +271,27 @@ class ConsoleWorld:
         """Something has changed that nobody shall wait for."""
         self._tell_rows()
         self._tell_seats()
+
+    def _tell_windows(self) -> None:
+        def stands(robot: RobotAgent) -> str:
+            return why_stands(robot, self.clock.now, self.lag.held)
+
+        for line in self.windows.lines(self.screens.watched, stands):
+            self._tell_new(line, but="t", key=str(line["i"]))
+
+    def _tell_devices(self) -> None:
+        line = self.dva.devices(self.feed.now_ms)
+        if line is not None:
+            self.tell(line)
+
+    def _tell_logs(self) -> None:
+        for line in self.logs.batches():
+            self.tell(line)
+
+    def _node_of(self, label: str) -> str | None:
+        """The id of a device of the run by its label."""
+        devices = self.run.stage.devices
+        return next((device.id_tag for device in devices if device.label == label), None)
 
     def _tell_hazards(self) -> None:
         self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
@@ -286,7 +372,7 @@ class ConsoleWorld:
         if self.lag.measured(time.monotonic(), behind):
             why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
             self.hold(why)
-            self.recorder.tell(self.clock.now, "console", why, "link")
+            self.note(why)
 
     # --- the link --------------------------------------------------------------------------
 

@@ -102,6 +102,22 @@ class Accepted(NamedTuple):
 make_accepted = maker(Accepted)
 
 
+class ByHand(NamedTuple):
+    """What somebody does who drives a robot by hand, at the robot itself, and is obeyed.
+
+    Attributes:
+        robot: Which, by id.
+        who: The hand.
+        what: `takes`, `drives` or `lets go`.
+        time: Now [s].
+    """
+
+    robot: str
+    who: str
+    what: str
+    time: float
+
+
 class Applied(NamedTuple):
     """A command that took effect at the robot; times in [s].
 
@@ -268,6 +284,7 @@ class Recorder:
         bytes: Of all of them [B].
         counters: Whatever else is counted, by what it is.
         on_accepted: Told of each command that a robot accepts.
+        on_hand: Told of what is done to a robot by hand.
     """
 
     def __init__(self, keep_traffic: bool = False) -> None:
@@ -283,6 +300,7 @@ class Recorder:
         self.exposure: dict[str, float] = defaultdict(float)
         self._issued: dict[tuple[str, int], Issued] = {}
         self.on_accepted: Callable[[Accepted], object] = lambda _: None
+        self.on_hand: Callable[[ByHand], object] = lambda _: None
 
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
         """Add a line to the timeline."""

@@ -30,7 +30,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings.writing import PART, check_target, write_recording
+from dva_sim.recordings.writing import PART, SENT, check_target, write_recording
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.hazards import draw_incidents
@@ -173,6 +173,16 @@ class LiveRecorder(Recorder):
     def trace(self, who: str, line: str) -> bool:
         """Keep a line of somebody's decisions."""
         return self.put("trace", self._clock.now, who, line)
+
+
+def event_facts(event: Event) -> Line:
+    """What is kept of an event of the DVA, after the word `event`."""
+    at = [event.position.latitude, event.position.longitude]
+    sent = {who: getattr(event, who) for who in SENT}
+    return [
+        *(event.number, event.kind, at, event.state.value, dict(event.times)),
+        *(event.severity, sent),
+    ]
 
 
 class TraceLines:
@@ -416,6 +426,7 @@ class _Told:
             duration=self.duration,
             contained=self._contained,
             endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
+            events=events,
         )
 
     def _traffic(self) -> Iterator[Sent]:
@@ -480,10 +491,12 @@ class _Told:
     def _contains(self, number: int, when: float) -> None:
         self._contained[number] = when
 
-    def _event(
-        self, number: int, kind: str, at: list[float], state: str, times: dict[str, float]
-    ) -> None:
-        event = Event(number, kind, Position(*at), 0.0, state=State(state), times=times)
+    def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
+        """See `event_facts`; what an earlier version did not say is left open."""
+        times, severity, sent = (*more, 0.0, {})[:3]
+        event = Event(
+            number, kind, Position(*at), severity, state=State(state), times=times, **sent
+        )
         self._events[number] = event
 
     def _trace(self, when: float, who: str, line: str) -> None:

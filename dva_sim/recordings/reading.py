@@ -21,8 +21,10 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
+from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels, messages, writing
 from dva_sim.recordings.messages import XML
 from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
@@ -288,6 +290,7 @@ def _opened(raw: _Raw) -> Opened:
         duration=raw.time if raw.is_cut else run["duration_s"],
         contained=contained,
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
+        events=[_event(entry) for entry in run.get("events", [])],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
@@ -320,6 +323,18 @@ def _incident(number: int, entry: Mapping[str, Any], told: Said) -> RunHazard:
 
 def _ending(entry: Mapping[str, Any]) -> Ending:
     return Ending(entry["outcome"], inf if entry["time_s"] is None else entry["time_s"])
+
+
+def _event(entry: Mapping[str, Any]) -> Event:
+    return Event(
+        number=entry["number"],
+        kind=entry["kind"],
+        position=Position(entry["latitude_deg"], entry["longitude_deg"]),
+        severity=entry["severity"],
+        state=State(entry["state"]),
+        **{who: entry[who] for who in writing.SENT},
+        times=dict(entry["times_s"]),
+    )
 
 
 def _surroundings(

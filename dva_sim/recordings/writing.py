@@ -22,6 +22,7 @@ from typing import IO, Any
 import numpy as np
 
 from dva_sim import __version__
+from dva_sim.core.events import Event
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import refuse_to_replace
@@ -94,6 +95,7 @@ FORMAT = 1  # of what is attached; a reader refuses a later one
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
+SENT = ("responder", "operator", "actor")  # to an event
 DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
 SUFFIX, PART = ".mcap", ".part"  # a recording; what a live run puts together until its end
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
@@ -292,10 +294,25 @@ def facts(playback: Playback) -> dict[str, Any]:
             {"outcome": ending.outcome, "time_s": messages.finite(ending.time)}
             for ending in playback.endings
         ],
+        "events": [_event(event) for event in playback.events],
         "drives": [
             {key: getattr(drive, key.removesuffix("_s")) for key in DRIVE}
             for drive in playback.recorder.drives
         ],
+    }
+
+
+def _event(event: Event) -> dict[str, Any]:
+    """An event as the DVA knew it in the end; the times say how it stood before."""
+    return {
+        "number": event.number,
+        "kind": event.kind,
+        "latitude_deg": event.position.latitude,
+        "longitude_deg": event.position.longitude,
+        "severity": event.severity,
+        "state": event.state.value,
+        **{who: getattr(event, who) for who in SENT},
+        "times_s": event.times,
     }
 
 

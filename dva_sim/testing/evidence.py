@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.messages import Problem, check_message
+from dva_sim.protocol.mistakes import Problem, check_message
 
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 

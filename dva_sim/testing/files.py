@@ -16,7 +16,7 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.protocol.limits import schema_file
-from dva_sim.testing.messages import READ_BYTES, Problem, check_message, not_text
+from dva_sim.protocol.mistakes import READ_BYTES, Problem, check_message, not_text
 
 YAML_BYTES: Final = 256 * 1024
 PLAN_BYTES: Final = 16 * 1024 * 1024

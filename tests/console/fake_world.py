@@ -26,6 +26,7 @@ from PIL import Image, ImageDraw
 
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 
+from fake_dva import FakeDva  # noqa: E402
 from fake_phones import FakePhone, PhoneDesk  # noqa: E402
 from fake_scene import LINK, Scene, Walker  # noqa: E402
 
@@ -98,6 +99,7 @@ class FakeWorld(PhoneDesk):
         self.toured = False  # from then on robots that nobody drives stand
         self.done: dict[str, dict[str, Any]] = {}
         self.phones, self.guards = 0, dict[str, dict[str, Any]]()
+        self.dva, self.looked = FakeDva(), frozenset[str]()
         self.more: dict[str, Any] = {}  # of the answer to an action
         self.pictures = not options.no_pictures
         self.socket, theirs = socket.socketpair()
@@ -165,6 +167,29 @@ class FakeWorld(PhoneDesk):
         print(f"Look only: {asked['look']}", flush=True)
         print(f"Phone: {asked['phone']}", flush=True)
         self.say(self.scene.line())
+        self.say(self.dva.log(self.ms, 12))
+
+    def do_look(self, asked: dict[str, Any]) -> None:
+        self.looked = frozenset(asked["tables"])
+        self._tell_devices()
+
+    def _tell_devices(self) -> None:
+        if "devices" in self.looked:
+            self.say(self.dva.devices(self.scene.robots))
+
+    def do_server_stop(self, asked: dict[str, Any]) -> str:
+        self.dva.listens = False
+        self.say(self.rows())
+        return "the server is stopped"
+
+    def do_server_start(self, asked: dict[str, Any]) -> None:
+        self.dva.listens, self.dva.port = True, asked["port"]
+        self.say(self.rows())
+
+    def do_fake_add(self, asked: dict[str, Any]) -> None:
+        number = f"02:00:00:0F:00:{len(self.dva.fakes) + 1:02X}"
+        self.dva.fakes.append(self.dva.row(asked["label"], number, fake=True, link=None))
+        self._tell_devices()
 
     def do_tour(self, asked: dict[str, Any]) -> str:
         self.toured = True
@@ -282,6 +307,7 @@ class FakeWorld(PhoneDesk):
             "clock": clock | {"held_by_lag": False},
             "link": {**self.link, "kind": "modelled", "trace": None},
             "dropped": 0,
+            "server": self.dva.server(),
             "robots": [self._row(robot, holders.get(robot.index)) for robot in self.scene.robots],
             "people": [{"i": p.index, "doing": "walks"} for p in self.scene.people],
         }
@@ -393,6 +419,8 @@ class FakeWorld(PhoneDesk):
                 self.say(events | {"t": self.ms})
             who = self.scene.all[ticks % len(self.scene.all)].label
             self.say({"k": "story", "who": who, "what": "looks around", "kind": "event"})
+            self.say(self.dva.log(self.ms, 1))
+            self._tell_devices()
         for seat in self.seats.values():
             if (seat.robots or seat.phone) and ticks % 3 == 0:
                 self.say(seat.line(self))

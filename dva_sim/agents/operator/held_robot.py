@@ -190,7 +190,11 @@ class HeldRobot:
             self.end("lost link")
             said(False, f"{self.label} does not answer")
 
+        def waits(why: str) -> None:
+            self._alert(f"{self.label} does not start yet: {why}")
+
         def begun() -> None:
+            self._alert("")
             self._begin(log)
             said(True, f"{self.label} is driven")
 
@@ -203,6 +207,7 @@ class HeldRobot:
             begun=begun,
             refused=refused,
             lost=lost,
+            waits=waits,
         )
 
     def _begin(self, log: DriveLog) -> None:

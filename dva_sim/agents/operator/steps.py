@@ -65,6 +65,7 @@ def start(
     begun: Callable[[], object],
     refused: Callable[[str], object],
     lost: Callable[[], object],
+    waits: Callable[[str], object] = lambda _: None,
     tries: int = 1,
 ) -> None:
     """Ask a robot to begin, again and again while it may not know of the permission yet.
@@ -78,6 +79,7 @@ def start(
         begun: Told that the robot agrees.
         refused: Told why it does not.
         lost: Told that it does not answer.
+        waits: Told why it does not yet, each time before it is asked again.
         tries: Which one this is.
     """
     if not wanted():
@@ -93,6 +95,7 @@ def start(
             begun=begun,
             refused=refused,
             lost=lost,
+            waits=waits,
             tries=tries + 1,
         )
 
@@ -102,6 +105,7 @@ def start(
         if reply.code == m.OK:
             begun()
         elif tries < START_TRIES and reply.code in NOT_YET:
+            waits(reply.text)
             device.clock.call_after(START_AGAIN, again)
         else:
             refused(reply.text)

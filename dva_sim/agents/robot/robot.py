@@ -27,7 +27,7 @@ from dva_sim.agents.robot.controller import (
     RobotController,
     TimedSetPoint,
 )
-from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, DecisionLog
+from dva_sim.agents.robot.decision_log import HANGS, LEASE_ENDS, MISSION_ENDS, DecisionLog
 from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.manoeuvres import Sensed
 from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
@@ -227,6 +227,8 @@ class RobotAgent:
         filmed: Told of each frame that it takes, with its id.
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
+        blind: Whether it takes no pictures: another one.
+        sensors: What it measures, by name; each may be given another port.
     """
 
     def __init__(
@@ -249,6 +251,7 @@ class RobotAgent:
         self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
+        self.blind = False
         self._fared, self._held_since = m.OK, 0.0
         self._told: tuple[str | None, int] = (
             None,
@@ -265,7 +268,8 @@ class RobotAgent:
             self._is_driven,
             self._turn_away,
         )
-        self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
+        self.sensors = dict(setup.sensors)
+        self._sensing = SensorSubscriptions(device, self.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
         self._pattern = setup.pattern
         self._commands: Subscription | None = None
@@ -319,6 +323,28 @@ class RobotAgent:
     def holder(self) -> tuple[str | None, float]:
         """Who may act on it, by id, and for how long already [s]."""
         return self._holder, self.device.clock.now - self._held_since
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether its wheels turn now."""
+        self._world.advance_to(self.device.clock.now)
+        return abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
+
+    def hang(self) -> None:
+        """Its computer hangs: it hears and says nothing, and is idle when it starts anew.
+
+        The motors keep what they were told last until its watchdog stops them; a mission, which the
+        computer steers, stops at once.
+        """
+        if self.controller.mode is Mode.MISSION:
+            self.move(STAND)
+        if self.trace is not None:
+            self.trace.happened(HANGS, self.device.clock.now)
+        before = self.controller.mode
+        self.controller.hang()
+        self.device.silent = True
+        if self.controller.mode is not before:
+            self._mode_changed("")
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
@@ -390,10 +416,8 @@ class RobotAgent:
         return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
-        now = self.device.clock.now
-        self._world.advance_to(now)
+        now, moving = self.device.clock.now, self.is_moving
         before, mission = self.controller.mode, self.controller.mission_status
-        moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
         decision = self.controller.handle(message, arrived, now, moving)
         if self.refuses is not None and isinstance(message.body, m.SetTeleOp):
             decision = Decision(self.refuses, "refuses all commands")
@@ -402,7 +426,7 @@ class RobotAgent:
         if self.controller.doubts.unasked is not None:
             self._ask_about(self.controller.doubts.unasked)
         if decision.set_point is not None:
-            self._move(decision.set_point)
+            self.move(decision.set_point)
         is_command = isinstance(message.body, m.SetTeleOp)
         if decision.code == m.OK and not is_command:
             decision = self._follow_up(message, decision)
@@ -496,7 +520,8 @@ class RobotAgent:
         if drive is not None and set_point is not None:
             recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
-    def _move(self, set_point: TimedSetPoint) -> None:
+    def move(self, set_point: TimedSetPoint) -> None:
+        """Give the motors a set point that was decided on."""
         self.set_point = set_point
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
             self._guarded.take(set_point)
@@ -524,7 +549,7 @@ class RobotAgent:
     def _take_frame(self) -> None:
         """Film for whoever watches; a frame is left out while the last one still waits."""
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
-        if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
+        if self.device.silent or self.blind or self._encoding or not network.ready(me, FRAME, size):
             return
         frame = make_frame(self.observe(), self.device.clock.now)
         if self.filmed is not None:

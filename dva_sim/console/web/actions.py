@@ -69,6 +69,12 @@ _REGISTER = {
     "label": _LABEL,
     "type": one_of("Robot", "Remote Control", "Teleoperation"),
 }
+_FAKE = {
+    "label": _LABEL,
+    "type": one_of("Robot", "Guard", "TeleOp", "Remote Control"),
+    "address": text(0, 64),
+    "id_tag": text(0, 17),
+}
 _PERMISSION = {"device": word, "level": one_of("teleoperation", "missions", "both")}
 _CALIBRATE = {
     "reference_mps2": maybe(_AXES),
@@ -96,6 +102,14 @@ _REPORT = {
 }
 _SAYINGS = ("departed", "arrived", "confirmed", "refuted", "contained", "help")
 
+_FAULT = {
+    "robot": robot,
+    "what": one_of("processing", "replies", "freeze", "camera", "sensor"),
+    "on": flag,
+    "seconds": number(0, 3),
+    "sensor": word,
+}
+
 # What may be asked: its arguments, and those of them that have to be there.
 ACTIONS: Known = {
     "take": ({"robots": robots}, ("robots",)),
@@ -110,10 +124,18 @@ ACTIONS: Known = {
     "refute": ({}, ()),
     "decline": ({}, ()),
     "tour": ({}, ()),
+    "manual_take": ({"robot": robot}, ("robot",)),
+    "manual_release": ({}, ()),
+    "fault": (_FAULT, ("robot", "what", "on")),
     "phone_register": (_REGISTER, tuple(_REGISTER)),
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
     "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key not in _OPTIONAL)),
+    "server_start": ({"port": whole(1, 65_534)}, ("port",)),
+    "server_stop": ({}, ()),
+    "revoke": ({"device": word}, ("device",)),
+    "fake_add": (_FAKE, ("label", "type")),
+    "fake_remove": ({"device": word}, ("device",)),
     "guard_join": ({"guard": _LABEL}, ("guard",)),
     "guard_leave": ({}, ()),
     "guard_answer": ({"accept": flag, "reason": text(0, 200)}, ("accept", "reason")),
@@ -121,22 +143,25 @@ ACTIONS: Known = {
     "guard_place": (_PLACE, tuple(_PLACE)),
     "guard_report": (_REPORT, tuple(_REPORT)),
 }
+_INPUT = {
+    "n": whole(0, 2**53),
+    "speed": number(0, 1),
+    "turn": number(-1, 1),
+    "held": flag,
+}
 # Those that have no answer.
 SILENT: Known = {
-    "input": (
-        {
-            "n": whole(0, 2**53),
-            "speed": number(0, 1),
-            "turn": number(-1, 1),
-            "held": flag,
-        },
-        ("n", "speed", "turn", "held"),
-    ),
+    "input": (_INPUT, tuple(_INPUT)),
+    "manual": (_INPUT, tuple(_INPUT)),
     "samples": (_SAMPLES, tuple(_SAMPLES)),
     "gone": ({}, ()),
 }
 # A phone changes nothing for others, but that it stops a robot.
-NOT_BY_PHONE = ("take", "link", "pattern", "pace", "tour")
+NOT_BY_PHONE = (
+    *("take", "link", "pattern", "pace", "tour"),
+    *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
+    *("manual_take", "manual", "fault"),
+)
 
 
 def check_role(role: Role, name: Any) -> None:

@@ -21,6 +21,7 @@ from starlette.websockets import WebSocket
 from dva_sim.console.web.access import Asked, Entrance, Role
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
@@ -244,6 +245,7 @@ def make_app(
         door: Where phones come in, if they do.
     """
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
+    logs = LogRequests(hub)
 
     async def see(ws: WebSocket) -> None:
         await hub.see(ws, ws.scope[ROLE])
@@ -264,6 +266,9 @@ def make_app(
         Route("/api/state", rest.state),
         Route("/api/site", rest.site),
         Route("/api/story", rest.story),
+        Route("/api/logs/{name}", _for(Role.LOOK, logs.lines)),
+        Route("/api/logs/{name}/export", _for(Role.DRIVE, logs.export)),
+        Route("/api/logs/{name}/{number:int}", _for(Role.DRIVE, logs.entry)),
         Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
         Route("/api/emergency", _for(Role.PHONE, rest.emergency), methods=["POST"]),
         WebSocketRoute("/ws/state", see),

@@ -64,7 +64,7 @@ class Client:
 
     def __init__(self, name: str, role: Role, state: RunState) -> None:
         self.name, self.role = name, role
-        self.feed = PageFeed(state, name)
+        self.feed = PageFeed(state, name, role >= Role.DRIVE)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
         self.driver: Driver | None = None
@@ -99,7 +99,8 @@ class Clients:
         """
         known = self._all.get(name)
         if known is not None and known.role is role and not known.is_here:
-            known.is_here, known.feed = True, PageFeed(self._state, known.name)
+            known.is_here = True
+            known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
             return known
         self._count += 1
         client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state)
@@ -125,6 +126,16 @@ class Clients:
     def watched(self) -> Iterable[int]:
         """Robots whose pictures somebody says to look at."""
         return (robot for client in self.here() for robot in client.watches)
+
+    def looked(self) -> tuple[dict[str, bool], list[str]]:
+        """Logs that pages look at, each with whether publications are wanted, and tables."""
+        logs: dict[str, bool] = {}
+        tables: set[str] = set()
+        for looks in (client.feed.looks for client in self.here()):
+            for name, wanted in looks.wanted.items():
+                logs[name] = logs.get(name, False) or wanted.publications
+            tables |= looks.tables
+        return logs, sorted(tables)
 
     def wake(self) -> None:
         """Something is new."""

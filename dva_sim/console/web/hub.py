@@ -60,6 +60,8 @@ class Hub:
         if self.clients.is_full():
             await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
             return
+        if await self._is_over(ws):
+            return
         client = self.clients.join(role, ws.query_params.get("client", ""))
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
@@ -83,14 +85,24 @@ class Hub:
             client.feed.resync()
         elif what == "watch":
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
+            client.feed.watches = client.watches
             self.watching()
+        elif what == "look" and client.role is not Role.PHONE:
+            client.feed.looks.look(said.get("logs", {}), said.get("tables", []))
+            self._tell_looks()
         else:
-            raise BadMessage("no such message; there are: ping, resync, watch")
+            raise BadMessage("no such message; there are: ping, resync, watch, look")
         client.wake.set()
+
+    def _tell_looks(self) -> None:
+        """The simulation tells what somebody looks at, and no more."""
+        logs, tables = self.clients.looked()
+        self.simulation.send({"do": "look", "logs": logs, "tables": tables})
 
     def _leave(self, client: Client) -> None:
         """A page is gone: its robots stop, and after a while others may have them."""
         self.clients.leave(client)
+        self._tell_looks()
         self.watching()
         if client.role.acts:
             self.simulation.send({"client": client.name, "do": "gone"})
@@ -115,6 +127,8 @@ class Hub:
         if not role.acts or client is None or client.role is not role:
             why = "may only look" if role is Role.LOOK else "no page of that name is open"
             await ws.send_denial_response(PlainTextResponse(why, 403))
+            return
+        if await self._is_over(ws):
             return
         self._replace(client)
         driver = client.driver = Driver()
@@ -162,11 +176,20 @@ class Hub:
 
     # --- both ----------------------------------------------------------------------------
 
+    async def _is_over(self, ws: WebSocket) -> bool:
+        """Whether the world has ended: who comes back then does not find it open once more."""
+        if self.simulation.ended.is_set():
+            await ws.send_denial_response(PlainTextResponse(self.simulation.why, 503))
+            return True
+        return False
+
     async def _serve(
         self, ws: WebSocket, wake: asyncio.Event, following: Next, hear: Hear, bucket: Bucket
     ) -> None:
         """Send and receive until one of both ends; nothing of it is left behind."""
         self._open.add(ws)
+        if self.simulation.ended.is_set():  # while it was being accepted
+            wire_of(ws).drop(LEAVING, self.simulation.why)
         tasks = [
             asyncio.ensure_future(self._send(ws, wake, following)),
             asyncio.ensure_future(self._receive(ws, hear, bucket)),

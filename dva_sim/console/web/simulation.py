@@ -20,7 +20,7 @@ from dva_sim.console.web.state import RunState
 
 PATIENCE = 5.0  # for an answer [s]
 LONG = 60.0  # for one that the DVA gives, or does not give after all attempts [s]
-BY_THE_DVA = ("phone_register", "phone_devices", "phone_permission")
+BY_THE_DVA = ("phone_register", "phone_devices", "phone_permission", "fake_add")
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
 MOST_PENDING = 256  # questions without an answer
@@ -116,8 +116,11 @@ class Simulation:
         return self._pipe.send(asked)
 
     def ask(self, asked: Asked, told: Told) -> None:
-        """Ask for something; `told` gets the answer, which may be that there is no room."""
+        """Ask for something; `told` gets the answer: there may be no room, or nobody there."""
         key = asked["id"]
+        if self.ended.is_set():
+            told({"k": "done", "id": key, "ok": False, "text": self.why})
+            return
         waiting = self._pending.get(key)
         if waiting is not None and len(waiting) < 4:
             waiting.append(told)

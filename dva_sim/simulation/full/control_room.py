@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.agents.control_room.dispatcher import ScriptedDispatcher
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.attention import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.drive import Teleoperation
@@ -23,6 +25,7 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sensing import Sensing, SensorAlarm
 from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
@@ -32,7 +35,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, Stage, middle_of
+from dva_sim.simulation.full.stage import DVA, Stage, id_of, label_of, middle_of
 from dva_sim.simulation.scenario import (
     Scenario,
     command_timeout_s,
@@ -91,6 +94,9 @@ def make_desk(stage: Stage, permissions: Permissions) -> Dva:
         patrols=_patrols(stage),
         sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
         supervisors=_supervisors(stage),
+        roles=_roles(stage),
+        ask_first=dispatch.mode == "ask_first",
+        policy_name=dispatch.policy.rpartition(":")[2],
     )
 
 
@@ -109,6 +115,16 @@ def _supervisors(stage: Stage) -> frozenset[str]:
     return frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors)
 
 
+def _roles(stage: Stage) -> Roles:
+    """What control rooms may do, by their ids, as the scenario says; and its own dispatcher."""
+    known = dict(stage.scenario.dva.control_rooms)
+    if stage.scenario.dispatch.person is not None:
+        known.setdefault(id_of("control-room", 1), stage.scenario.dispatch.person.role)
+    named = {label_of("control-room", n): id_of("control-room", n) for n in range(1, ROOMS + 1)}
+    return Roles({named.get(name, name): ControlRoomRole(role) for name, role in known.items()})
+
+
+ROOMS = 99  # control rooms that a scenario can name by a label
 MOVED_SINCE = 2.0  # since somebody last told where it is; assumed [m]
 
 
@@ -202,6 +218,19 @@ def _patrols(stage: Stage) -> Patrols:
                 raise ConfigError(f"patrols: no robot fits at x {x:g} m, y {y:g} m")
         beats[patrol.robot] = tuple(m.Position(*to_latlon(x, y)) for x, y in places)
     return Patrols(beats)
+
+
+def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
+    """The person who dispatches by a script, at the first control room, if there is one."""
+    profile = stage.scenario.dispatch.person
+    if profile is None:
+        return None
+    device = stage.device("control-room", 1)
+    luck = stage.streams.fresh
+    room = ControlRoomAgent(device)
+    person = ScriptedDispatcher(room, profile, lambda what: luck(f"{device.label}/{what}"))
+    room.start()
+    return person
 
 
 def add_operator(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.core.sensing import REACH
 from dva_sim.kernel.recorder import Recorder
@@ -72,6 +73,7 @@ class Playback:
         contained: When incidents were dealt with [s], by their place in `incidents`.
         endings: What became of each incident, in the order of `incidents`; empty if that is not
             known, as of a recording that was cut short.
+        events: The events as the DVA knew them in the end.
     """
 
     scenario: Scenario
@@ -85,6 +87,7 @@ class Playback:
     duration: float
     contained: dict[int, float] = field(default_factory=dict)
     endings: list[Ending] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
 
     def robot_named(self, label: str) -> str | None:
         """The id of a robot, if there is one of that name."""
@@ -96,20 +99,20 @@ class Recording(Playback):
     """All that is left of one run, to be measured.
 
     Attributes:
-        events: The events as the DVA knew them.
         robots: The robots by id, as they ended.
         people: What became of the people on foot.
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
             `datagram`.
         persons: Numbers of the operators whose places people took.
+        facts: What was decided, by whom and why.
     """
 
-    events: list[Event]
     robots: dict[str, RobotAgent]
     links: dict[str, tuple[Link, Link]]
     people: list[PersonLog] = field(default_factory=list)
     depth: str = "message"
     persons: tuple[int, ...] = ()
+    facts: list[Fact] = field(default_factory=list)
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""

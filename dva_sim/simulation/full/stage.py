@@ -15,7 +15,7 @@ import shapely
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
-from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
@@ -30,7 +30,17 @@ from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
 _ANYWHERE = "robot", "guard"  # whose scenario has a key `way_m`
-_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5, "phone": 6}
+_ROOMS = {
+    "dva": 0,
+    "robot": 1,
+    "guard": 2,
+    "operator": 3,
+    "detector": 4,
+    "console": 5,
+    "phone": 6,
+    "control-room": 7,
+    "fake": 15,
+}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -76,6 +86,7 @@ TYPES = {
     "detector": DETECTOR,
     "console": OPERATOR,
     "phone": OPERATOR,
+    "control-room": CONTROL_ROOM,
 }
 
 
@@ -142,8 +153,8 @@ class Stage:
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
-        """What a robot can do, by its id, as its operator has been taught."""
-        spec = self._specs[robot]
+        """What a robot can do, as its operator has been taught; a stranger, what ours can."""
+        spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
     def device(self, kind: str, number: int) -> AgentDevice:

@@ -98,6 +98,18 @@ def test_the_legend_tells_what_the_fullest_tint_means(fake, visit) -> None:
     expect(page.locator(".legend")).not_to_contain_text("undefined")
 
 
+@pytest.mark.parametrize("name", ["map", "drive"])
+def test_the_legend_is_closed_again_on_a_small_screen(fake, visits, name: str) -> None:
+    page = visits(360, 640).open(fake(*SMALL).drive, name)
+    summary = page.get_by_text("Legend")
+
+    summary.click()
+    expect(page.get_by_text("robot: teleoperation")).to_be_visible()
+    page.get_by_role("button", name="Zoom in").click()  # the legend covers no button
+    summary.click()
+    expect(page.get_by_text("robot: teleoperation")).to_be_hidden()
+
+
 @pytest.mark.parametrize("site", ["campus", "office-block"])
 def test_other_sites_are_drawn_too(fake, visit, site: str) -> None:
     page = visit.open(fake("--robots", "3", "--people", "4", "--site", site).drive)

@@ -10,10 +10,20 @@ export const rows = signal(null);
 export const hazards = signal({ hazards: [], fields: [] });
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').SiteEvent[]>} */
 export const events = signal([]);
+/**
+ * What the DVA knows of each device, while a page shows it.
+ * @type {import('../vendor/preact.js').Signal<any[]>}
+ */
+export const devices = signal([]);
 /** @type {import('../vendor/preact.js').Signal<{t: number, who: string, what: string}[]>} */
 export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */
 export const seat = signal(null);
+/**
+ * What the windows of robots show, of those that the page looks at.
+ * @type {import('../vendor/preact.js').Signal<Map<number, import('./types.js').RobotWindow>>}
+ */
+export const windows = signal(new Map());
 /**
  * What the guard knows whom this page stands for.
  * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
@@ -72,4 +82,4 @@ export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
  * The mode of a robot, as its driver hears it first, else as everybody does.
  * @param {number} i
  */
-export const modeOf = (i) => driveOf(i)?.mode || rowOf(i)?.mode || 'Idle';
+export const modeOf = (i) => (rowOf(i)?.by_hand ? 'Manual' : driveOf(i)?.mode || rowOf(i)?.mode || 'Idle');

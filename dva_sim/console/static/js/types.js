@@ -5,7 +5,8 @@
  * @typedef {{i: number, id: string, label: string, kind: string, radius_m: number,
  *   max_speed_mps: number, max_turn_rate_radps: number,
  *   camera?: {field_of_view_deg: number, range_m: number, rate_hz: number},
- *   person?: boolean}} Thing
+ *   person?: boolean, wheel_radius_m?: number, corners_m?: number[][], steering?: string,
+ *   sensors?: string[]}} Thing
  *
  * @typedef {{name: string, polygon_m: number[][], floor: string, outdoor: boolean}} Room
  * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
@@ -32,9 +33,24 @@
  *   holder: string | null, holder_label?: string | null, session_age_s?: number | null,
  *   watchdog_left_s: number | null, stands: string, set_speed_mps: number,
  *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
- *   refused: number}} RobotRow
+ *   refused: number, by_hand?: boolean}} RobotRow
+ * @typedef {{last_ms: number, median_ms: number, p95_ms: number, largest_ms: number,
+ *   count: number}} LatencyFigures
+ * @typedef {{name: string, unit: string, stuck: boolean, values?: number[],
+ *   least?: number}} SensorShown
+ * @typedef {{state: string, address: string, dva: string | null, problem: string,
+ *   by_hand?: boolean, asking?: boolean}} StationShown
+ * @typedef {{i: number, t: number, station: StationShown, mode: string, hand: number | null,
+ *   holder: string | null, stands: string, notice: string, link_lost: boolean,
+ *   emergency: {at_ms: number, by: string} | null, speed_mps: number, turn_rate_radps: number,
+ *   now_mps: number, now_radps: number, watchdog_left_s: number | null,
+ *   one_way: LatencyFigures | null, loop: LatencyFigures | null, replies: LatencyFigures | null,
+ *   faults: {processing_s: number | null, replies: boolean, freeze: boolean, camera: boolean},
+ *   sensors: SensorShown[]}} RobotWindow
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
- *   people: {i: number, doing: string}[], order?: Order | null}} Rows
+ *   people: {i: number, doing: string}[], order?: Order | null, server?: Server}} Rows
+ * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
+ *   own?: boolean}} Server
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard
@@ -67,7 +83,7 @@
  *
  * @typedef {{client: string, role: string}} You
  * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
- *   address: string}, devices?: Device[]}} Done
+ *   address: string}, devices?: Device[], hand?: number}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
  */
 export {};

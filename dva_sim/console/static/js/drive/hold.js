@@ -29,6 +29,7 @@ export const interrupted = signal('');
 const sources = new Map();
 /** @type {Set<() => void>} */
 const releases = new Set();
+let what = 'input';
 let count = 0;
 let sent = 0;
 let timer = 0;
@@ -120,7 +121,21 @@ function send() {
   count += 1;
   sent = performance.now();
   const { speed, turn } = wish.value;
-  steer({ do: 'input', n: count, speed, turn, held: held.value });
+  steer({ do: what, n: count, speed, turn, held: held.value });
+}
+
+/**
+ * What is held steers something else than the robots of the seat, until that is ended.
+ * @param {string} name of the input, as the world knows it
+ * @returns {() => void} how to end that
+ */
+export function steerWith(name) {
+  forget();
+  what = name;
+  return () => {
+    forget();
+    what = 'input';
+  };
 }
 
 /** A last word that outlives the page, should the socket not carry it any more. */

@@ -6,7 +6,7 @@ import { steer } from './wire.js';
 
 const PATIENCE_MS = 8000;
 const LONG_MS = 65000; // for what the DVA answers, or does not after all attempts
-const BY_THE_DVA = ['phone_register', 'phone_devices', 'phone_permission'];
+const BY_THE_DVA = ['phone_register', 'phone_devices', 'phone_permission', 'fake_add'];
 const ENDS = ['stop', 'release'];
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */

@@ -1,6 +1,7 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
-import { connection, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import { hearLog } from '../logs/log_rows.js';
+import { connection, devices, events, guard, hazards, pictures, rows, scene, seat, story, tracks, windows, you } from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -19,6 +20,7 @@ const LINES = {
     tracks.drop(line.gone ?? []);
   },
   rows: (line) => (rows.value = line),
+  robot: (line) => (windows.value = new Map(windows.value).set(line.i, line)),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
@@ -33,6 +35,8 @@ const LINES = {
     rememberClient(line.client);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
+  devices: (line) => (devices.value = line.devices),
+  log: hearLog,
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),
 };
@@ -58,6 +62,7 @@ function snap(line) {
   story.value = [];
   seat.value = null;
   guard.value = null;
+  windows.value = new Map();
   const { pos, story: told, ...others } = line.state ?? {};
   if (pos) LINES.pos({ p: pos });
   if (told) story.value = told.slice(-STORY_KEPT);

@@ -19,6 +19,7 @@ let count = NaN;
 let asked = 0;
 /** @type {number[]} */
 let watched = [];
+let looked = { logs: {}, tables: /** @type {string[]} */ ([]) };
 
 /** @param {string} path */
 function address(path) {
@@ -38,6 +39,7 @@ export function connect() {
     connection.value = 'open';
     stopAsking = keepAsking(tell);
     tell({ do: 'watch', robots: watched });
+    if (isLooking()) tell({ do: 'look', ...looked });
   };
   socket.onmessage = (event) => receive(JSON.parse(event.data));
   socket.onclose = (event) => {
@@ -82,6 +84,18 @@ export function watch(robots) {
   watched = robots;
   tell({ do: 'watch', robots });
 }
+
+/**
+ * Say which logs are looked at, each with its filter, and which tables.
+ * @param {Record<string, object>} logs
+ * @param {string[]} tables
+ */
+export function look(logs, tables) {
+  looked = { logs, tables };
+  tell({ do: 'look', ...looked });
+}
+
+const isLooking = () => looked.tables.length > 0 || Object.keys(looked.logs).length > 0;
 
 /** Open the socket for driving whenever this page may, under the name that it has got. */
 export function keepDriveSocket() {

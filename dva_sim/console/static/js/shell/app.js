@@ -1,10 +1,13 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
 import { clock, connection, notice, scene } from '../store.js';
+import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
+import { RequestsPage } from '../requests/requests_page.js';
+import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -13,11 +16,17 @@ import { addressOf, page } from './route.js';
 
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
+  ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
   ['network', 'Network', 'activity'],
 ]);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
+  main: RequestsPage,
+  devices: DevicesPage,
+  robots: RobotsPage,
   drive: DrivePage,
   network: NetworkPage,
 });

@@ -64,7 +64,7 @@ function Age() {
   const error = roundTrip.value.error;
   const more = Number.isNaN(error) ? '' : `; to the server and back ${roundTrip.value.ms.toFixed(1)} ms, clocks ±${error.toFixed(1)} ms`;
   return html`<span class=${old ? 'item age old' : 'item age'} title=${`How old the newest word from the world is${more}`}>
-    data ${known ? `${secondsText(age)} old` : '–'}</span>`;
+    <span class="word">data </span>${known ? secondsText(age) : '–'}<span class="word">${known ? ' old' : ''}</span></span>`;
 }
 
 function Alarms() {

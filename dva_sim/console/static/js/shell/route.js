@@ -2,15 +2,28 @@
 import { computed, signal } from '../../vendor/preact.js';
 import { robots } from '../store.js';
 
-const PAGES = ['map', 'drive', 'network'];
+const PAGES = ['map', 'main', 'devices', 'robots', 'drive', 'network'];
 const MOST_AT_ONCE = 2;
 const hash = signal(location.hash);
 window.addEventListener('hashchange', () => (hash.value = location.hash));
 
 const parts = computed(() => {
   const [path, query = ''] = hash.value.replace(/^#\/?/, '').split('?');
-  return { path, query: new URLSearchParams(query) };
+  const [name, ...rest] = path.split('/');
+  return { path: name, detail: decoded(rest.join('/')), query: new URLSearchParams(query) };
 });
+
+/** What stands behind the name of the page, as in `#/robots/robot-1`; empty: nothing. */
+export const detail = computed(() => parts.value.detail);
+
+/** @param {string} text */
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
 
 export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : 'map'));
 
