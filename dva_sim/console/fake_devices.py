@@ -19,6 +19,7 @@ from dva_sim.protocol.limits import pattern
 
 RENEW: Final = 3.0  # from one registration to the next: a third of what the DVA bears [s]
 MOST: Final = 64
+NOWHERE: Final = "192.0.2.{}"  # addresses that belong to nobody (RFC 5737)
 TYPES: Final = ("Robot", "Guard", "TeleOp", "Remote Control")
 
 MakeDevice = Callable[[str, str, str, str], AgentDevice]

@@ -14,9 +14,9 @@ from contextlib import suppress
 from typing import Any
 
 MOST_WAITING = 64  # lines
-NEWEST_ONLY = frozenset({"pos", "frame", "seat", "rows", "hazards", "events", "devices"})
+NEWEST_ONLY = frozenset({"pos", "frame", "seat", "rows", "hazards", "events", "devices", "told"})
 DROPPED_FIRST = "log"  # whose numbers tell what is missing
-KEPT = frozenset({"scene", "done", "bye", "contain"})  # lines that are never dropped
+KEPT = frozenset({"scene", "shelf", "done", "bye", "contain"})  # lines that are never dropped
 MOST_LINE = 1 << 20  # of one that is read [B]
 AT_ONCE = 1 << 16  # that are read [B]
 

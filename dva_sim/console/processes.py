@@ -14,6 +14,7 @@ import time
 import webbrowser
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Protocol
 
 from dva_sim.console.children import END_WITHIN, Child
@@ -77,17 +78,20 @@ class ConsoleProcesses:
         self.serving: Mapping[str, Any] = {}
         self.failed, self._restarts = "", 0
 
-    def start(self, subject: ConsoleSubject, take: Callable[[Line], object]) -> None:
+    def start(
+        self, subject: ConsoleSubject, take: Callable[[Line], object], report: Path | None = None
+    ) -> None:
         """Start both, connect them with what is shown, say where it is, and begin.
 
         Args:
             subject: What is shown.
             take: Does what a line of a page asks for.
+            report: A study's report that pages may show.
 
         Raises:
             ChildFailed: the web process could not begin.
         """
-        web = self._start_web()
+        web = self._start_web(report)
         pictures = self._start_pictures()
         self.serving = web.first_line()
         subject.serve_cameras(str(self.serving["base"]))
@@ -114,12 +118,13 @@ class ConsoleProcesses:
         for child in self._children:
             child.make_sure(deadline)
 
-    def _start_web(self) -> Child:
+    def _start_web(self, report: Path | None) -> Child:
         options = self._options
         ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += [] if options.token else ["--no-token"]
+        words += [] if report is None else ["--report", str(report)]
         if options.phones:
             words += ["--phones-host", options.phones_host]
             words += ["--phones-port", str(options.phones_port)]

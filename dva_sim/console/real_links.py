@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.kernel.clock import Clock
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.safety_checks import SafetyAudit
@@ -22,6 +23,13 @@ TITLE = "the links are real: they are what the network of this machine makes the
 
 
 MakeSockets = Callable[[Scenario, PacedClock, ConsoleRecorder], "ConsoleSockets"]
+
+
+def start_of_day(clock: Clock) -> tuple[float, bool]:
+    """When a clock was at zero, by the clock on the wall [s since midnight]; exactly."""
+    started = time.time() - clock.now
+    local = time.localtime(started)
+    return local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec + started % 1.0, True
 
 
 class ConsoleSockets:
@@ -68,9 +76,7 @@ class ConsoleSockets:
 
     def time_of_day(self) -> tuple[float, bool]:
         """See `RealLinks`: by the clock on the wall."""
-        started = time.time() - self._clock.now
-        local = time.localtime(started)
-        return local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec + started % 1.0, True
+        return start_of_day(self._clock)
 
     def watch(self, audit: SafetyAudit) -> None:
         """See `RealLinks`: all devices of ours are in this process, so each message is seen."""

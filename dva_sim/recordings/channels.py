@@ -354,7 +354,7 @@ def names_of(labels: Mapping[str, str]) -> dict[str, str]:
     """A name for each id that fits into a topic, and that no other id has."""
     names: dict[str, str] = {}
     for device, label in labels.items():
-        name = label.replace(" ", "-")
+        name = label.replace(" ", "-").replace("/", "-")
         taken = name in names.values()
         names[device] = f"{name}-{device.replace(':', '')}" if taken else name
     return names
@@ -362,9 +362,9 @@ def names_of(labels: Mapping[str, str]) -> dict[str, str]:
 
 def shown(playback: Playback) -> Iterator[ChannelMessage]:
     """The frames that come onto the operators' screens."""
-    labels = playback.labels
+    labels, names = playback.labels, names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
-        topic, whose = f"/{labels[drive.operator]}/{SCREEN}", labels[drive.robot]
+        topic, whose = f"/{names[drive.operator]}/{SCREEN}", labels[drive.robot]
         for at in drive.frames:
             said = {"drive": number, "robot": whose, "captured_s": at.captured}
             yield stamped(at.time, topic, "dva_sim.Shown", **said)
@@ -372,9 +372,9 @@ def shown(playback: Playback) -> Iterator[ChannelMessage]:
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
     """What the phones make of the tilt."""
-    labels = playback.labels
+    labels, names = playback.labels, names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
-        topic, whose = f"/{labels[drive.operator]}/{COMMANDS}", labels[drive.robot]
+        topic, whose = f"/{names[drive.operator]}/{COMMANDS}", labels[drive.robot]
         for time, speed, turn_rate in drive.commands:
             made = {"speed_m_s": round(speed, 5), "turn_rate_rad_s": round(turn_rate, 5)}
             yield stamped(time, topic, "dva_sim.Command", drive=number, robot=whose, **made)

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from console_served import Answer, Served, serving
 from patience import PATIENCE_S
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from dva_sim.console.qr_code import half_blocks, svg
@@ -224,6 +224,22 @@ def test_a_phone_that_is_gone_stops(console):
         with wss(console, f"/ws/drive?client={you['client']}", console.phone):
             pass
         assert console.next_asked("gone")["client"] == you["client"]
+
+
+def test_a_page_that_lost_its_connection_unnoticed_keeps_its_name_and_a_copy_gets_another(console):
+    """As on a change of network: the old connection is dead, and nobody has said so here."""
+    with wss(console, "/ws/state?page=one", console.phone) as old:
+        name = json.loads(old.recv(PATIENCE_S))["client"]
+        with wss(console, f"/ws/state?client={name}&page=copy", console.phone) as copy:
+            assert json.loads(copy.recv(PATIENCE_S))["client"] != name
+        with wss(console, f"/ws/state?client={name}&page=one", console.phone) as again:
+            assert json.loads(again.recv(PATIENCE_S))["client"] == name
+            with pytest.raises(ConnectionClosed):
+                list(old)
+            with wss(console, f"/ws/drive?client={name}", console.phone):  # it is still here
+                console.say({"k": "seat", "seat": name, "drives": [], "phase": "held"})
+                while json.loads(again.recv(PATIENCE_S)).get("phase") != "held":
+                    pass
 
 
 def test_the_line_of_a_guard_reaches_its_page_alone(console):

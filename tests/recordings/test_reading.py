@@ -1,5 +1,6 @@
 """What is read back from a recording is what was written, as far as the file goes."""
 
+import dataclasses
 import random
 import resource
 
@@ -130,6 +131,19 @@ def test_messages_screens_and_commands_come_back(folder):
     assert len(driven.commands) == len(drove.commands) > 100
     robot = drove.robot
     assert len(now.views[robot]) == len(then.views[robot]) > 100
+
+
+def test_what_a_person_calls_a_phone_breaks_no_recording(tmp_path):
+    run = drive()
+    (drove,) = run.recorder.drives
+    labels = run.labels | {drove.operator: "A/B <b>?\u00e9</b> /pose"}
+    path = tmp_path / "named.mcap"
+    write_recording(dataclasses.replace(run, labels=labels), path, tables=tables_of(run))
+    now = read_recording(path).playback
+    assert now.labels[drove.operator] == labels[drove.operator]
+    assert [s[:3] for s in now.recorder.traffic] == [s[:3] for s in run.recorder.traffic]
+    assert len(now.recorder.drives[0].commands) == len(drove.commands)
+    assert set(now.recorder.tracks) == set(run.recorder.tracks)
 
 
 def test_the_tables_come_with_it(folder):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.operator.handheld import Said
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
@@ -28,6 +28,7 @@ def watch(
     seen: Callable[[Subscription], object],
     blind: Callable[[str], object],
     wanted: Callable[[], bool],
+    unreachable: Callable[[], object] = do_nothing,
 ) -> None:
     """Ask a robot where its camera is, and watch it.
 
@@ -40,6 +41,7 @@ def watch(
         seen: Told once it is watched.
         blind: Told the URL, if there is nothing to see there.
         wanted: Whether it still is.
+        unreachable: Told that the robot does not answer.
     """
 
     def answered(reply: m.Reply) -> None:
@@ -52,7 +54,7 @@ def watch(
         else:
             seen(device.network.subscribe(device.id_tag, robot, found, on_frame))
 
-    device.ask(robot, m.GetSensorInfo(), answered, session=session)
+    device.ask(robot, m.GetSensorInfo(), answered, unreachable, session)
 
 
 def start(

@@ -48,6 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--phones-port", type=int, help="https for phones; 0 for any; else none")
     parser.add_argument("--certificates", type=Path, help="folder of those for phones")
     parser.add_argument("--name", action="append", default=[], help="another name of this machine")
+    parser.add_argument("--report", type=Path, help="a study's report that may be shown")
     parser.add_argument("--no-token", action="store_true", help="everybody may drive")
     return parser
 
@@ -76,7 +77,8 @@ async def run(options: argparse.Namespace) -> None:
     telling = asyncio.ensure_future(cameras.keep_telling())
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     files, over = StaticFiles(), _after(closing)
-    serves = [serve(make_server(make_app(access, hub, cameras, files, door)), sock, over)]
+    app = make_app(access, hub, cameras, files, door, options.report)
+    serves = [serve(make_server(app), sock, over)]
     if phones:
         app = make_app(phones.access, hub, cameras, files, door)
         serves.append(serve(make_server(app, phones.certificate), phones.sock, over))

@@ -120,6 +120,8 @@ ACTIONS: Known = {
     "link": (_LINK, ()),
     "pattern": ({"robot": robot, "name": word}, ("robot", "name")),
     "pace": ({"factor": number(0.01, 1000), "paused": flag}, ()),
+    "seek": ({"t_ms": whole(0, 10**10)}, ("t_ms",)),
+    "open_recording": ({"name": text(1, 255)}, ("name",)),
     "confirm": ({}, ()),
     "refute": ({}, ()),
     "decline": ({}, ()),
@@ -158,7 +160,7 @@ SILENT: Known = {
 }
 # A phone changes nothing for others, but that it stops a robot.
 NOT_BY_PHONE = (
-    *("take", "link", "pattern", "pace", "tour"),
+    *("take", "link", "pattern", "pace", "tour", "seek", "open_recording"),
     *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
     *("manual_take", "manual", "fault"),
 )

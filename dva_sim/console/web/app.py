@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
@@ -23,6 +24,7 @@ from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
+from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.web.streaming import PictureStream
@@ -234,6 +236,7 @@ def make_app(
     cameras: CameraStreams,
     files: StaticFiles,
     door: PhoneDoor | None = None,
+    report: Path | None = None,
 ) -> ASGIApp:
     """The whole application.
 
@@ -243,7 +246,9 @@ def make_app(
         cameras: Pictures.
         files: Of the pages.
         door: Where phones come in, if they do.
+        report: A study's report that is shown as it is.
     """
+    told = StudyReport(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
     logs = LogRequests(hub)
 
@@ -261,6 +266,7 @@ def make_app(
         Route("/api/phones.svg", _for(Role.DRIVE, phones.code)),
         Route("/static/{name:path}", pages.file),
         Route(OPEN, pages.health),
+        Route("/report", told.page),
         Route("/camera/{label:path}.mjpg", pages.stream),
         Route("/camera/{label:path}.jpg", pages.still),
         Route("/api/state", rest.state),

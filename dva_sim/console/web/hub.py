@@ -62,7 +62,11 @@ class Hub:
             return
         if await self._is_over(ws):
             return
-        client = self.clients.join(role, ws.query_params.get("client", ""))
+        name, page = (ws.query_params.get(key, "")[:64] for key in ("client", "page"))
+        client = self.clients.join(role, name, page)
+        if client.ws is not None:  # the page has lost that one, and we did not know
+            wire_of(client.ws).drop(STUCK, "the page has come again")
+        client.ws = ws
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
         def hear(text: str) -> None:
@@ -73,7 +77,8 @@ class Hub:
             bucket = Bucket(LOOKS_RATE, LOOKS_BURST)
             await self._serve(ws, client.wake, client.feed.next, hear, bucket)
         finally:
-            self._leave(client)
+            if client.ws is ws:
+                self._leave(client)
 
     def _hear_looker(self, client: Client, text: str) -> None:
         said = read(text)

@@ -92,8 +92,8 @@ class Rest:
     async def site(self, request: Request) -> Response:
         """`GET /api/site`: the plan, which does not change."""
         scene = self._simulation.state.scene
-        if scene is None:
-            return problem(503, "the simulation has not begun")
+        if scene is None or "site" not in scene:
+            return problem(503, "nothing has begun")
         response = JSONResponse(scene["site"])
         tag = f'"{hashlib.sha256(response.body).hexdigest()[:32]}"'
         headers = {"ETag": tag, "Cache-Control": "no-cache"}

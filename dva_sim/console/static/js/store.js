@@ -40,6 +40,12 @@ export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
 export const notice = signal('');
 
+/**
+ * The recordings that can be chosen, if any can.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Shelf | null>}
+ */
+export const shelf = signal(null);
+
 /** Where everything that moves is; not a signal, for it is drawn, not rendered. */
 export const tracks = new Tracks();
 
@@ -49,17 +55,27 @@ export const clock = computed(
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
 /** Whether the link is that of a study, with sliders, and not one of sockets. */
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
+/** Whether what is shown runs at a DVA elsewhere, of which only messages are known. */
+export const isAttached = computed(() => Boolean(scene.value?.attached));
 /** How long a command takes at least [ms], as far as it is known. */
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),
 );
+/** What is known of the recording that is shown; null where something runs. */
+export const replay = computed(() => scene.value?.replay ?? null);
+/** Whether the past is shown, in which nobody can be told anything. */
+export const isPast = computed(() => Boolean(scene.value && 'replay' in scene.value));
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
 /** Whether this page's address is one for driving, or for a phone. */
 export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
 /** Whether anything can be steered now. */
-export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
+export const maySteer = computed(
+  () => mayDrive.value && connection.value === 'open' && !isPast.value,
+);
+/** Whether this page may say which moment of a recording is shown. */
+export const maySteerReplay = computed(() => mayDrive.value && connection.value === 'open');
 
 const robotRows = computed(
   () => new Map((rows.value?.robots ?? []).map((row) => [row.i, row])),

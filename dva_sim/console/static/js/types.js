@@ -24,16 +24,25 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, dva_address?: string, phone?: PhoneOffer}} Scene
+ *   lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer,
+ *   replay?: ReplayAbout | null}} Scene
+ * @typedef {{t: number, who: string, what: string, kind: string}} Mark
+ * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[]}} ReplayAbout
+ * @typedef {{name: string, bytes: number, part: string, person: number | null,
+ *   trial: number | null, levels: unknown[], values: unknown[]}} ShelfEntry
+ * @typedef {{folder: string, question: string, report: boolean, factors: string[],
+ *   measures: {title: string, unit: string}[], worst_by: string,
+ *   recordings: ShelfEntry[]}} Shelf
  * @typedef {{pipelines: Record<string, any>, filters: string[], mappings: string[],
  *   speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number}} PhoneOffer
  *
- * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean}} Clock
+ * @typedef {{factor: number, paused: boolean, lag_s: number, held_by_lag: boolean,
+ *   jumps?: number}} Clock
  * @typedef {{i: number, mode: string, pattern: string, battery: number | null,
  *   holder: string | null, holder_label?: string | null, session_age_s?: number | null,
  *   watchdog_left_s: number | null, stands: string, set_speed_mps: number,
  *   set_turn_rate_radps: number, queue: number, lost: number, commands_hz: number,
- *   refused: number, by_hand?: boolean}} RobotRow
+ *   refused: number, by_hand?: boolean, camera?: string | null, sensors?: string[]}} RobotRow
  * @typedef {{last_ms: number, median_ms: number, p95_ms: number, largest_ms: number,
  *   count: number}} LatencyFigures
  * @typedef {{name: string, unit: string, stuck: boolean, values?: number[],

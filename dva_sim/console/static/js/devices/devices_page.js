@@ -1,6 +1,6 @@
 /** Who is connected, and who holds what? Devices that are not there are added here, too. */
 import { html, useState } from '../../vendor/preact.js';
-import { devices, maySteer, rows } from '../store.js';
+import { devices, isAttached, maySteer, rows } from '../store.js';
 import { act } from '../net/actions.js';
 import { useTable } from '../logs/looking.js';
 import { Icon } from '../ui/icon.js';
@@ -17,7 +17,7 @@ const HEADS = /** @type {[string, string][]} */ ([
 export function DevicesPage() {
   useTable('devices');
   const [isAdding, setAdding] = useState(false);
-  const list = devices.value;
+  const list = [...devices.value].sort(byKind);
   return html`<main class="page devices-page" id="main" tabindex="-1">
     <h1 class="hidden">Devices</h1>
     <section class="panel" aria-label="Devices known to the DVA">
@@ -37,6 +37,15 @@ export function DevicesPage() {
   </main>`;
 }
 
+const ORDER = ['Robot', 'Guard', 'TeleOp', 'Teleoperation', 'Remote Control', 'ControlRoom', 'Sensor'];
+
+/**
+ * @param {any} a
+ * @param {any} b
+ */
+const byKind = (a, b) =>
+  ORDER.indexOf(a.type) - ORDER.indexOf(b.type) || a.id.localeCompare(b.id);
+
 /** @param {{device: any}} props */
 function Row({ device }) {
   return html`<tr class=${device.silent ? 'silent' : ''}>
@@ -48,13 +57,13 @@ function Row({ device }) {
     <td class="n">${number(device.commands_hz, 1)}</td><td class="n">${number(device.refused, 0)}</td>
     <td class="n">${number(device.picture_age_s, 1)}</td>
     <td class="n">${number(isNumber(device.round_trip_s) ? 1000 * device.round_trip_s : null, 0)}</td>
-    <td>${device.holder ? device.holder_label || device.holder : '–'}</td>
-    <td>${device.level ?? '–'}</td>
+    <td>${holderOf(device)}</td>
+    <td>${device.level ?? (device.holder ? UNKNOWN : '–')}</td>
     <td>${endText(device)}</td>
-    <td class="acts">${device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value}
+    <td><div class="acts">${device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value}
         aria-label=${`Revoke the permission for ${device.label}`} onClick=${() => act('revoke', { device: device.id })}>Revoke</button>`}
       ${device.fake && html`<button type="button" disabled=${!maySteer.value} aria-label=${`Remove ${device.label}`}
-        onClick=${() => act('fake_remove', { device: device.id })}>Remove</button>`}</td>
+        onClick=${() => act('fake_remove', { device: device.id })}>Remove</button>`}</div></td>
   </tr>`;
 }
 
@@ -74,11 +83,20 @@ function Health({ device }) {
  * @param {number | null | undefined} value
  * @param {number} digits
  */
-const number = (value, digits) =>
-  isNumber(value) ? /** @type {number} */ (value).toFixed(digits) : '–';
+function number(value, digits) {
+  if (isNumber(value)) return /** @type {number} */ (value).toFixed(digits);
+  return isAttached.value ? UNKNOWN : '–';
+}
+
+/** @param {any} device */
+function holderOf(device) {
+  if (device.holder) return device.holder_label || device.holder;
+  return device.holder_known === false ? UNKNOWN : '–';
+}
 
 /** @param {any} device */
 function endText(device) {
   if (!device.holder) return '–';
+  if (isAttached.value) return UNKNOWN;
   return isNumber(device.ends_s) ? `in ${Math.max(0, Math.round(device.ends_s))} s` : 'when given back';
 }

@@ -1,7 +1,10 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
-import { connection, devices, events, guard, hazards, pictures, rows, scene, seat, story, tracks, windows, you } from '../store.js';
+import {
+  connection, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story, tracks,
+  windows, you,
+} from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -19,10 +22,15 @@ const LINES = {
     tracks.put(line.p, performance.now());
     tracks.drop(line.gone ?? []);
   },
-  rows: (line) => (rows.value = line),
+  rows: (line) => {
+    if (line.clock?.jumps !== rows.value?.clock?.jumps) tracks.jump();
+    rows.value = line;
+  },
   robot: (line) => (windows.value = new Map(windows.value).set(line.i, line)),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
+  told: (line) => (story.value = line.lines),
+  shelf: (line) => (shelf.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
     if (isMine(line)) seat.value = line;

@@ -3,7 +3,7 @@ import { effect } from '../../vendor/preact.js';
 import { connection, mayDrive, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
-import { rememberedClient } from './client_id.js';
+import { PAGE, rememberedClient } from './client_id.js';
 import { keepAsking } from './round_trip.js';
 import { isDriveSocket, replaceDriveSocket } from './wire.js';
 
@@ -11,6 +11,9 @@ const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 4000;
 const RESYNC_EVERY_MS = 1000;
 const LEAVING = 1001; // the server ends
+const LOOK_MS = 1000; // from one look at a socket to the next; it is asked as often
+const ATTEMPTS = 3; // looks at which nothing was heard: the link is lost, though nobody said so
+const OPENS_WITHIN = 10; // looks
 
 /** @type {WebSocket | null} */
 let state = null;
@@ -29,26 +32,41 @@ function address(path) {
 /** Begin to listen, for as long as the page lives. */
 export function connect() {
   const old = you.value?.client ?? rememberedClient();
-  const query = old ? `?client=${encodeURIComponent(old)}` : '';
-  const socket = new WebSocket(address(`/ws/state${query}`));
+  const query = new URLSearchParams({ page: PAGE, ...(old && { client: old }) });
+  const socket = new WebSocket(address(`/ws/state?${query}`));
   count = NaN;
   state = socket;
   let stopAsking = () => {};
-  socket.onopen = () => {
-    wait = FIRST_WAIT_MS;
-    connection.value = 'open';
-    stopAsking = keepAsking(tell);
-    tell({ do: 'watch', robots: watched });
-    if (isLooking()) tell({ do: 'look', ...looked });
-  };
-  socket.onmessage = (event) => receive(JSON.parse(event.data));
-  socket.onclose = (event) => {
+  let unheard = 0; // looks
+  let first = true;
+  const end = (/** @type {{code?: number, reason?: string}} */ why) => {
     stopAsking();
-    if (event.code === LEAVING && isAlive()) connection.value = event.reason || 'it was ended';
+    window.clearInterval(look);
+    socket.onclose = socket.onmessage = null;
+    socket.close();
+    if (why.code === LEAVING && isAlive()) connection.value = why.reason || 'it was ended';
     else if (isAlive()) connection.value = 'lost';
     window.setTimeout(connect, wait);
     wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
   };
+  const look = window.setInterval(() => {
+    unheard += 1;
+    if (unheard > (socket.readyState === WebSocket.OPEN ? ATTEMPTS : OPENS_WITHIN)) end({});
+  }, LOOK_MS);
+  socket.onopen = () => {
+    unheard = 0;
+    stopAsking = keepAsking(tell);
+    tell({ do: 'watch', robots: watched });
+    if (isLooking()) tell({ do: 'look', ...looked });
+  };
+  socket.onmessage = (event) => {
+    unheard = 0;
+    if (first) connection.value = 'open';
+    first = false;
+    wait = FIRST_WAIT_MS;
+    receive(JSON.parse(event.data));
+  };
+  socket.onclose = end;
 }
 
 /** Whether nobody has said yet that the world has ended. */

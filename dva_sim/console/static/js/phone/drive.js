@@ -12,7 +12,7 @@ import { engaged, interrupt, interrupted, watchInterruptions } from '../drive/ho
 import { choices } from './choices.js';
 import { keepAwake, vibrate } from './feel.js';
 import { screen } from './screens.js';
-import { isIos, lastHeard, state as sensor } from './sensor.js';
+import { ask as askSensor, isIos, lastHeard, state as sensor } from './sensor.js';
 
 const SILENT_MS = 300;
 const LOOK_MS = 50;
@@ -32,15 +32,9 @@ export const holds = computed(
 /** Whether who drives is known to the DVA: as a phone, or as the console's operator. */
 export const isKnown = computed(() => Boolean(phone.value?.registered) || holds.value);
 export const isDriving = computed(() => ['starting', 'driving'].includes(phase.value));
-/**
- * Whether the phone is steered by tilting it: without a sensor it is by the stick, and so is what the
- * console's operator drives, who is no phone.
- */
+/** Whether the phone is steered by tilting it: without a sensor it is by the stick. */
 export const tilts = computed(
-  () =>
-    choices.value.by === 'tilt' &&
-    ['live', 'looking', 'tap'].includes(sensor.value) &&
-    !(holds.value && !phone.value?.registered),
+  () => choices.value.by === 'tilt' && ['live', 'looking', 'tap'].includes(sensor.value),
 );
 
 /** The robot that is held, else the one that was chosen. */
@@ -58,6 +52,7 @@ export const whyNoEmergency = computed(() => {
 /** Begin, if a robot is in hand. */
 export async function start() {
   if (!holds.value || isDriving.value || asking.peek()) return;
+  await askSensor(); // if it wants to be, which has to be from a tap
   const why = whyNot();
   if (why) {
     notice.value = why;
@@ -74,6 +69,7 @@ export async function start() {
 /** Why a tilted phone cannot begin; empty if it can. */
 function whyNot() {
   if (!tilts.peek()) return '';
+  if (sensor.peek() === 'tap') return 'This phone wants to be asked for its motion sensor: press Start.';
   if (isSilent()) return 'There is no sensor that says anything: nothing was started. See Calibration.';
   const lifted = choices.peek().hold && !thumb.peek();
   return lifted ? 'Hold to drive is on: swipe up over the picture and keep your thumb there.' : '';

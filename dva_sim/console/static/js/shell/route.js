@@ -2,7 +2,10 @@
 import { computed, signal } from '../../vendor/preact.js';
 import { robots } from '../store.js';
 
-const PAGES = ['map', 'main', 'devices', 'robots', 'drive', 'network'];
+const PAGES = [
+  ...['map', 'main', 'devices', 'robots', 'drive', 'network'],
+  ...['story', 'camera', 'recordings'],
+];
 const MOST_AT_ONCE = 2;
 const hash = signal(location.hash);
 window.addEventListener('hashchange', () => (hash.value = location.hash));
