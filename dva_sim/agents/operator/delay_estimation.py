@@ -52,14 +52,14 @@ class DelayEstimate:
         self._lags = np.arange(1, round(LONGEST / step) + 1) * step
         self._offset = self._filled = 2 * len(self._lags)
         self._asked = np.zeros((2, 4 * len(self._lags)))
-        self._intent = (0.0, 0.0)
+        self._intent = np.zeros((2, 1))
         self._misfit = FIRM * np.abs(self._lags - guess)
         self.value = guess
 
     def intend(self, now: float, one: float, other: float) -> None:
         """The person asks for this from `now` [s] on: speed and turn rate, or two velocities."""
         self._remember(now)
-        self._intent = one, other
+        self._intent[0, 0], self._intent[1, 0] = one, other
 
     def see(self, now: float, one: float, other: float, over: float = 0.0) -> None:
         """The picture shows this motion at `now` [s].
@@ -114,6 +114,5 @@ class DelayEstimate:
             return
         while due >= self._asked.shape[1]:
             self._asked = np.hstack([self._asked, np.zeros_like(self._asked)])
-        self._asked[0, self._filled : due] = self._intent[0]
-        self._asked[1, self._filled : due] = self._intent[1]
+        self._asked[:, self._filled : due] = self._intent
         self._filled = due

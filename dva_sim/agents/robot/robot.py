@@ -9,13 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
-from dva_sim.agents.observation import (
-    FRAME,
-    CameraFrame,
-    Observation,
-    make_frame,
-    make_observation,
-)
+from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (

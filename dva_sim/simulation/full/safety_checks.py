@@ -58,9 +58,8 @@ CHECKED_IN_SHORT: Final = (
 )
 
 Broken = tuple[str, str]
-_COMMAND = re.compile(  # as everybody here writes them, but any other would do no harm
-    rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>.*<SetTeleOp>", re.DOTALL
-)
+# As everybody here writes them, but any other would do no harm.
+_NUMBER_AND_SOURCE = re.compile(rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -254,7 +253,7 @@ class SafetyAudit:
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness = self.witness(robot)
-        command = _COMMAND.search(data)
+        command = _NUMBER_AND_SOURCE.search(data) if b"<SetTeleOp>" in data else None
         if command is not None:
             witness.arrivals.setdefault((command[2].decode(), int(command[1])), now)
             if len(witness.arrivals) > MOST_KEPT:
