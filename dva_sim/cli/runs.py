@@ -199,6 +199,9 @@ def console(
         Path | None, folder("Show the recordings of a study, worst first, and its report.")
     ] = None,
     record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
+    audit: Annotated[
+        Path | None, file("Keep who did what: .sqlite; a log that is there is gone on with.")
+    ] = None,
     out: Annotated[
         Path | None,
         Option("-o", "--out", metavar="FOLDER", help="Keep tables of what people did there."),
@@ -218,6 +221,7 @@ def console(
         dva-sim console  # two robots, two guards, a fire and a leak
         dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
+        dva-sim console --audit audit.sqlite  # who decided what, for `check`
         dva-sim console -o results/mine  # tables of the drives, for `show` and `report`
         dva-sim console --links real  # over sockets, which other devices may join
         dva-sim console --dva 127.0.0.1:5600  # what a `dva-sim live` does, here or elsewhere
@@ -267,6 +271,7 @@ def console(
         dva_port=dva_port,
         open=not no_open,
         record=record,
+        audit=audit,
         results=out,
         keep_motion=keep_motion,
         overwrite=overwrite,

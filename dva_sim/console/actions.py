@@ -15,6 +15,7 @@ from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
+from dva_sim.console.room_actions import AlarmActions, RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
@@ -40,6 +41,7 @@ class Actions:
         self._world = world
         self._seats, self._answers = Seats(), Answers()
         self._phones = PhoneActions(world, self._seats, self._robot, self._stop_one)
+        self._rooms = RoomActions(world, self._seats, self._robot, self._take)
         self._at_robots = RobotActions(
             world.windows,
             self._robot,
@@ -66,6 +68,8 @@ class Actions:
             **self._phones.doers,
             **self._at_robots.doers,
             **GuardActions(world).doers,
+            **self._rooms.doers,
+            **AlarmActions(world, self._rooms).doers,
             **world.dva.doers,
         }
 
@@ -93,12 +97,14 @@ class Actions:
             if known is not None:
                 self._tell(known)
             return
-        said = partial(self._said, number)
+        said: Said = partial(self._said, number)
         do = self._doers.get(what)
         if do is None:
             said(False, f"no action {what!r}")
             return
         try:
+            if self._world.audited is not None:
+                said = self._world.audited.answered(what, client, line, said)
             do(client, line, said)
         except (Refused, ConfigError) as error:
             said(False, str(error))
@@ -140,6 +146,7 @@ class Actions:
     def _release(self, client: str, line: Line, said: Said) -> None:
         if str(line["id"]).startswith(BYE):
             self._phones.forget(client)
+            self._rooms.forget(client)
             self._hold()
         if client not in self._seats.taken:
             said(True, "released")

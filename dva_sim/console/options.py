@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from dva_sim.console.audit_keeper import check_target as check_audit_target
 from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.real_links import ConsoleSockets, MakeSockets
 from dva_sim.console.web.addresses import own_address
@@ -53,6 +54,7 @@ class ConsoleOptions(PageOptions):
         links: `modelled` as in a study, or `real`: sockets, which others may join.
         dva_port: Port of the DVA on real links; 0: any that is free.
         record: Recording to be made, if any.
+        audit: File of the audit log; None: one that is gone with the console.
         results: Folder for the tables of what people did, if any.
         keep_motion: Folder for the samples of phones whose person agrees, if any.
         overwrite: What is there may be replaced.
@@ -64,6 +66,7 @@ class ConsoleOptions(PageOptions):
     links: str = "modelled"
     dva_port: int = 0
     record: Path | None = None
+    audit: Path | None = None
     results: Path | None = None
     keep_motion: Path | None = None
     overwrite: bool = False
@@ -121,4 +124,6 @@ class ConsoleOptions(PageOptions):
             raise ConfigError("zeromq.conflate: only on modelled links, since messages have parts")
         if self.record is not None:
             check_target(self.record, self.overwrite)
+        if self.audit is not None:
+            check_audit_target(self.audit)
         return scenario

@@ -22,6 +22,8 @@ from dva_sim.console.options import PageOptions
 from dva_sim.network.realtime import PacedClock
 
 WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
+# What else is printed: an address for each of those who may do less than everything.
+ROLES = ("Dispatch only", "dispatch"), ("Drive only", "drive"), ("Look only", "look")
 BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
 FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
 MOST_RESTARTS = 5  # of the process that draws
@@ -79,19 +81,24 @@ class ConsoleProcesses:
         self.failed, self._restarts = "", 0
 
     def start(
-        self, subject: ConsoleSubject, take: Callable[[Line], object], report: Path | None = None
+        self,
+        subject: ConsoleSubject,
+        take: Callable[[Line], object],
+        report: Path | None = None,
+        audit: Path | None = None,
     ) -> None:
         """Start both, connect them with what is shown, say where it is, and begin.
 
         Args:
             subject: What is shown.
             take: Does what a line of a page asks for.
+            audit: File of the audit log that pages show, if there is one.
             report: A study's report that pages may show.
 
         Raises:
             ChildFailed: the web process could not begin.
         """
-        web = self._start_web(report)
+        web = self._start_web(report, audit)
         pictures = self._start_pictures()
         self.serving = web.first_line()
         subject.serve_cameras(str(self.serving["base"]))
@@ -102,11 +109,12 @@ class ConsoleProcesses:
         subject.begin()
         subject.clock.pulse(FLUSH, self._flush)
         gc.freeze()  # what stays for the whole run is not looked through again and again
-        self._say(f"Console: {self.serving['drive']}")
+        self._say(f"Console: {self.serving['supervise']}")
         if self._options.token:
-            self._say(f"Look only: {self.serving['look']}")
+            for name, role in ROLES:
+                self._say(f"{name}: {self.serving[role]}")
         self._say_of_phones()
-        self._open_browser(str(self.serving["drive"]))
+        self._open_browser(str(self.serving["supervise"]))
 
     def end(self) -> None:
         """End both, as soon as they have written what they have."""
@@ -118,12 +126,13 @@ class ConsoleProcesses:
         for child in self._children:
             child.make_sure(deadline)
 
-    def _start_web(self, report: Path | None) -> Child:
+    def _start_web(self, report: Path | None, audit: Path | None) -> Child:
         options = self._options
         ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]
         words += [] if options.token else ["--no-token"]
+        words += [] if audit is None else ["--audit", str(audit)]
         words += [] if report is None else ["--report", str(report)]
         if options.phones:
             words += ["--phones-host", options.phones_host]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from dva_sim.console.actions import Actions
+from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.children import ChildFailed
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.processes import ConsoleProcesses
@@ -73,7 +74,8 @@ class ConsoleSupervisor:
             world.recorder.kept.is_own = lambda _: True
             keep_run(world.run, world.recorder)
         try:
-            yield
+            with self._audited(world):
+                yield
         finally:
             self._processes.end()
             world.phones.close()
@@ -86,10 +88,26 @@ class ConsoleSupervisor:
             if lost is not None and sys.exc_info()[0] is None:
                 raise DvaSimError(lost)
 
+    @contextmanager
+    def _audited(self, world: ConsoleWorld) -> Iterator[None]:
+        """Keep who does what, and say in the end by which hash that can be held against."""
+        options = self._options
+        about = {"scenario": options.scenario, "seed": world.seed, "links": options.links}
+        keeper = AuditKeeper(options.audit, lambda: world.clock.now, about)
+        world.keep_audit(keeper)
+        try:
+            yield
+        finally:
+            world.clock.unwatch(keeper.fileno())
+            keeper.close()
+            if keeper.is_lasting:
+                self._say(f"{keeper.path} written: {keeper.number} rows, the last {keeper.head}")
+
     def _run(self, world: ConsoleWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:
             actions = Actions(world)
-            self._processes.start(world, actions.take)
+            path = None if world.audited is None else world.audited.keeper.path
+            self._processes.start(world, actions.take, audit=path)
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
             if not ending.is_asked:

@@ -6,7 +6,7 @@ One thread does everything, and waits for nobody: lines to other processes go in
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,6 +17,9 @@ from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.alarm_desk import AlarmDesk
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audited import Audited
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
@@ -27,13 +30,16 @@ from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robot_windows import RobotWindows
+from dva_sim.console.rooms import ConsoleRooms, about_event
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
 from dva_sim.console.stands import why_stands
+from dva_sim.console.strangers import Strangers
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
+from dva_sim.recordings.audit_log import AuditRow, plain_row
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario, phone_profile
@@ -129,6 +135,11 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.strangers = Strangers(self.run, self.feed)
+        self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
+        self.alarms = AlarmDesk(self.run)
+        self.audited: Audited | None = None
+        self._events: list[Line] = []
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
@@ -207,6 +218,45 @@ class ConsoleWorld:
         """Something of the console itself has gone wrong that people should know of."""
         self.recorder.tell(self.clock.now, "console", text, "link")
 
+    # --- who did what ------------------------------------------------------------------------
+
+    def keep_audit(self, keeper: AuditKeeper) -> None:
+        """Keep what people do, and what the DVA decides, from now on."""
+        self.audited = Audited(keeper, self.author, self._named)
+        self.run.dva.on_fact = self.audited.decided
+        keeper.on_rows = self._audit_written
+        self.clock.watch(keeper.fileno(), keeper.take)
+
+    def _audit_written(self, rows: Sequence[AuditRow]) -> None:
+        if self.recorder.kept is not None:
+            for row in rows:
+                self.recorder.kept.put("audited", plain_row(row))
+
+    def _tell_audit(self) -> None:
+        if self.audited is None:
+            return
+        keeper = self.audited.keeper
+        line = {"k": "audit", "t": self.feed.now_ms, "rows": keeper.number, "hash": keeper.head}
+        line |= {"problem": keeper.problem, "lasting": keeper.is_lasting}
+        self._tell_new(line | {"file": str(keeper.path) if keeper.is_lasting else ""}, but="t")
+
+    def author(self, client: str) -> str:
+        """What the person of a page is called."""
+        if room := self.rooms.label(client):
+            return room
+        if (guard := self.guards.by_client.get(client)) is not None:
+            return guard.device.label
+        seat = next((n for n, who in self.client_of.items() if who == client), None)
+        if seat is not None:
+            return self._persons[seat].device.label
+        return f"page {client.partition('-')[0]}" if client != "rest" else "program"
+
+    def _named(self, device: str) -> str:
+        """The name of a device by its id, or of things by their numbers."""
+        names = {str(thing["i"]): thing["label"] for thing in self.feed.things}
+        found = [names.get(one, one) for one in device.split(", ")] if device else []
+        return self.run.stage.labels.get(device, ", ".join(found))
+
     @property
     def persons(self) -> list[PersonAgent]:
         """Those of all seats, with or without somebody in them."""
@@ -250,27 +300,33 @@ class ConsoleWorld:
         }
 
     def _tell_positions(self) -> None:
-        self._tell_new(self.feed.positions(), but="t")
+        line = self.feed.positions()
+        line["p"] += self.strangers.positions()
+        self._tell_new(line, but="t")
 
     def _tell_rows(self) -> None:
+        if self.strangers.come():
+            self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
-        rows = {
+        rows: Line = {
             "k": "rows",
             "t": self.feed.now_ms,
             "clock": self.clock_line(),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
             "server": self.dva.port.line(),
-            "robots": self.feed.robots(self.lag.held),
+            "robots": [*self.feed.robots(self.lag.held), *self.strangers.robots()],
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
         }
         self.tell(rows)
+        self._tell_alarms(rows["robots"])
 
     def tell_now(self) -> None:
         """Something has changed that nobody shall wait for."""
         self._tell_rows()
         self._tell_seats()
+        self._tell_audit()
 
     def _tell_windows(self) -> None:
         def stands(robot: RobotAgent) -> str:
@@ -305,7 +361,7 @@ class ConsoleWorld:
 
     def _tell_news(self) -> None:
         """Events, story and seats, as soon as they change; rows when a mode or holder does."""
-        self._tell_new(self.feed.events(), but="t")
+        self._tell_events()
         for line in self.feed.story():
             self.tell(line)
         robots = self.run.field.robots.values()
@@ -314,6 +370,19 @@ class ConsoleWorld:
             self._newest["modes"] = modes
             self._tell_rows()
         self._tell_seats()
+        self._tell_audit()
+
+    def _tell_events(self) -> None:
+        """Events with what was decided on them, and who decides."""
+        line = self.feed.events()
+        self._events = line["events"] = [
+            event | about_event(self.rooms.listener, event["number"]) for event in line["events"]
+        ]
+        self._tell_new(line, but="t")
+        self._tell_new(self.rooms.line(self.feed.now_ms), but="t")
+
+    def _tell_alarms(self, robots: list[Line]) -> None:
+        self._tell_new(self.alarms.look(self._events, robots, self.feed.now_ms), but="t")
 
     def _tell_seats(self) -> None:
         for client, line in (*self.seat_lines.lines(), *self.guards.lines()):

@@ -350,7 +350,7 @@ def finish(part: Path, target: Path, own_code: bool = True) -> float:
         raise ConfigError("names a class in a file, which is run for no recording", part)
     playback = told.playback()
     about = {"time": "real, from the start of the run", "live": "over sockets"}
-    write_recording(playback, target, about=about, traces=told.traces)
+    write_recording(playback, target, about=about, traces=told.traces, audit=told.audit)
     part.unlink(missing_ok=True)
     return playback.duration
 
@@ -379,6 +379,7 @@ class _Told:
     def __init__(self, part: Path) -> None:
         self.recorder = Recorder(keep_traffic=True)
         self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
+        self.audit: list[tuple[float, dict[str, Any]]] = []
         self.duration, self.radii = 0.0, dict[str, float]()
         self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
         self._events: dict[int, Event] = {}
@@ -498,6 +499,9 @@ class _Told:
             number, kind, Position(*at), severity, state=State(state), times=times, **sent
         )
         self._events[number] = event
+
+    def _audited(self, row: dict[str, Any]) -> None:
+        self.audit.append((float(row["time_s"]), row))
 
     def _trace(self, when: float, who: str, line: str) -> None:
         self.traces[who].append((when, line))

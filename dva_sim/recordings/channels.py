@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import heapq
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
@@ -310,7 +311,7 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
     }
 
 
-STORY, MESSAGES, DECISIONS = "/story", "/messages", "/decisions/"
+STORY, MESSAGES, DECISIONS, AUDIT = "/story", "/messages", "/decisions/", "/audit"
 SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
@@ -348,6 +349,13 @@ def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[Chann
         for time, line in lines:
             content = {"timestamp": messages.stamp(time), "line": line}
             yield ChannelMessage(time, f"{DECISIONS}{name}", "dva_sim.Decision", content)
+
+
+def audited(rows: Sequence[tuple[float, Mapping[str, Any]]]) -> Iterator[ChannelMessage]:
+    """The rows of an audit log, with their hashes."""
+    for time, row in rows:
+        content = {"timestamp": messages.stamp(time), "row": json.dumps(row)}
+        yield ChannelMessage(time, AUDIT, "dva_sim.Audited", content)
 
 
 def names_of(labels: Mapping[str, str]) -> dict[str, str]:

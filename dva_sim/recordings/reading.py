@@ -146,6 +146,7 @@ class Opened:
             file does not say.
         lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
         traces: The lines of what was decided, by who decides.
+        audit: The rows of the audit log.
     """
 
     playback: Playback
@@ -153,6 +154,7 @@ class Opened:
     tables: dict[str, list[dict[str, Any]]] | None
     lasted: float
     traces: dict[str, list[str]] = field(default_factory=dict)
+    audit: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def is_whole(self) -> bool:
@@ -298,7 +300,8 @@ def _opened(raw: _Raw) -> Opened:
         for topic, said in raw.said.items()
         if topic.startswith(channels.DECISIONS)
     }
-    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces)
+    audit = [json.loads(entry["row"]) for _, entry in raw.said.get(channels.AUDIT, ())]
+    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces, audit)
 
 
 def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:

@@ -149,6 +149,7 @@ def write_recording(
     tables: Tables | None = None,
     about: Mapping[str, str] | None = None,
     traces: Mapping[str, Sequence[tuple[float, str]]] | None = None,
+    audit: Sequence[tuple[float, Mapping[str, Any]]] = (),
 ) -> None:
     """Write a run as MCAP, in its time from zero.
 
@@ -158,6 +159,7 @@ def write_recording(
         tables: What was measured, rows by table; goes with it as JSON.
         about: More to say of the run, such as its place in a study.
         traces: What was decided: lines with their time [s], by who decides.
+        audit: Rows of an audit log, with their time [s].
 
     Raises:
         DvaSimError: the file cannot be written.
@@ -166,7 +168,8 @@ def write_recording(
     if playback.recorder.traffic is None:
         raise ValueError("a recording needs a run made with keep_traffic")
     with whole_file(path) as file:
-        _write(playback, file, tables, dict(about or {}), traces or {})
+        decided = [*channels.decided(traces or {}), *channels.audited(audit)]
+        _write(playback, file, tables, dict(about or {}), decided)
 
 
 def _beside(path: Path) -> Path:
@@ -213,7 +216,11 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def _write(
-    playback: Playback, file: IO[bytes], tables: Tables | None, about: Any, traces: Any
+    playback: Playback,
+    file: IO[bytes],
+    tables: Tables | None,
+    about: Any,
+    decided: Sequence[ChannelMessage],
 ) -> None:
     from mcap.writer import Writer
 
@@ -228,11 +235,13 @@ def _write(
     writer.add_metadata(ABOUT, _about(playback) | about | {DIGEST: digest(attached)})
     for name, data in attached.items():
         writer.add_attachment(0, 0, name, _media_type(name), data)
-    _add_messages(writer, playback, files, traces)
+    _add_messages(writer, playback, files, decided)
     writer.finish()
 
 
-def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes], traces: Any) -> None:
+def _add_messages(
+    writer: Any, playback: Playback, files: Mapping[str, bytes], decided: Sequence[ChannelMessage]
+) -> None:
     """All messages in order of time; schemas and channels are opened when first used."""
     ids = {name: device for device, name in channels.names_of(playback.labels).items()}
     counts: Counter[int] = Counter()
@@ -253,7 +262,7 @@ def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes], t
         ends = {"source": source, "destination": destination}
         return int(writer.register_channel(topic, XML, number, ends))
 
-    said = chain(every_message(playback), channels.decided(traces))
+    said = chain(every_message(playback), decided)
     every = [_packed(message) for message in said]
     plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
     if plan is not None:

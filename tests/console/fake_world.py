@@ -26,6 +26,7 @@ from PIL import Image, ImageDraw
 
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 
+from fake_control_room import ControlRoomDesk  # noqa: E402
 from fake_dva import FakeDva  # noqa: E402
 from fake_phones import FakePhone, PhoneDesk  # noqa: E402
 from fake_scene import LINK, Scene, Walker  # noqa: E402
@@ -82,7 +83,7 @@ class Seat:
         }
 
 
-class FakeWorld(PhoneDesk):
+class FakeWorld(PhoneDesk, ControlRoomDesk):
     """The fake itself.
 
     Args:
@@ -107,8 +108,10 @@ class FakeWorld(PhoneDesk):
         words = [sys.executable, "-m", "dva_sim.console.web", "--fd", str(theirs.fileno())]
         words += ["--pictures-fd", str(their_painter.fileno()), "--port", str(options.port)]
         words += ["--no-token"] if options.no_token else []
+        self.folder = tempfile.TemporaryDirectory()
+        self.hostile = options.hostile
+        words += ["--audit", str(self.open_desk(options.audit or self.folder.name))]
         if options.phones:
-            self.folder = tempfile.TemporaryDirectory()
             words += ["--phones-host", "127.0.0.1", "--phones-port", "0"]
             words += ["--certificates", self.folder.name]
         numbers = theirs.fileno(), their_painter.fileno()
@@ -159,11 +162,13 @@ class FakeWorld(PhoneDesk):
             more = {"tour": self.scene.tour()} if what == "tour" else self.more
             self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text, **more}
             self.say(self.done[key])
+            if what.startswith(("event", "alarm", "dispatch", "room")) and "proposal" not in what:
+                self.tell_events()
 
     # --- actions -----------------------------------------------------------------------
 
     def do_serving(self, asked: dict[str, Any]) -> None:
-        print(f"Console: {asked['drive']}", flush=True)
+        print(f"Console: {asked['supervise']}", flush=True)
         print(f"Look only: {asked['look']}", flush=True)
         print(f"Phone: {asked['phone']}", flush=True)
         self.say(self.scene.line())
@@ -407,16 +412,21 @@ class FakeWorld(PhoneDesk):
                     self.paint()
             self._regularly(ticks)
 
+    def tell_events(self) -> None:
+        """Events and what hangs on them, when they change, as the real world does."""
+        lines = [self.with_decisions(self.scene.events(self.t)), *self.dispatch_lines()]
+        if lines != self.events:
+            self.events = lines
+            for line in lines:
+                self.say(line)
+
     def _regularly(self, ticks: int) -> None:
         if ticks % 25 == 1:
             self.say(self.rows())
         if ticks % 50 == 2:
             self.say(self.scene.hazards(self.t) | {"t": self.ms})
         if ticks % 100 == 3:
-            events = self.scene.events(self.t)
-            if events != self.events:  # the real world tells of them when they change, too
-                self.events = events
-                self.say(events | {"t": self.ms})
+            self.tell_events()
             who = self.scene.all[ticks % len(self.scene.all)].label
             self.say({"k": "story", "who": who, "what": "looks around", "kind": "event"})
             self.say(self.dva.log(self.ms, 1))
@@ -436,6 +446,7 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--people", type=int, default=100)
     parser.add_argument("--site", default="caparica", help="or office-block, campus, ...")
+    parser.add_argument("--audit", help="file of its audit log")
     parser.add_argument("--hostile", action="store_true", help="a robot is called <script>")
     world = FakeWorld(parser.parse_args())
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

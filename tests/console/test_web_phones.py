@@ -181,7 +181,8 @@ def test_what_a_phone_asks_reaches_the_world_and_the_answer_comes_back_whole(con
     you, drive = phone
     drive.send(json.dumps({"id": "reg-1", "do": "phone_register", **REGISTER}))
     asked = console.next_asked("phone_register")
-    assert asked == {"id": "reg-1", "do": "phone_register", "client": you["client"], **REGISTER}
+    by = {"id": "reg-1", "client": you["client"], "role": "phone"}
+    assert asked == {"do": "phone_register", **by, **REGISTER}
     more = {"phone": {"id": "02:00", "label": "my phone", "address": "127.0.0.1:5700"}}
     console.say({"k": "done", "id": "reg-1", "ok": True, "text": "registered", **more})
     assert json.loads(drive.recv(PATIENCE_S))["phone"] == more["phone"]

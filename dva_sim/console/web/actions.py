@@ -100,6 +100,37 @@ _REPORT = {
     "severity": one_of("low", "medium", "high", "critical"),
     **_PLACE,
 }
+_EVENT = {"event": whole(1, 10**9)}
+_SEEN = {"decisions": maybe(whole(0, 10**9))}  # of the event, as the page knows it
+_REASON = text(0, 256)
+_ALARM = {"alarm": text(1, 200)}
+_SENT = _EVENT | {"device": _LABEL}
+_SHIFT = 8 * 3600  # no alarm is shelved for longer [s]
+_NEEDED_EVENT = ("event",)
+# What a control room asks for: by the messages of a device of its own, or of this console.
+CONTROL_ROOM: Known = {
+    "room_join": ({"name": text(0, 64)}, ("name",)),
+    "event_raise": (_REPORT, tuple(_REPORT)),
+    "event_acknowledge": (_EVENT, _NEEDED_EVENT),
+    "event_assign": (
+        _SENT | _SEEN | {"task": one_of("confirm", "contain", "stand_by"), "reason": _REASON},
+        ("event", "device"),
+    ),
+    "event_take_off": (_SENT | _SEEN | {"reason": _REASON}, ("event", "device")),
+    "event_false_alarm": (_EVENT | _SEEN | {"reason": text(1, 256)}, ("event", "reason")),
+    "event_escalate": (_EVENT | _SEEN | {"reason": _REASON}, _NEEDED_EVENT),
+    "event_note": (_EVENT | {"text": text(1, 256)}, ("event", "text")),
+    "event_proposal": (_EVENT, _NEEDED_EVENT),
+    "dispatch_mode": (
+        {"mode": one_of("automatic", "ask_first"), "reason": _REASON},
+        ("mode",),
+    ),
+    "mission": ({"robot": robot, **_EVENT}, ("robot", "event")),
+    "take_over": ({"robot": robot, "reason": text(1, 256)}, ("robot", "reason")),
+    "alarm_acknowledge": (_ALARM, ("alarm",)),
+    "alarm_shelve": (_ALARM | {"for_s": number(1, _SHIFT)}, ("alarm", "for_s")),
+    "alarm_unshelve": (_ALARM, ("alarm",)),
+}
 _SAYINGS = ("departed", "arrived", "confirmed", "refuted", "contained", "help")
 
 _FAULT = {
@@ -144,6 +175,7 @@ ACTIONS: Known = {
     "guard_say": ({"what": one_of(*_SAYINGS)}, ("what",)),
     "guard_place": (_PLACE, tuple(_PLACE)),
     "guard_report": (_REPORT, tuple(_REPORT)),
+    **CONTROL_ROOM,
 }
 _INPUT = {
     "n": whole(0, 2**53),
@@ -158,12 +190,18 @@ SILENT: Known = {
     "samples": (_SAMPLES, tuple(_SAMPLES)),
     "gone": ({}, ()),
 }
-# A phone changes nothing for others, but that it stops a robot.
-NOT_BY_PHONE = (
-    *("take", "link", "pattern", "pace", "tour", "seek", "open_recording"),
-    *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
-    *("manual_take", "manual", "fault"),
-)
+# The least role that may ask for it; whoever acts at all may ask for the others. A phone changes
+# nothing for others, but that it stops a robot.
+NEEDS = {
+    **dict.fromkeys(
+        ("take", "link", "pattern", "pace", "tour", "seek", "open_recording"), Role.DRIVE
+    ),
+    **dict.fromkeys(("server_start", "server_stop", "fake_add", "fake_remove"), Role.DRIVE),
+    **dict.fromkeys(("manual_take", "manual", "fault"), Role.DRIVE),
+    **dict.fromkeys(CONTROL_ROOM, Role.DISPATCH),
+    **dict.fromkeys(("room_join", "event_raise", "event_proposal", "mission"), Role.DRIVE),
+    **dict.fromkeys(("dispatch_mode", "take_over", "revoke"), Role.SUPERVISE),
+}
 
 
 def check_role(role: Role, name: Any) -> None:
@@ -174,8 +212,18 @@ def check_role(role: Role, name: Any) -> None:
     """
     if not role.acts:
         raise BadMessage("this address may only look")
-    if role is Role.PHONE and name in NOT_BY_PHONE:
-        raise BadMessage(f"a phone's address may not {name}; the address for driving may")
+    least = NEEDS.get(name, Role.PHONE) if isinstance(name, str) else Role.PHONE
+    if role < least:
+        own = "a phone's address" if role is Role.PHONE else "this address"
+        raise BadMessage(f"{own} may not {plain(name)}; an address {_FOR[least]} may")
+
+
+_FOR = {Role.DRIVE: "for driving", Role.DISPATCH: "for dispatch", Role.SUPERVISE: "to supervise"}
+
+
+def plain(name: str) -> str:
+    """The name of an action, for people."""
+    return name.replace("_", " ")
 
 
 def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Asked, Entrance, Role
+from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
@@ -227,7 +228,7 @@ def _for(least: Role, endpoint: Any) -> Any:
     return guarded
 
 
-_ONLY = {Role.PHONE: "drive by phone"}
+_ONLY = {Role.PHONE: "drive by phone", Role.DRIVE: "drive", Role.DISPATCH: "dispatch"}
 
 
 def make_app(
@@ -236,6 +237,7 @@ def make_app(
     cameras: CameraStreams,
     files: StaticFiles,
     door: PhoneDoor | None = None,
+    audit: AuditPages | None = None,
     report: Path | None = None,
 ) -> ASGIApp:
     """The whole application.
@@ -246,10 +248,12 @@ def make_app(
         cameras: Pictures.
         files: Of the pages.
         door: Where phones come in, if they do.
+        audit: Who did what, if that is kept.
         report: A study's report that is shown as it is.
     """
     told = StudyReport(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
+    log = audit or AuditPages(None)
     logs = LogRequests(hub)
 
     async def see(ws: WebSocket) -> None:
@@ -272,6 +276,11 @@ def make_app(
         Route("/api/state", rest.state),
         Route("/api/site", rest.site),
         Route("/api/story", rest.story),
+        Route("/api/audit", log.rows),
+        Route("/api/audit/check", log.check),
+        Route("/api/audit/measures", log.measures),
+        Route("/api/audit.csv", log.as_csv),
+        Route("/api/audit.json", log.as_json),
         Route("/api/logs/{name}", _for(Role.LOOK, logs.lines)),
         Route("/api/logs/{name}/export", _for(Role.DRIVE, logs.export)),
         Route("/api/logs/{name}/{number:int}", _for(Role.DRIVE, logs.entry)),

@@ -173,7 +173,7 @@ class Hub:
                 return
             if client.role is Role.PHONE and "robots" not in said:
                 asked.pop("robots", None)  # an emergency is for its own robot
-            asked["id"] = id_of(key)
+            asked |= {"id": id_of(key), "role": client.role.name.lower()}
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
         except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from dva_sim.console.web.actions import CONTROL_ROOM
 from dva_sim.console.web.checks import Labels
 from dva_sim.console.web.outbox import Asked
 from dva_sim.console.web.pipes import Lines, PipeEnd
@@ -32,6 +33,7 @@ OVER_THE_LINK = (
     "fake_add",
     "guard_say",
     "guard_report",
+    *CONTROL_ROOM,
 )
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20

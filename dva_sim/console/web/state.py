@@ -17,7 +17,10 @@ Line = dict[str, Any]
 STORY_KEPT = 1000  # lines
 STORY_SHOWN = 200  # of them in a snapshot
 # Kinds of which only the newest counts.
-LATEST = ("rows", "hazards", "events", "pictures", "told", "shelf")
+LATEST = (
+    *("rows", "hazards", "events", "control", "alarms", "audit", "pictures"),
+    *("told", "shelf"),
+)
 SHORT = ("seat", "phase", "order", "label")  # what others may know of a seat
 MOST_SEATS = 256  # of which anything is remembered
 

@@ -24,6 +24,22 @@ def test_robots_people_and_hazards_are_drawn_and_move(fake, visit) -> None:
     assert becomes(lambda: picture() != first)
 
 
+def test_what_moves_is_drawn_every_second_frame(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    page.clock.install()
+    page.clock.pause_at("2030-01-01")
+    page.evaluate(
+        """async () => { const {Live} = await import('/static/js/map/live.js');
+        const {draw} = Live.prototype; window.drawn = 0;
+        Live.prototype.isMoving = () => true;
+        Live.prototype.draw = function (...about) {
+          window.drawn += 1; draw.apply(this, about); }; }"""
+    )
+    page.clock.run_for(2000)  # 125 frames
+
+    assert 40 <= page.evaluate("window.drawn") <= 90  # some more for what is told meanwhile
+
+
 def test_list_and_map_share_one_selection(fake, visit) -> None:
     page = visit.open(fake(*SMALL).drive)
     row = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-2")

@@ -11,7 +11,9 @@ PAGES = {
     "main": "Main",
     "devices": "Devices",
     "drive": "Drive",
+    "events": "Events",
     "network": "Network",
+    "audit": "Audit",
 }
 
 
@@ -167,7 +169,7 @@ def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit) -> N
 
 def test_every_page_obeys_its_content_security_policy(fake, visit) -> None:
     page = visit.open(fake().drive)
-    for name in ("Main", "Devices", "Drive", "Network", "Map"):
+    for name in ("Main", "Devices", "Drive", "Events", "Network", "Audit", "Map"):
         page.get_by_role("link", name=name).click()
         expect(page.get_by_role("heading", name=name, level=1)).to_be_attached()
 

@@ -29,12 +29,26 @@ export const windows = signal(new Map());
  * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
  */
 export const guard = signal(null);
+/**
+ * How orders are given, and who decides: what control rooms share.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Control | null>}
+ */
+export const control = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').AlarmList>} */
+export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0 });
+/**
+ * How the audit log stands; its rows are asked for.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').AuditState | null>}
+ */
+export const audit = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
 export const selection = signal(null);
 /** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
 export const connection = signal('connecting');
+/** Whether the socket is open on which the person's hand reaches the world. */
+export const reaches = signal(false);
 /** Why there are no camera pictures; empty while there are. */
 export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
@@ -69,10 +83,16 @@ export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
 /** Whether this page's address is one for driving, or for a phone. */
-export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
+export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
+/** Whether it is one for sending people and robots to events. */
+export const mayDispatch = computed(() => roleIsOneOf('dispatch', 'supervise'));
+/** Whether it is one for taking robots from their holders. */
+export const maySupervise = computed(() => roleIsOneOf('supervise'));
+/** @param {string[]} roles */
+const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */
 export const maySteer = computed(
-  () => mayDrive.value && connection.value === 'open' && !isPast.value,
+  () => mayDrive.value && connection.value === 'open' && reaches.value && !isPast.value,
 );
 /** Whether this page may say which moment of a recording is shown. */
 export const maySteerReplay = computed(() => mayDrive.value && connection.value === 'open');

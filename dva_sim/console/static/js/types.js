@@ -68,7 +68,33 @@
  *
  * @typedef {{number: number, kind: string, x_m: number, y_m: number, room: string,
  *   severity: string, state: string, since_ms: number, reported_ms: number,
- *   assigned: string[], over?: boolean}} SiteEvent
+ *   assigned: string[], over?: boolean, decisions?: number, note?: string | null,
+ *   acknowledged?: {label: string, at_ms: number} | null,
+ *   decided?: {label: string, action: string, at_ms: number, reason: string} | null}} SiteEvent
+ *
+ * @typedef {{label: string, role: string, client: string}} ControlRoom
+ * @typedef {{dispatch: {mode: string, decide_within_s: number,
+ *   switched: {label: string, at_ms: number} | null} | null, rooms: ControlRoom[]}} Control
+ * @typedef {{label: string, robot: boolean, can: boolean, reason: string,
+ *   arrival_s: number | null}} Candidate
+ * @typedef {{event: number, policy: string, reason: string, task: string | null, label: string,
+ *   arrival_s: number | null, decide_within_s: number | null, candidates: Candidate[]}} Proposal
+ * @typedef {{key: string, priority: string, state: string, text: string, place: string,
+ *   count: number, event: number | null, since_ms: number, is_new: boolean, seen_by: string,
+ *   left_s: number | null, shelved_by: string}} AlarmRow
+ * @typedef {{alarms: AlarmRow[], shelved: AlarmRow[], flood: boolean, rate: number}} AlarmList
+ * @typedef {{rows: number, hash: string, problem: string, lasting: boolean, file: string}} AuditState
+ * @typedef {{number: number, time_s: number, at_utc: string, author: string, device: string,
+ *   role: string, action: string, event: number | null, subject: string, cause: string,
+ *   outcome: string, text: string, details: Record<string, any>, hash: string}} AuditRow
+ * @typedef {{rows: number, hash: string, problem: {row: number, text: string} | null,
+ *   doubts: string[]}} AuditCheck
+ * @typedef {{events: number, median_s: number | null, largest_s: number | null}} Times
+ * @typedef {{acknowledge: Times, assign: Times, assigned_by_people: number,
+ *   assigned_by_policy: number, overrides: number, lost_s: number | null,
+ *   newest_overrides: {number: number, event: number, author: string, did: string,
+ *   did_s: number | null, advised: string | null, advised_s: number | null,
+ *   cause: string}[]}} AuditMeasures
  *
  * @typedef {{i: number, pattern: string, phase: string, mode: string, session?: number,
  *   wanted: number[], command: number[], sent: number, answered: number, timeouts: number,
@@ -92,7 +118,7 @@
  *
  * @typedef {{client: string, role: string}} You
  * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
- *   address: string}, devices?: Device[], hand?: number}} Done
+ *   address: string}, devices?: Device[], proposal?: Proposal, event?: number, hand?: number}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
  */
 export {};

@@ -33,6 +33,7 @@ let what = 'input';
 let count = 0;
 let sent = 0;
 let timer = 0;
+let soon = 0;
 
 /**
  * A source wants something, as long as it is held.
@@ -105,7 +106,9 @@ function changed() {
   if (!same) wish.value = next;
   if (same && held.value === Boolean(last)) return;
   held.value = Boolean(last);
-  if (!held.value || performance.now() - sent > LEAST_MS) send();
+  const left = LEAST_MS - (performance.now() - sent);
+  if (!held.value || left <= 0) send();
+  else if (!soon) soon = window.setTimeout(send, left);
   keepSending();
 }
 
@@ -118,6 +121,8 @@ function keepSending() {
 }
 
 function send() {
+  window.clearTimeout(soon);
+  soon = 0;
   count += 1;
   sent = performance.now();
   const { speed, turn } = wish.value;

@@ -18,6 +18,9 @@ const OVER_THE_LINK = [
   'fake_add',
   'guard_say',
   'guard_report',
+  ...['event_raise', 'event_acknowledge', 'event_assign', 'event_take_off', 'event_false_alarm'],
+  ...['event_escalate', 'event_note', 'event_proposal', 'alarm_acknowledge', 'room_join'],
+  ...['dispatch_mode', 'mission', 'take_over'],
 ];
 const ENDS = ['stop', 'release'];
 const STOP_ATTEMPTS = 3;
@@ -40,13 +43,22 @@ function newId() {
  * Ask for something; what is refused is told to the person.
  * @param {string} what
  * @param {object} [more]
- * @returns {Promise<import('../types.js').Done>}
  */
 export async function act(what, more = {}) {
+  return told(await ask(what, more));
+}
+
+/**
+ * Ask for something, as a page does by itself: nobody is told what was refused.
+ * @param {string} what
+ * @param {object} [more]
+ * @returns {Promise<import('../types.js').Done>}
+ */
+export async function ask(what, more = {}) {
   if (ENDS.includes(what)) forget();
   const id = newId();
   if (!steer({ id, do: what, ...more })) {
-    return told({ ok: false, text: 'There is no connection to the world; nothing was sent.' });
+    return { ok: false, text: 'There is no connection to the world; nothing was sent.' };
   }
   const answer = new Promise((resolve) => waiting.set(id, resolve));
   const patience = OVER_THE_LINK.includes(what) ? LONG_MS : PATIENCE_MS;
@@ -56,7 +68,7 @@ export async function act(what, more = {}) {
   );
   const done = await answer;
   window.clearTimeout(timer);
-  return told(/** @type {import('../types.js').Done} */ (done));
+  return /** @type {import('../types.js').Done} */ (done);
 }
 
 /** @param {import('../types.js').Done} done */

@@ -2,7 +2,8 @@
 import { batch } from '../../vendor/preact.js';
 import { hearLog } from '../logs/log_rows.js';
 import {
-  connection, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story, tracks,
+  alarmList, audit, connection, control, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story,
+  tracks,
   windows, you,
 } from '../store.js';
 import { rememberClient } from './client_id.js';
@@ -29,6 +30,9 @@ const LINES = {
   robot: (line) => (windows.value = new Map(windows.value).set(line.i, line)),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
+  control: (line) => (control.value = line),
+  alarms: (line) => (alarmList.value = line),
+  audit: (line) => (audit.value = line),
   told: (line) => (story.value = line.lines),
   shelf: (line) => (shelf.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),

@@ -1,6 +1,6 @@
 /** The two sockets: one tells what is, the other carries what the person does. */
 import { effect } from '../../vendor/preact.js';
-import { connection, mayDrive, you } from '../store.js';
+import { connection, mayDrive, reaches, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
 import { PAGE, rememberedClient } from './client_id.js';
@@ -119,6 +119,7 @@ const isLooking = () => looked.tables.length > 0 || Object.keys(looked.logs).len
 export function keepDriveSocket() {
   effect(() => {
     const client = mayDrive.value ? you.value?.client : null;
+    reaches.value = false;
     replaceDriveSocket(client ? open(client) : null);
   });
 }
@@ -126,6 +127,9 @@ export function keepDriveSocket() {
 /** @param {string} client */
 function open(client) {
   const socket = new WebSocket(address(`/ws/drive?client=${encodeURIComponent(client)}`));
+  socket.onopen = () => {
+    if (isDriveSocket(socket)) reaches.value = true;
+  };
   socket.onmessage = (event) => {
     const line = JSON.parse(event.data);
     if (line.k === 'done') settle(line);
@@ -133,6 +137,7 @@ function open(client) {
   };
   socket.onclose = () => {
     const unexpected = isDriveSocket(socket);
+    if (unexpected) reaches.value = false;
     socketLost(unexpected);
     if (unexpected) window.setTimeout(() => reopen(socket, client), LONGEST_WAIT_MS / 4);
   };

@@ -1,6 +1,6 @@
 /** Drive the robot at the robot itself: no message, no session, the same limits and watchdog. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { connection, maySteer } from '../store.js';
+import { connection, mayDrive, maySteer } from '../store.js';
 import { act, driveLost } from '../net/actions.js';
 import { DriveSliders } from '../drive/drive_sliders.js';
 import { driveByGamepad } from '../drive/gamepad.js';
@@ -54,7 +54,7 @@ function steering() {
 function hint(robot) {
   const shown = windowOf(robot.i);
   if (connection.value !== 'open') return 'There is no connection to the world: nothing can be driven.';
-  if (!maySteer.value) return 'This address may only look.';
+  if (!mayDrive.value) return 'This address may only look.';
   if (!shown) return '';
   if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped: take hold again.` : 'It is in your hand. Hold to drive; whoever else asks for it is told that it is busy.';
   if (shown.hand !== null) return 'It is in the hand of another page.';

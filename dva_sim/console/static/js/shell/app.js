@@ -3,8 +3,10 @@ import { html, render } from '../../vendor/preact.js';
 import {
   clock, connection, isAttached, isPast, notice, replay, rows, scene, shelf,
 } from '../store.js';
+import { AuditPage } from '../audit/audit_page.js';
 import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
+import { EventsPage } from '../events/events_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
@@ -26,9 +28,11 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['devices', 'Devices', 'router'],
   ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
+  ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
+  ['audit', 'Audit', 'square'],
 ]);
-const NOT_ATTACHED = ['robots', 'drive', 'network']; // what sends is absent where only messages are known
+const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messages tell nothing
 // What sends something is not there in a recording.
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
@@ -42,7 +46,9 @@ const BODIES = /** @type {Record<string, any>} */ ({
   devices: DevicesPage,
   robots: RobotsPage,
   drive: DrivePage,
+  events: EventsPage,
   network: NetworkPage,
+  audit: AuditPage,
   story: StoryPage,
   camera: CameraPage,
   recordings: ShelfPage,

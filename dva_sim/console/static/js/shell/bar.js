@@ -77,7 +77,7 @@ function Age() {
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/map" title="Open events, by severity">
+  return html`<a class="item alarms" href="#/events" title="Open events, by severity">
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
@@ -88,5 +88,5 @@ function Who() {
   const me = you.value;
   if (!me) return null;
   return html`<span class="item who" title=${`What your address allows; the world knows this page as ${me.client}`}>
-    ${me.role === 'drive' ? 'you may drive' : 'you may look'}</span>`;
+    you may ${me.role === 'phone' ? 'drive' : me.role}</span>`;
 }

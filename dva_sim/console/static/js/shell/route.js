@@ -3,7 +3,7 @@ import { computed, signal } from '../../vendor/preact.js';
 import { robots } from '../store.js';
 
 const PAGES = [
-  ...['map', 'main', 'devices', 'robots', 'drive', 'network'],
+  ...['map', 'main', 'devices', 'robots', 'drive', 'events', 'network', 'audit'],
   ...['story', 'camera', 'recordings'],
 ];
 const MOST_AT_ONCE = 2;
