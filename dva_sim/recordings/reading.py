@@ -293,6 +293,7 @@ def _opened(raw: _Raw) -> Opened:
         contained=contained,
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
         events=[_event(entry) for entry in run.get("events", [])],
+        facts=[channels.fact_of(time, held) for time, held in raw.said.get(channels.FACTS, ())],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
