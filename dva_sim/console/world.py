@@ -20,6 +20,7 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.audited import Audited
+from dva_sim.console.decisions import about_event
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
@@ -30,7 +31,7 @@ from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robot_windows import RobotWindows
-from dva_sim.console.rooms import ConsoleRooms, about_event
+from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
@@ -375,8 +376,10 @@ class ConsoleWorld:
     def _tell_events(self) -> None:
         """Events with what was decided on them, and who decides."""
         line = self.feed.events()
+        told = self.rooms.listener
         self._events = line["events"] = [
-            event | about_event(self.rooms.listener, event["number"]) for event in line["events"]
+            event | about_event(told.events, told.told_at, event["number"])
+            for event in line["events"]
         ]
         self._tell_new(line, but="t")
         self._tell_new(self.rooms.line(self.feed.now_ms), but="t")

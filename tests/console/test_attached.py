@@ -196,7 +196,9 @@ def test_a_fake_device_is_added_to_a_dva_elsewhere_and_taken_away(programs: Prog
     assert console.act("fake_remove", device=id_of("fake", 1))["ok"]
 
 
-def test_with_keys_it_attaches_as_the_control_room_of_its_key(programs: Programs, tmp_path: Path):
+def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(
+    programs: Programs, tmp_path: Path
+):
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])
     role = "dva.control_rooms={control-room-1: dispatch}"
@@ -210,6 +212,13 @@ def test_with_keys_it_attaches_as_the_control_room_of_its_key(programs: Programs
     number = console.state()["events"][0]["number"]
     assert console.act("event_note", event=number, text="seen from elsewhere")["ok"]
     assert "pretend" in console.act("fake_add", label="ghost", type="Robot")["text"]
+    assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
+    assert console.act("event_acknowledge", event=1)["ok"]
+    done = console.act("event_assign", event=1, device="guard-1", reason="is near")
+    assert done["text"] == "guard-1 is sent to event 1"
+    assert becomes(lambda: "guard-1" in console.state()["events"][0]["assigned"])
+    refused = console.act("dispatch_mode", mode="ask_first")
+    assert "to set dispatch needs supervise" in refused["text"]
 
 
 @pytest.mark.parametrize(
