@@ -51,7 +51,7 @@ def opened(visit: Any, address: str, robot: str = "robot-1") -> Page:
 
 
 def take(page: Page) -> None:
-    """Take the robot in hand, again and again where this machine does much else: it is held then."""
+    """Take it in hand, again and again where this machine is late: robots are held then."""
     button, mode = (
         page.get_by_role("button", name="Take manual control"),
         page.get_by_role("status", name="Mode"),
