@@ -314,7 +314,8 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
 
 STORY, MESSAGES, DECISIONS, AUDIT = "/story", "/messages", "/decisions/", "/audit"
 FACTS = "/facts"
-SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
+# Last parts of topics.
+SCREEN, COMMANDS, CAMERA, APPLIED = "screen", "commands", "camera", "applied"
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
@@ -414,7 +415,7 @@ def applied(playback: Playback) -> Iterator[ChannelMessage]:
         for a in drive.applied:
             yield stamped(
                 a.time,
-                f"/{playback.labels[drive.robot]}/applied",
+                f"/{playback.labels[drive.robot]}/{APPLIED}",
                 "dva_sim.Applied",
                 made_s=a.issued,
                 sent_s=a.sent,
