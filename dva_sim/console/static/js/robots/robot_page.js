@@ -44,7 +44,7 @@ function Head({ robot }) {
     <h1>${robot.label}</h1>
     <span role="status" aria-label="Mode" class="mode-status"><${ModeMark} mode=${mode} /> ${mode}</span>
     ${shown?.holder && html`<span>held by ${shown.holder}</span>`}
-    <span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>
+    ${!isPast.value && html`<span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
     <span class="gap"></span>
     <a href="#/robots">All robots</a>
     ${!isPast.value && html`<button type="button" class="stop-one" disabled=${!maySteer.value}
