@@ -210,9 +210,9 @@ def run_row(recording: Recording) -> Row:
         _event_measures(recording) | _people_measures(recording) | workload.run_measures(recording)
     )
     row |= _disturbance_measures(recording)
-    counted = {"replans": "replans", "messages": "messages", "traffic_bytes": "bytes"}
-    for name, counter in (counted | {"refused": "refused"}).items():
-        row[name] = recording.recorder.counters[counter]
+    recorder = recording.recorder
+    row |= {"replans": recorder.counters["replans"], "messages": recorder.messages}
+    row |= {"traffic_bytes": recorder.bytes, "refused": recorder.counters["refused"]}
     row["plugin_failures"] = plugin_failures(recording)
     row["violations"] = sum(recording.recorder.violations.values())
     row["simulated_s"] = recording.duration
