@@ -8,23 +8,19 @@ from typing import Any, Final
 
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.steps import give_back, start
-from dva_sim.agents.people.person_guard import SEVERITIES
+from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
 from dva_sim.console.seats import Seats
+from dva_sim.console.takeover import Takeover
 from dva_sim.console.world import ConsoleWorld
-from dva_sim.core.registry import ROBOT
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.reply_codes import OUT_OF_ORDER
 
 Line = dict[str, Any]
 Doer = Callable[[str, Line, Said], object]
 
-CERTAIN: Final = 0.9  # of what somebody in a control room reports
 ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
 UNDER_WAY: Final = ("under_way", "waiting", "replanning")
-TAKE_AGAIN: Final = 0.5  # while a robot is brought to a standstill [s]
-MOST_TRIES: Final = 40
 
 
 class RoomActions:
@@ -49,14 +45,7 @@ class RoomActions:
         self.doers: Mapping[str, Doer] = {
             "room_join": self._join,
             "event_raise": self._raise,
-            "event_acknowledge": self._plain(m.Acknowledge, "acknowledged"),
-            "event_assign": self._assign,
-            "event_take_off": self._take_off,
-            "event_false_alarm": self._with_words(m.FalseAlarm, "a false alarm"),
-            "event_escalate": self._with_words(m.Escalate, "escalated"),
-            "event_note": self._note,
-            "event_proposal": self._proposal,
-            "dispatch_mode": self._mode,
+            **dict.fromkeys(DECISIONS, self._decide),
             "mission": self._mission,
             "take_over": self._take_over,
         }
@@ -102,16 +91,18 @@ class RoomActions:
 
     # --- events -----------------------------------------------------------------------------
 
+    def _decide(self, client: str, line: Line, said: Said) -> None:
+        body, done = decision_of(line, self._device, self._rooms.decisions)
+        self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
+
     def _raise(self, client: str, line: Line, said: Said) -> None:
-        kind, place = str(line["kind"]), self._place(line)
-        severity = SEVERITIES[line["severity"]]
-        body = m.EventReport(None, kind, place, severity, CERTAIN, "detected")
+        body, done = report_of(line, self._place(line))
 
         def then(_: m.Reply) -> Line:
-            event = self._world.run.dva.desk.book.near(kind, place)
+            event = self._world.run.dva.desk.book.near(body.kind, body.position)
             return {} if event is None else {"event": event.number}
 
-        self._ask(client, line, said, body, f"{kind.replace('_', ' ')} is raised", then)
+        self._ask(client, line, said, body, done, then)
 
     def _place(self, line: Line) -> m.Position:
         """Where on earth a place of the site lies.
@@ -126,47 +117,6 @@ class RoomActions:
             raise Refused("x_m and y_m should be a place on the site")
         return m.Position(*site.frame.to_latlon(x, y))
 
-    def _plain(self, kind: Callable[[int], m.Body], done: str) -> Doer:
-        """What needs no words."""
-
-        def do(client: str, line: Line, said: Said) -> None:
-            number = line["event"]
-            self._ask(client, line, said, kind(number), f"event {number} is {done}")
-
-        return do
-
-    def _with_words(self, kind: Callable[..., m.Body], done: str) -> Doer:
-        """What needs a reason, and is not done where somebody else has decided meanwhile."""
-
-        def do(client: str, line: Line, said: Said) -> None:
-            number, reason = line["event"], line.get("reason") or None
-            body = kind(number, reason, self._seen(line))
-            self._ask(client, line, said, body, f"event {number} is {done}")
-
-        return do
-
-    def _seen(self, line: Line) -> int | None:
-        """How many decisions the asker knows: what the page says, else what is known here."""
-        given = line.get("decisions")
-        return given if given is not None else self._rooms.decisions(line["event"])
-
-    def _assign(self, client: str, line: Line, said: Said) -> None:
-        number, label = line["event"], str(line["device"])
-        body = m.Assign(
-            number,
-            self._device(label),
-            task=line.get("task"),
-            reason=line.get("reason") or None,
-            decisions=self._seen(line),
-        )
-        self._ask(client, line, said, body, f"{label} is sent to event {number}")
-
-    def _take_off(self, client: str, line: Line, said: Said) -> None:
-        number, label = line["event"], str(line["device"])
-        reason = line.get("reason") or None
-        body = m.TakeOff(number, self._device(label), reason, self._seen(line))
-        self._ask(client, line, said, body, f"{label} is called off event {number}")
-
     def _device(self, label: str) -> str:
         """The id of a device by its label.
 
@@ -180,48 +130,8 @@ class RoomActions:
             raise Refused(f"there is no device {label!r}")
         return id_tag
 
-    def _note(self, client: str, line: Line, said: Said) -> None:
-        number = line["event"]
-        body = m.AddNote(number, str(line["text"]))
-        self._ask(client, line, said, body, f"noted at event {number}")
-
-    def _proposal(self, client: str, line: Line, said: Said) -> None:
-        body = m.GetProposal(line["event"])
-        self._ask(client, line, said, body, "", self._proposed)
-
-    def _proposed(self, reply: m.Reply) -> Line:
-        proposal = reply.content
-        if not isinstance(proposal, m.Proposal):
-            return {}
-        label = next((c.label for c in proposal.candidates if c.device == proposal.device), "")
-        return {
-            "proposal": {
-                "event": proposal.event_id,
-                "policy": proposal.policy,
-                "reason": proposal.reason,
-                "task": proposal.task,
-                "label": label,
-                "arrival_s": proposal.arrival_in,
-                "decide_within_s": proposal.decide_within,
-                "candidates": [self._candidate(each) for each in proposal.candidates],
-            }
-        }
-
-    def _candidate(self, who: m.Candidate) -> Line:
-        entry = self._world.run.dva.desk.registry.entries.get(who.device)
-        return {
-            "label": who.label,
-            "robot": entry is not None and entry.device.device_type == ROBOT,
-            "can": who.arrival_in is not None,
-            "reason": who.reason,
-            "arrival_s": who.arrival_in,
-        }
-
-    def _mode(self, client: str, line: Line, said: Said) -> None:
-        mode = str(line["mode"])
-        body = m.SetDispatch(mode, line.get("reason") or None)
-        told = "the policy asks first" if mode == "ask_first" else "the policy decides by itself"
-        self._ask(client, line, said, body, told)
+    def _is_robot(self, device: str) -> bool:
+        return device in self._world.run.field.robots
 
     # --- robots -----------------------------------------------------------------------------
 
@@ -283,78 +193,26 @@ class RoomActions:
     def _take_over(self, client: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
         robot, reason = self._robot(line["robot"]), str(line["reason"])
-        self._room(client, line, said, partial(self._revoke, client, line, robot, reason, said))
 
-    def _revoke(
-        self, client: str, line: Line, robot: str, reason: str, said: Said, room: ConsoleRoom
-    ) -> None:
-        event = next(
-            (n for n, e in self._rooms.listener.events.items() if _works_at(e, robot)), None
-        )
-
-        def revoked(reply: m.Reply) -> None:
-            if reply.code == m.NOT_PERMITTED:
-                said(False, why(reply))
+        def begin(room: ConsoleRoom) -> None:
+            number = self._seats.sit(client)
+            if number is None:
+                said(False, "all seats are taken")
                 return
-            self._sit_down(client, line, robot, event, reason, said, room)
+            seat = self._world.person(number)
+            label = self._world.run.stage.labels[robot]
+            take = partial(self._take, client, line | {"robots": [label]})
 
-        room.device.ask(
-            room.device.dva, m.Revoke(robot, reason), revoked, lambda: said(False, NO_ANSWER)
-        )
+            def ended(ok: bool, text: str, /, **more: Any) -> None:
+                if not ok and not seat.robots:
+                    self._seats.stand_up(client)
+                    seat.attended = client in self._world.client_of.values()
+                said(ok, text, **more)
 
-    def _sit_down(
-        self,
-        client: str,
-        line: Line,
-        robot: str,
-        event: int | None,
-        reason: str,
-        said: Said,
-        room: ConsoleRoom,
-    ) -> None:
-        """The robot is free: the person's seat asks for it, and gets the order it had."""
-        number = self._seats.sit(client)
-        if number is None:
-            said(False, "all seats are taken")
-            return
-        operator = self._world.person(number).device.id_tag
-        tries = iter(range(MOST_TRIES))
+            event = self._rooms.event_of(robot)
+            Takeover(room, robot, reason, event, seat.device.id_tag, take, ended).begin()
 
-        def take() -> None:
-            self._take(client, line | {"robots": [room.device.label_of(robot)]}, taken)
-
-        def taken(ok: bool, text: str, /, **_: Any) -> None:
-            if ok or next(tries, None) is None:
-                said(ok, text)
-            else:  # it is still brought to a standstill
-                room.device.clock.call_after(TAKE_AGAIN, take)
-
-        def ordered(reply: m.Reply) -> None:
-            content = reply.content
-            if (
-                reply.code == OUT_OF_ORDER
-                and isinstance(content, m.EventStatus)
-                and content.closed_for is None
-                and next(tries, None) is not None
-            ):
-                assign(content.decisions)  # the policy was quicker
-            else:
-                take()
-
-        def assign(decisions: int | None) -> None:
-            assert event is not None
-            body = m.Assign(event, robot, operator, None, reason, decisions)
-            room.device.ask(room.device.dva, body, ordered, take)
-
-        if event is None:
-            take()
-        else:
-            self._world.person(number).sit_down()
-            assign(self._rooms.decisions(event))
-
-
-def _works_at(event: m.EventStatus, robot: str) -> bool:
-    return event.closed_for is None and event.responder == robot
+        self._room(client, line, said, begin)
 
 
 class AlarmActions:
@@ -385,7 +243,8 @@ class AlarmActions:
             return
         answers = Gathered(len(events), said)
         for number in events.values():
-            self._rooms.doers["event_acknowledge"](client, line | {"event": number}, answers)
+            asked = line | {"do": "event_acknowledge", "event": number}
+            self._rooms.doers["event_acknowledge"](client, asked, answers)
 
     def _shelve(self, client: str, line: Line, said: Said) -> None:
         keys = self._desk.members(line["alarm"])

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
+from dva_sim.console.decisions import dispatch_line
 from dva_sim.console.refusal import Said
 from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.core.roles import Roles
@@ -72,35 +73,6 @@ class ConsoleRoom:
 def why(reply: m.Reply) -> str:
     """Why a reply refuses, in words."""
     return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
-
-
-def about_event(agent: ControlRoomAgent, number: int) -> Line:
-    """What a page is told of an event beside what everybody sees."""
-    status = agent.events.get(number)
-    if status is None:
-        return {"decisions": None, "acknowledged": None, "decided": None, "note": None}
-    at, last = agent.told_at[number], status.last_decision
-    decided = last and {
-        "label": last.label,
-        "action": last.action,
-        "at_ms": _ms(at - last.ago),
-        "reason": last.reason or "",
-    }
-    return {
-        "decisions": status.decisions,
-        "acknowledged": _by(status.acknowledged, at),
-        "decided": decided,
-        "note": status.note,
-    }
-
-
-def _ms(seconds: float) -> int:
-    """To the tenth of a second: what is said twice of the same moment is the same."""
-    return 100 * round(10 * seconds)
-
-
-def _by(whom: m.ByWhom | None, at: float) -> Line | None:
-    return None if whom is None else {"label": whom.label, "at_ms": _ms(at - whom.ago)}
 
 
 class ConsoleRooms:
@@ -199,6 +171,11 @@ class ConsoleRooms:
         status = self.listener.events.get(number)
         return None if status is None else status.decisions
 
+    def event_of(self, robot: str) -> m.EventStatus | None:
+        """How that stands which a robot was sent to, and is not over."""
+        every = self.listener.events.values()
+        return next((e for e in every if e.closed_for is None and e.responder == robot), None)
+
     def line(self, now_ms: int) -> Line:
         """How orders are given, and who decides."""
         rooms = [
@@ -206,12 +183,5 @@ class ConsoleRooms:
             for client, room in self.by_client.items()
             if room.registered
         ]
-        return {"k": "control", "t": now_ms, "dispatch": self._dispatch(), "rooms": rooms}
-
-    def _dispatch(self) -> Line | None:
-        status = self.listener.dispatch
-        if status is None:
-            return None
-        by = status.switched and {"label": status.switched.label, "at_ms": _ms(self._switched)}
-        mode, within = status.dispatch_mode, status.decide_within
-        return {"mode": mode, "decide_within_s": within, "switched": by}
+        dispatch = dispatch_line(self.listener.dispatch, self._switched)
+        return {"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms}

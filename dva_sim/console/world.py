@@ -20,6 +20,7 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.audited import Audited
+from dva_sim.console.decisions import about_event
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
@@ -30,12 +31,13 @@ from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robot_windows import RobotWindows
-from dva_sim.console.rooms import ConsoleRooms, about_event
+from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
 from dva_sim.console.stands import why_stands
+from dva_sim.console.strangers import Strangers
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
@@ -134,6 +136,7 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.strangers = Strangers(self.run, self.feed)
         self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
         self.alarms = AlarmDesk(self.run)
         self.audited: Audited | None = None
@@ -298,9 +301,13 @@ class ConsoleWorld:
         }
 
     def _tell_positions(self) -> None:
-        self._tell_new(self.feed.positions(), but="t")
+        line = self.feed.positions()
+        line["p"] += self.strangers.positions()
+        self._tell_new(line, but="t")
 
     def _tell_rows(self) -> None:
+        if self.strangers.come():
+            self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         rows: Line = {
             "k": "rows",
@@ -309,7 +316,7 @@ class ConsoleWorld:
             "link": self.sliders.line(),
             "dropped": self.dropped(),
             "server": self.dva.port.line(),
-            "robots": self.feed.robots(self.lag.held),
+            "robots": [*self.feed.robots(self.lag.held), *self.strangers.robots()],
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
         }
@@ -369,8 +376,10 @@ class ConsoleWorld:
     def _tell_events(self) -> None:
         """Events with what was decided on them, and who decides."""
         line = self.feed.events()
+        told = self.rooms.listener
         self._events = line["events"] = [
-            event | about_event(self.rooms.listener, event["number"]) for event in line["events"]
+            event | about_event(told.events, told.told_at, event["number"])
+            for event in line["events"]
         ]
         self._tell_new(line, but="t")
         self._tell_new(self.rooms.line(self.feed.now_ms), but="t")

@@ -268,6 +268,8 @@ class ControlRooms:
         if (task == "contain") != (event.state is State.CONFIRMED):
             asked = "stand_by until it is" if task == "contain" else "contain, as it is confirmed"
             raise _Refused(m.WRONG_MODE, f"event {event.number} is {event.state}: {asked}")
+        if event.state is State.PENDING:
+            raise _Refused(m.WRONG_MODE, "nobody looks there yet: send somebody to first")
         if event.actor is not None and body.decisions is None:
             who = self._orders.label_of(event.actor)
             raise _Refused(m.BUSY, f"{who} has it; state Decisions to send another instead")

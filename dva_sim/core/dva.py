@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -496,7 +495,7 @@ class Dva:
                 return []
             self.counters["event raised by a sensor"] += 1
             report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
-            return self._sighting(replace(message, body=report), report, now)[1]
+            return self._sighting(message._replace(body=report), report, now)[1]
         others = event.sources.keys() - {robot}
         self.book.merge(event, 0.0)
         self.book.note_source(event, robot, CONFIDENCE)

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -383,6 +384,7 @@ class _Told:
         self.duration, self.radii = 0.0, dict[str, float]()
         self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
         self._events: dict[int, Event] = {}
+        self._facts: list[Fact] = []
         self._drives: dict[tuple[str, int], DriveLog] = {}
         try:
             with part.open("rb") as file:
@@ -428,6 +430,7 @@ class _Told:
             contained=self._contained,
             endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
             events=events,
+            facts=self._facts,
         )
 
     def _traffic(self) -> Iterator[Sent]:
@@ -499,6 +502,9 @@ class _Told:
             number, kind, Position(*at), severity, state=State(state), times=times, **sent
         )
         self._events[number] = event
+
+    def _fact(self, held: dict[str, Any]) -> None:
+        self._facts.append(Fact(**held))
 
     def _audited(self, row: dict[str, Any]) -> None:
         self.audit.append((float(row["time_s"]), row))

@@ -1,4 +1,4 @@
-"""The messages of the DVA, one frozen dataclass per element of `protocol/dva.xsd`.
+"""The messages of the DVA, one frozen class per element of `protocol/dva.xsd`.
 
 The specification with its rules of use is `protocol/README.md`. Units are SI; angles are in
 radians except latitude and longitude, which are WGS-84 degrees. Devices are named by ids such
@@ -8,8 +8,9 @@ as `70:1A:04:F9:81:D6`, with capital letters, so that one device has one spellin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
+from dva_sim.kernel.makers import maker
 from dva_sim.protocol.control_room import (
     Acknowledge,
     AddNote,
@@ -97,9 +98,10 @@ class StartTeleOp:
     """Begin teleoperation in the session of the header."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetTeleOp:
+class SetTeleOp(NamedTuple):
     """Drive so until the next command.
+
+    It is made so often that it is a named tuple, as the message around it: that takes a third.
 
     Attributes:
         speed: Forward speed [m/s].
@@ -111,6 +113,9 @@ class SetTeleOp:
     speed: float
     turn_rate: float
     seen_tick: int | None = None
+
+
+make_set_tele_op = maker(SetTeleOp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -525,8 +530,7 @@ Body = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+class Message(NamedTuple):
     """A body and the header that every message carries.
 
     Attributes:
@@ -544,3 +548,6 @@ class Message:
     timestamp: str
     session: int | None
     body: Body
+
+
+make_message = maker(Message)

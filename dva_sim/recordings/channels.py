@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.observation import CameraFrame
+from dva_sim.core.audit import Fact
 from dva_sim.kernel.recorder import Sent, TrackPoint
 from dva_sim.recordings import messages
 from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
@@ -312,7 +313,9 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
 
 
 STORY, MESSAGES, DECISIONS, AUDIT = "/story", "/messages", "/decisions/", "/audit"
-SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
+FACTS = "/facts"
+# Last parts of topics.
+SCREEN, COMMANDS, CAMERA, APPLIED = "screen", "commands", "camera", "applied"
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
@@ -330,6 +333,24 @@ def told(playback: Playback) -> Iterator[ChannelMessage]:
             line=0,
             kind=moment.kind,
         )
+
+
+def facts(playback: Playback) -> Iterator[ChannelMessage]:
+    """What was decided, by whom and why, where people take part; without, the story tells."""
+    for fact in playback.facts if playback.people_decide else ():
+        content = {_IN_SECONDS.get(name, name): value for name, value in fact.row().items()}
+        del content["time"]
+        yield stamped(fact.time, FACTS, "dva_sim.Fact", **content)
+
+
+def fact_of(time: float, content: Mapping[str, Any]) -> Fact:
+    """The fact that a message of `facts` holds."""
+    names = {written: name for name, written in _IN_SECONDS.items()}
+    held = {names.get(name, name): value for name, value in content.items() if name != "timestamp"}
+    return Fact(time=time, **held)
+
+
+_IN_SECONDS = {name: f"{name}_s" for name in ("arrival_in", "advised_in", "waited")}
 
 
 def said(playback: Playback) -> Iterator[ChannelMessage]:
@@ -394,7 +415,7 @@ def applied(playback: Playback) -> Iterator[ChannelMessage]:
         for a in drive.applied:
             yield stamped(
                 a.time,
-                f"/{playback.labels[drive.robot]}/applied",
+                f"/{playback.labels[drive.robot]}/{APPLIED}",
                 "dva_sim.Applied",
                 made_s=a.issued,
                 sent_s=a.sent,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.kernel.recorder import Applied, DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels, messages, writing
 from dva_sim.recordings.messages import XML
@@ -293,6 +293,7 @@ def _opened(raw: _Raw) -> Opened:
         contained=contained,
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
         events=[_event(entry) for entry in run.get("events", [])],
+        facts=[channels.fact_of(time, held) for time, held in raw.said.get(channels.FACTS, ())],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
@@ -433,7 +434,21 @@ def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
         for time, made in said if topic.endswith(f"/{channels.COMMANDS}") else ():
             command = time, made["speed_m_s"], made["turn_rate_rad_s"]
             drives[made["drive"]].commands.append(command)
+    for drive in drives:
+        for time, told in raw.said.get(f"/{run['labels'][drive.robot]}/{channels.APPLIED}", ()):
+            if drive.ordered <= time and (drive.ended is None or time <= drive.ended):
+                drive.applied.append(_applied(time, told))
     return drives
+
+
+def _applied(time: float, told: Mapping[str, Any]) -> Applied:
+    until, captured = told["until_s"], told["captured_s"]
+    return Applied(
+        *(told["made_s"], told["sent_s"], told["arrived_s"], time),
+        inf if until is None else until,
+        nan,
+        nan if captured is None else captured,
+    )
 
 
 Columns = dict[str, NDArray[Any]]

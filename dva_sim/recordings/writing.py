@@ -209,6 +209,7 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.beliefs(playback)
     yield from channels.fixes(playback)
     yield from channels.told(playback)
+    yield from channels.facts(playback)
     yield from channels.commanded(playback)
     yield from channels.said(playback)
     yield from channels.applied(playback)

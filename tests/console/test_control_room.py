@@ -194,6 +194,25 @@ def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(
     assert room.seat()["drives"][0]["phase"] == "held"
 
 
+@pytest.mark.parametrize("wait", [0.0, 8.0], ids=["before it is held", "while it is driven"])
+def test_a_robot_is_taken_over_from_an_operator_with_the_event_it_was_sent_to(
+    monkeypatch: pytest.MonkeyPatch, wait: float
+) -> None:
+    one = page(monkeypatch, operator__count=2)
+    assert one.do("room_join", name="ana", role="supervise")[0]
+    fire(one)
+    assert one.do("event_assign", event=1, device="robot-1")[0]
+    one.let(wait)
+    assert event(one)["assigned"] == ["robot-1", "operator-1"]
+    done, text = one.do("take_over", robot="robot-1", reason="I know the place", role="supervise")
+
+    assert done, text
+    assert event(one)["assigned"] == ["robot-1", "console-1"]
+    assert event(one)["decided"]["reason"] == "I know the place"
+    assert one.seat()["order"]["event"] == 1
+    assert one.seat()["drives"][0]["phase"] == "held"
+
+
 def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room: PhonePage) -> None:
     done, text = room.do("mission", robot="robot-1", event=1)
     assert done, text

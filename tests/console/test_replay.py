@@ -8,15 +8,18 @@ from pathlib import Path
 import pytest
 from recordings.runs import drill, evacuation
 
+from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.player import NOBODY, Player
 from dva_sim.console.replay.recorded_run import RecordedRun, event_at
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol.codec import decode
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import write_recording
 from dva_sim.recordings.reading import read_recording
 from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.full.stage import DVA
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +39,14 @@ class Told:
     """A player, and the newest line of each kind that it tells."""
 
     def __init__(self, run, shelf=None):
-        self.lines, self.shown, self.answers = {}, [], []
+        self.lines, self.shown, self.answers, self.logs = {}, [], [], []
         self.player = Player(run, shelf)
         self.player.tell, self.player.show = self._take, self._show
 
     def _take(self, line, key=None):
         self.lines[line["k"]] = line
+        if line["k"] == "log":
+            self.logs.append(line)
         if line["k"] == "done":
             self.answers.append(line)
 
@@ -250,3 +255,45 @@ def test_a_recording_that_is_damaged_is_told_and_the_one_before_goes_on(files, t
     assert not answer["ok"]
     assert "is not a recording" in answer["text"]
     assert told.player.run.name == "good.mcap"
+
+
+# --- logs and windows ----------------------------------------------------------------------
+
+
+def test_a_log_is_told_up_to_the_moment_and_anew_after_a_jump(recorded, playing):
+    told = playing(recorded)
+    told.ask("seek", "1", t_ms=80_000)
+    told.logs.clear()
+    told.player.take({"do": "look", "logs": {"dva": False}})
+    late = [row for line in told.logs for row in line["lines"]]
+    assert told.logs[0]["anew"]
+    assert late[-1][1] <= 80_000
+    assert [row[0] for row in late] == list(range(1, len(late) + 1))
+
+    told.logs.clear()
+    told.ask("seek", "2", t_ms=10_000)
+    told.player._tell_logs()
+    early = [row for line in told.logs for row in line["lines"]]
+    assert told.logs[0]["anew"]
+    assert early == late[: len(early)]
+    assert 0 < len(early) < len(late)
+
+
+def test_each_request_has_the_reply_that_answers_it(recorded):
+    log = ExchangeLog(drill().recorder.traffic, DVA)
+    rows = [row for line in log.batches("dva", 0, log.until(1e9)) for row in line["lines"]]
+    answered = [row for row in rows if row[3] is not None]
+    assert answered
+    for row in answered:
+        request, reply = decode(row[2].encode("latin-1")), decode(row[3].encode("latin-1"))
+        assert reply.body.answers == request.message_id
+        assert reply.destination == request.source
+    assert {row[5] for row in rows if "<HBMsg>" in row[2]} == {1}
+
+
+def test_a_window_tells_how_long_commands_were_under_way(recorded):
+    drive = next(d for d in drill().recorder.drives if d.applied)
+    one = drive.applied[len(drive.applied) // 2]
+    line = recorded.window(drive.robot, one.time)
+    assert line["one_way"]["last_ms"] == pytest.approx(1000 * (one.arrived - one.sent), abs=0.1)
+    assert recorded.window(drive.robot, drive.applied[0].time - 0.01)["one_way"] is None

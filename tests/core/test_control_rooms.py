@@ -242,9 +242,10 @@ def test_a_guard_stands_by_and_deals_with_it_as_a_control_room_wants() -> None:
     office.fire(12)
     assert decide(office, m.Assign(1, GUARD, None, "contain"), 1.0)[0].code == m.WRONG_MODE
     assert decide(office, m.Assign(1, ROBOT, None, "stand_by"), 1.0)[0].code == m.NOT_SUPPORTED
-    _, sends = decide(office, m.Assign(1, GUARD, None, "stand_by"), 1.0)
-    assert sends == [Send(GUARD, order(1, task="stand_by"))]
+    assert decide(office, m.Assign(1, GUARD, None, "stand_by"), 1.0)[0].code == m.WRONG_MODE
     decide(office, m.Assign(1, ROBOT), 2.0)
+    _, sends = decide(office, m.Assign(1, GUARD, None, "stand_by"), 2.0)
+    assert sends == [Send(GUARD, order(1, task="stand_by"))]
     _, sends = office.finds(OPERATOR, "confirmed", 9.0)
     assert Send(GUARD, order(1, task="contain")) in sends
     office.finds(GUARD, "contained", 60.0)

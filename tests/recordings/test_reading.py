@@ -288,3 +288,24 @@ def test_a_recording_of_a_later_form_is_refused(tmp_path, monkeypatch):
     write_recording(drive(), tmp_path / "later.mcap")
     with pytest.raises(ConfigError, match=f"made by dva-sim {__version__} .* its form 2 is later"):
         read_recording(tmp_path / "later.mcap")
+
+
+# --- what people decide --------------------------------------------------------------------
+
+
+def test_what_was_decided_by_whom_and_why_is_part_of_a_recording(tmp_path):
+    recording = run_of("asked-first", 120)
+    write_recording(recording, tmp_path / "asked.mcap")
+    back = read_recording(tmp_path / "asked.mcap").playback
+    people = [fact for fact in recording.facts if fact.role is not None]
+    assert people
+    assert [f.action for f in back.facts] == [f.action for f in recording.facts]
+    for read, kept in zip(back.facts, recording.facts, strict=True):
+        assert read.time == pytest.approx(kept.time, abs=1e-6)
+        assert read.row() | {"time": 0} == kept.row() | {"time": 0}
+
+
+def test_a_recording_without_people_who_decide_holds_no_facts(folder):
+    with (folder / "drill.mcap").open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert "/facts" not in topics

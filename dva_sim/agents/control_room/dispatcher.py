@@ -27,13 +27,11 @@ class Turned:
 
     Attributes:
         acknowledged: Whether it has been acknowledged, by whomever.
-        decided: The number of decisions after the own last one; None: nothing yet.
-        looks: How often it has been decided on: each draws its own delay.
-        tries: How often a decision came too late in a row.
+        looks: How often it has been looked at: each look takes a time of its own.
+        tries: How often a decision was refused in a row.
     """
 
     acknowledged: bool = False
-    decided: int | None = None
     looks: int = 0
     tries: int = 0
 
@@ -75,9 +73,7 @@ class ScriptedDispatcher:
         """It is new; or the policy asks what has not been decided yet."""
         if status.closed_for is not None or turned.tries >= MOST_TRIES:
             return False
-        return turned.decided is None or (
-            status.proposed is not None and status.decisions > turned.decided
-        )
+        return not turned.looks or status.proposed is not None
 
     def _next(self) -> None:
         while self._busy is None and self._waiting:
@@ -87,7 +83,10 @@ class ScriptedDispatcher:
                 self._turn_to(number)
 
     def _done(self) -> None:
-        self._busy = None
+        """Turn to the next; to the same again if something has come up meanwhile."""
+        number, self._busy = self._busy, None
+        if number is not None:
+            self._seen(self.room.events[number])
         self._next()
 
     def _turn_to(self, number: int) -> None:
@@ -99,6 +98,7 @@ class ScriptedDispatcher:
 
     def _acknowledge(self, number: int) -> None:
         self._known[number].acknowledged = True
+        self.room.device.tell(f"acknowledges event {number}", "order")
         self.room.ask(m.Acknowledge(number), lambda _: self._read(number), self._done)
 
     # --- deciding ----------------------------------------------------------------------------
@@ -126,21 +126,20 @@ class ScriptedDispatcher:
         status = self.room.events[number]
         wish = self._wish(status, proposal)
         if wish is None:
-            self._settled(number, status.decisions)
             self._done()
             return
-        self.room.ask(wish, lambda reply: self._answered(number, reply), self._done)
+        self.room.ask(wish, lambda reply: self._answered(number, wish, reply), self._done)
 
-    def _answered(self, number: int, reply: m.Reply) -> None:
-        if reply.code == m.OUT_OF_ORDER and self.room.events[number].closed_for is None:
-            self._known[number].tries += 1
-            self._waiting.append(number)
+    def _answered(self, number: int, wish: m.Body, reply: m.Reply) -> None:
+        turned, device = self._known[number], self.room.device
+        what = type(wish).__name__.lower()
+        if reply.code == m.OK:
+            turned.tries = 0
+            device.tell(f"decides on event {number}: {_in_words(wish, device.label_of)}", "order")
         else:
-            self._settled(number, self.room.events[number].decisions)
+            turned.tries += 1
+            device.tell(f"is refused ({what}, event {number}): {reply.text}", "order")
         self._done()
-
-    def _settled(self, number: int, decisions: int) -> None:
-        self._known[number].decided, self._known[number].tries = decisions, 0
 
     def _wish(self, status: m.EventStatus, proposal: m.Proposal) -> m.Body | None:
         """What it wants done; None: what the policy has done, or nothing that can be."""
@@ -155,6 +154,8 @@ class ScriptedDispatcher:
         if rule.sends == "others":
             return m.Escalate(number, "as the script says", seen)
         chosen = self._earliest(rule.sends, proposal)
+        if chosen is None and status.proposed is not None:
+            chosen = proposal.device
         if chosen is None or chosen in (status.responder, status.actor):
             return None
         if status.event_state not in ("pending", "assigned") and task == "confirm":
@@ -190,3 +191,12 @@ class ScriptedDispatcher:
     def _kind(self, device: str | None) -> str | None:
         known = self.room.devices.get(device or "")
         return None if known is None else KINDS.get(known.device_type)
+
+
+def _in_words(wish: m.Body, label_of: Callable[[str], str]) -> str:
+    match wish:
+        case m.Assign(device=device, task=task):
+            return f"{label_of(device)} shall {(task or 'confirm').replace('_', ' ')} it"
+        case m.FalseAlarm():
+            return "it is a false alarm"
+    return "others have to deal with it"

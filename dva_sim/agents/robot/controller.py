@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from dva_sim.kernel.makers import maker
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import is_absurd
 
@@ -36,6 +37,9 @@ class TimedSetPoint(NamedTuple):
     until: float
 
 
+_make_set_point = maker(TimedSetPoint)
+
+
 STAND = TimedSetPoint(0.0, 0.0, 0.0)
 NO_MISSION = m.MissionStatus(0, "none", 0, "")
 Mission = m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
@@ -55,6 +59,9 @@ class Decision(NamedTuple):
     text: str = ""
     set_point: TimedSetPoint | None = None
     content: m.SensorInfo | m.MissionStatus | m.SessionFloor | None = None
+
+
+_make_decision = maker(Decision)
 
 
 @dataclass(frozen=True)
@@ -112,6 +119,9 @@ class Doubts:
             stopped: Who was driving until then, and does not any longer.
             word: How much was said in the DVA's name so far.
         """
+        if isinstance(message.body, m.SetTeleOp):
+            self.unasked = None
+            return
         who, before = None, self._stranger
         match message.body:
             case m.PermissionGrant() if decision.code == m.BAD_SESSION or stopped:
@@ -507,11 +517,13 @@ class RobotController:
             return Decision(m.STALE, "no picture of that tick was taken yet")
         else:
             seen_at = body.seen_tick / 1000 - self.clock_offset
-            until = min(until, seen_at + self.limits.max_age)
+            oldest = seen_at + self.limits.max_age
+            until = until if until < oldest else oldest
         if until <= now:
             return Decision(m.STALE, "too old to obey")
         self.last_valid = now
-        return Decision(m.OK, set_point=TimedSetPoint(body.speed, body.turn_rate, until))
+        set_point = _make_set_point(body.speed, body.turn_rate, until)
+        return _make_decision(m.OK, "", set_point, None)
 
     def _stop(self, message: m.Message) -> Decision:
         refusal = self._refusal(message, "teleoperation") or self._order(message)

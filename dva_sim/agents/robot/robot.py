@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
-from dva_sim.agents.observation import FRAME, CameraFrame, Observation
+from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (
@@ -28,7 +28,7 @@ from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import Accepted, DriveLog
+from dva_sim.kernel.recorder import DriveLog, make_accepted
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
@@ -286,11 +286,11 @@ class RobotAgent:
         now = self.device.clock.now
         self._world.advance_to(now)
         pose = self.body.pose()
-        view, at = self._setup.view, (pose.x, pose.y, pose.heading)
-        hazards, visibility = view.look(*at, self._setup.hazards(now)), view.visibility(*at)
+        view = self._setup.view
+        hazards, visibility = view.look(*pose, self._setup.hazards(now)), view.visibility(*pose)
         speed, turn_rate = self.body.speed, self.body.turn_rate
         tick = self.controller.tick(now)
-        return Observation(tick, *at, speed, turn_rate, hazards, visibility)
+        return make_observation(tick, *pose, speed, turn_rate, hazards, visibility)
 
     def expect(self, pattern: Pattern) -> None:
         """From the next drive on, commands come by another pattern.
@@ -421,13 +421,14 @@ class RobotAgent:
             self._ask_about(self.controller.doubts.unasked)
         if decision.set_point is not None:
             self.move(decision.set_point)
-        if decision.code == m.OK:
+        is_command = isinstance(message.body, m.SetTeleOp)
+        if decision.code == m.OK and not is_command:
             decision = self._follow_up(message, decision)
         if decision.code != m.OK:
             self.refused += 1
             name = m.CODE_NAMES[decision.code]
             self.device.recorder.counters[f"robot refused: {name}"] += 1
-        elif isinstance(message.body, m.SetTeleOp):
+        elif is_command:
             self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
             self._mode_changed(message.source)
@@ -505,7 +506,7 @@ class RobotAgent:
             self.picture_age = (self.controller.tick(now) - tick) / 1000
         number, recorder = message.message_id, self.device.recorder
         recorder.on_accepted(
-            Accepted(
+            make_accepted(
                 self.device.id_tag, message.source, message.session, number, tick, arrived, now
             )
         )
@@ -544,7 +545,7 @@ class RobotAgent:
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
         if self.device.silent or self.blind or self._encoding or not network.ready(me, FRAME, size):
             return
-        frame = CameraFrame(self.observe(), self.device.clock.now)
+        frame = make_frame(self.observe(), self.device.clock.now)
         if self.filmed is not None:
             self.filmed(me, frame)
         if self._setup.encode > 0.0:

@@ -14,6 +14,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.told import ToldSystem
+from dva_sim.console.decisions import about_event, dispatch_line
 from dva_sim.console.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.real_links import start_of_day
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
@@ -103,6 +104,10 @@ class AttachedSystem:
         """Take part no more."""
         self.device.leave()
         self.network.close()
+
+    def place_of(self, x: float, y: float) -> m.Position:
+        """Where on earth a place of the map lies [m]."""
+        return m.Position(*self._frame.to_latlon(x, y))
 
     # --- what is asked ---------------------------------------------------------------------
 
@@ -218,9 +223,12 @@ class AttachedSystem:
         agent, labels = self.agent, {i: t.device.label for i, t in self.told.devices.items()}
         rows = [
             lines.event_row(status, agent.told_at[number], labels, self._site, self._frame)
+            | about_event(agent.events, agent.told_at, number)
             for number, status in sorted(agent.events.items())
         ]
         self._tell_new({"k": "events", "t": self.now_ms, "events": rows})
+        dispatch = dispatch_line(agent.dispatch, 0.0)
+        self._tell_new({"k": "control", "t": self.now_ms, "dispatch": dispatch, "rooms": []})
         moments, self.recorder.timeline = self.recorder.timeline, list[Moment]()
         for time, who, what, kind in moments:
             line = {"k": "story", "t": round(1000 * time), "who": who, "what": what}

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.console.seats import Answers
@@ -21,7 +22,13 @@ from dva_sim.recordings.writing import pack
 
 Line = dict[str, Any]
 SLOWEST = 0.1  # that a recording is played, as a multiple of real time
-POSITIONS, ROWS, HAZARDS, FRAMES = 0.1, 0.25, 1.0, 0.1  # from one line to the next, real time [s]
+POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = (
+    0.1,
+    0.25,
+    1.0,
+    0.1,
+    0.2,
+)  # from one line to the next, real time [s]
 NOBODY = "this is a recording: there is nobody who could be told to do anything"
 
 
@@ -48,6 +55,8 @@ class Player:
         self.dropped: Callable[[], int] = lambda: 0
         self._offset, self._jumps, self._frames = 0.0, 0, 0
         self._watched: set[str] = set()
+        self._logs: dict[str, ExchangeLog] = {}
+        self._told: dict[str, int] = {}  # exchanges of each log that somebody looks at
         self._answers = Answers()
         self._site: TemporaryDirectory[str] | None = None
         self._doers: dict[str, Callable[[Line], str]] = {
@@ -77,6 +86,7 @@ class Player:
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(FRAMES, self._show_frames)
+        self.clock.pulse(LOGS, self._tell_logs)
 
     def show_scene(self) -> None:
         """See `ConsoleSubject`: the site is the one in the file, whatever became of it since."""
@@ -159,6 +169,8 @@ class Player:
         self.tell(rows)
         self.tell(run.events(now))
         self.tell(run.story(now))
+        for robot in self._watched:
+            self.tell(run.window(robot, now))
 
     def _clock_line(self) -> Line:
         return {
@@ -182,6 +194,33 @@ class Player:
                 self._frames += 1
                 self.show(frame | {"number": self._frames}, frame["robot"])
 
+    def _tell_logs(self) -> None:
+        """What was asked and answered since the last time; after a jump, all of it anew."""
+        run, now = self.run, self.now
+        for name, told in self._told.items() if run is not None else ():
+            log, anew = self._log(name), told < 0
+            end = log.until(now)
+            lines = log.batches(name, max(0, told), end)
+            if anew and not lines:
+                lines = [{"k": "log", "log": name, "lines": []}]
+            for number, line in enumerate(lines):
+                self.tell(line | ({"anew": True} if anew and number == 0 else {}))
+            self._told[name] = end
+
+    def _log(self, name: str) -> ExchangeLog:
+        assert self.run is not None
+        if name not in self._logs:
+            playback = self.run.playback
+            node = next((i for i, label in playback.labels.items() if label == name), name)
+            self._logs[name] = ExchangeLog(playback.recorder.traffic or (), node)
+        return self._logs[name]
+
+    def _look(self, logs: Any) -> None:
+        """Pages look at these logs; those that are new to them are told from the beginning."""
+        names = list(logs) if isinstance(logs, dict) else []
+        self._told = {str(name): self._told.get(str(name), -1) for name in names}
+        self._tell_logs()
+
     # --- what is asked for -----------------------------------------------------------------
 
     def take(self, line: Line) -> None:
@@ -189,6 +228,8 @@ class Player:
         what, number = line.get("do"), line.get("id")
         if what == "watch":
             self._watch(line.get("robots"))
+        elif what == "look":
+            self._look(line.get("logs"))
         if not isinstance(number, str):
             return
         if self._answers.begin(number):
@@ -224,6 +265,7 @@ class Player:
     def _go_to(self, time: float) -> None:
         self._offset = min(max(0.0, time), self._duration) - self.clock.now
         self._jumps += 1
+        self._told = dict.fromkeys(self._told, -1)
 
     def _open(self, line: Line) -> str:
         if self.shelf is None:
@@ -231,6 +273,7 @@ class Player:
         path = self.shelf.find(str(line.get("name")))
         self.run = RecordedRun(read_recording(path), path.name)
         self._watched.clear()
+        self._logs.clear()
         self._go_to(0.0)
         self.clock.pace(paused=False)
         self._tell_scene()

@@ -14,6 +14,7 @@ from typing import Any
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import event_line
 from dva_sim.console.fields import HazardFeed
+from dva_sim.console.replay.robot_lines import RobotLines, about
 from dva_sim.console.scene import scene_of
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import DvaSimError
@@ -23,6 +24,7 @@ from dva_sim.simulation.scenario import robot_profiles
 
 Line = dict[str, Any]
 GONE = 1.0  # whoever was not seen for so long has left the site [s]
+TURNING = 0.25  # over which a turn rate is measured [s]
 ROUNDED = 0.0005  # pages know moments to the millisecond [s]
 STORY_KEPT = 200  # lines of the story up to a moment
 MOST_MARKS = 400  # moments to jump to
@@ -64,6 +66,7 @@ class RecordedRun:
         self._drives: dict[str, list[DriveLog]] = {}
         for drive in playback.recorder.drives:
             self._drives.setdefault(drive.robot, []).append(drive)
+        self._windows: dict[str, RobotLines] = {}
         self._hazards = HazardFeed(
             *(playback.site, playback.incidents, playback.surroundings, playback.contained)
         )
@@ -78,6 +81,7 @@ class RecordedRun:
                 radius_m=radius,
                 max_speed_mps=speed,
                 max_turn_rate_radps=turn_rate,
+                **about(radius),
                 camera={
                     "field_of_view_deg": camera.field_of_view_deg,
                     "range_m": camera.range_m,
@@ -212,6 +216,24 @@ class RecordedRun:
             "refused": 0,
             "timeouts": 0,
         }
+
+    def window(self, id_tag: str, now: float) -> Line:
+        """What the windows of a robot show."""
+        if id_tag not in self._windows:
+            playback = self.playback
+            self._windows[id_tag] = RobotLines(
+                *(self._drives.get(id_tag, []), playback.recorder.traffic or ()),
+                *(id_tag, playback.labels),
+            )
+        label = self.playback.labels[id_tag]
+        here = {name: (at, speed) for name, at, speed in self.places(now)}
+        before = {name: at for name, at, _ in self.places(now - TURNING)}
+        at, speed = here.get(label, (None, 0.0))
+        turned = 0.0
+        if at is not None and label in before:
+            turned = math.remainder(at.heading - before[label].heading, 2.0 * math.pi) / TURNING
+        row = self._robot(id_tag, "" if at is None else at.mode, now)
+        return self._windows[id_tag].line(row, speed, turned, now)
 
     def _drive_of(self, robot: str, now: float) -> DriveLog | None:
         """The drive that goes on, if one does."""

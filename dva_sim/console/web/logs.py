@@ -110,12 +110,13 @@ class KeptLog:
         lost: How many exchanges the simulation left out.
         bytes: What messages take.
         newest: Number of the newest entry.
+        begun: How often it has begun anew, as when a recording is wound back.
     """
 
     def __init__(self, name: str) -> None:
         self.name = name
         self.entries: dict[int, Entry] = {}
-        self.changed = self.lost = self.bytes = self.newest = 0
+        self.changed = self.lost = self.bytes = self.newest = self.begun = 0
         self._changes: deque[int] = deque(maxlen=KEPT)  # numbers
 
     def take(self, entries: Iterable[Entry]) -> None:
@@ -132,6 +133,13 @@ class KeptLog:
             self.changed += 1
             self._changes.append(entry.number)
         self._forget()
+
+    def begin(self, before: int) -> None:
+        """Forget all: what comes next begins after the entry of that number."""
+        self.entries.clear()
+        self._changes.clear()
+        self.bytes, self.newest = 0, before
+        self.begun += 1
 
     def _forget(self) -> None:
         while len(self.entries) > KEPT or self.bytes > KEPT_BYTES:
@@ -185,7 +193,10 @@ class KeptLogs:
         for entry in entries:
             if entry.kind == "RegMsg" and entry.code == m.OK:
                 self.meet({entry.header["SourceID"]: entry.label})
-        self.of(str(line["log"])).take(entries)
+        log = self.of(str(line["log"]))
+        if line.get("anew"):
+            log.begin(entries[0].number - 1 if entries else 0)
+        log.take(entries)
 
 
 class Looks:
@@ -204,7 +215,7 @@ class Looks:
         self._logs, self.acts = logs, acts
         self.wanted: dict[str, LogFilter] = {}
         self.tables: frozenset[str] = frozenset()
-        self._seen: dict[str, tuple[int, int]] = {}  # changes, lost
+        self._seen: dict[str, tuple[int, int, int]] = {}  # changes, lost, begun
 
     def look(self, logs: Any, tables: Any) -> None:
         """From now on the page looks at these.
@@ -234,8 +245,9 @@ class Looks:
         """What the page gets next of the logs that it looks at; None if it has everything."""
         for name, wanted in self.wanted.items():
             log = self._logs.of(name)
-            line = self._more(log, wanted) if name in self._seen else self._first(log, wanted)
-            self._seen[name] = log.changed, log.lost
+            goes_on = name in self._seen and self._seen[name][2] == log.begun
+            line = self._more(log, wanted) if goes_on else self._first(log, wanted)
+            self._seen[name] = log.changed, log.lost, log.begun
             if line is not None:
                 return {"k": "log", "log": name, "total": log.newest, **line}
         return None
@@ -250,7 +262,7 @@ class Looks:
         return {"first": True, "missed": 0, "lines": [self.brief(entry) for entry in found]}
 
     def _more(self, log: KeptLog, wanted: LogFilter) -> Line | None:
-        changed, lost = self._seen[log.name]
+        changed, lost, _ = self._seen[log.name]
         found = {
             entry.number: entry
             for entry in log.since(changed)

@@ -74,6 +74,7 @@ class Playback:
         endings: What became of each incident, in the order of `incidents`; empty if that is not
             known, as of a recording that was cut short.
         events: The events as the DVA knew them in the end.
+        facts: What was decided, by whom and why, in order.
     """
 
     scenario: Scenario
@@ -88,6 +89,13 @@ class Playback:
     contained: dict[int, float] = field(default_factory=dict)
     endings: list[Ending] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    facts: list[Fact] = field(default_factory=list)
+
+    @property
+    def people_decide(self) -> bool:
+        """Whether somebody takes part at a control room."""
+        person = self.scenario.dispatch.person is not None
+        return person or any(fact.role is not None for fact in self.facts)
 
     def robot_named(self, label: str) -> str | None:
         """The id of a robot, if there is one of that name."""
@@ -104,7 +112,6 @@ class Recording(Playback):
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
             `datagram`.
         persons: Numbers of the operators whose places people took.
-        facts: What was decided, by whom and why.
     """
 
     robots: dict[str, RobotAgent]
@@ -112,7 +119,6 @@ class Recording(Playback):
     people: list[PersonLog] = field(default_factory=list)
     depth: str = "message"
     persons: tuple[int, ...] = ()
-    facts: list[Fact] = field(default_factory=list)
 
     def event_of(self, number: int) -> Event | None:
         """The DVA's event about incident `number`, if it knows of it."""

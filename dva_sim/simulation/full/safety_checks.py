@@ -58,9 +58,8 @@ CHECKED_IN_SHORT: Final = (
 )
 
 Broken = tuple[str, str]
-_COMMAND = re.compile(  # as everybody here writes them, but any other would do no harm
-    rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>.*<SetTeleOp>", re.DOTALL
-)
+# As everybody here writes them, but any other would do no harm.
+_NUMBER_AND_SOURCE = re.compile(rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -219,7 +218,8 @@ class SafetyAudit:
         at_event: float,
         tick: float,
     ) -> None:
-        self._recorder, self._limits, self._robots = recorder, limits, robots
+        self._recorder, self._robots = recorder, robots
+        self._watchdog, self._max_age = limits.watchdog_s, limits.max_age_s
         self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
         self._ledger, self._tick = EventLedger(book, rules, dva, place_of, at_event), tick
         self._witnesses: dict[str, Witness] = {}
@@ -253,7 +253,7 @@ class SafetyAudit:
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness = self.witness(robot)
-        command = _COMMAND.search(data)
+        command = _NUMBER_AND_SOURCE.search(data) if b"<SetTeleOp>" in data else None
         if command is not None:
             witness.arrivals.setdefault((command[2].decode(), int(command[1])), now)
             if len(witness.arrivals) > MOST_KEPT:
@@ -367,13 +367,13 @@ class SafetyAudit:
 
     def accepted(self, command: Accepted) -> None:
         """A robot has accepted a command to drive, from whomever."""
-        witness, limits = self.witness(command.robot), self._limits
+        witness = self.witness(command.robot)
         found: list[Broken] = []
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
         if broken is not None:
             found.append(broken)
         source, session, number = command.source, command.session, command.message_id
-        if witness.stopped > max(witness.ordered, -0.5):
+        if witness.stopped > witness.ordered and witness.stopped > -0.5:
             found.append(("S3", "obeys a command after an emergency, before a new order"))
         elif witness.hand is not None:
             found.append(("S2", f"obeys {source} while it is driven by hand"))
@@ -383,12 +383,13 @@ class SafetyAudit:
             found.append(("S1", "obeys a command again, or after a newer one"))
         witness.newest = source, session, number
         arrived = witness.arrivals.pop((source, number), command.arrived)
-        witness.allowed = arrived + limits.watchdog_s
+        witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
             found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
         elif command.seen_tick is not None and witness.offset is not None:
             pictured = command.seen_tick / 1000 + witness.offset
-            witness.allowed = min(witness.allowed, pictured + limits.max_age_s)
+            oldest = pictured + self._max_age
+            witness.allowed = witness.allowed if witness.allowed < oldest else oldest
             if pictured > command.time + ROUNDED:
                 found.append(("S1", "obeys a command behind a picture that was not taken yet"))
         self._report(found, command.time, self._robots[command.robot].device.label)
@@ -410,7 +411,7 @@ class SafetyAudit:
                 found.append(("S3", "obeys a hand after an emergency, before it is taken anew"))
             elif witness.hand != done.who:
                 found.append(("S1", "obeys a hand that has not taken it, or has let it go"))
-            witness.allowed = now + self._limits.watchdog_s
+            witness.allowed = now + self._watchdog
         self._report(found, now, robot.device.label)
 
     # --- twice a second --------------------------------------------------------------------

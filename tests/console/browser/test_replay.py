@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,19 @@ def shown(page: Page) -> float:
     """The moment that is shown [s]."""
     hours, minutes, seconds = (page.locator(".bar .time .figure").inner_text()).split(":")
     return 3600 * int(hours) + 60 * int(minutes) + int(seconds)
+
+
+def choose(page: Page, name: str) -> None:
+    """Play one of the list, once the page may say so."""
+
+    def chosen() -> bool:
+        page.get_by_role("button", name=name).click()
+        with suppress(AssertionError):
+            expect(page.get_by_role("region", name="Replay")).to_be_visible(timeout=10_000)
+            return True
+        return False
+
+    becomes(chosen)
 
 
 def test_a_recording_plays_stands_and_jumps(address, visit, folder: Path) -> None:
@@ -106,10 +120,25 @@ def test_a_line_of_the_story_leads_to_its_moment(address, visit, folder: Path) -
     becomes(lambda: shown(page) == 60 * minutes + seconds)
 
 
+def test_the_log_holds_what_was_asked_up_to_the_moment(address, visit, folder: Path) -> None:
+    page = visit.open(address("replay", folder / "drill.mcap", "--console"))
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("link", name="Main").click()
+    rows = page.get_by_role("table", name="Requests").locator("tbody tr")
+    position = page.get_by_role("slider", name="Replay position")
+    position.focus()
+    page.keyboard.press("End")
+    expect(rows.filter(has_text="EventReport")).not_to_have_count(0)
+    position.focus()
+    page.keyboard.press("Home")
+    expect(rows.filter(has_text="EventReport")).to_have_count(0)
+
+
 def test_the_camera_shows_a_picture_with_its_age(address, visit, folder: Path) -> None:
     page = visit.open(address("replay", folder / "drive.mcap", "--console"))
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("link", name="Camera").click()
+    page.get_by_role("link", name="Robots").click()
+    page.get_by_role("link", name="robot-1").click()
     page.get_by_role("slider", name="Replay position").focus()
     page.keyboard.press("End")
 
@@ -125,7 +154,7 @@ def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
     page.goto(where)
     rows = page.get_by_role("table", name="Recordings").locator("tbody tr")
     expect(rows).to_have_count(2)
-    page.get_by_role("button", name="drill.mcap").click()
+    choose(page, "drill.mcap")
     expect(page.get_by_role("region", name="Map")).to_be_visible()
     expect(page.get_by_role("status", name="Link")).to_have_text("recording drill.mcap")
 
@@ -143,8 +172,8 @@ def test_axe_finds_nothing_serious_and_all_fits(
 ) -> None:
     page = visits(width, 800, color_scheme=scheme).tab()
     page.goto(address("console", "--results", folder))
-    page.get_by_role("button", name="drill.mcap").click()
-    for name in ("Map", "Story", "Camera", "Recordings"):
+    choose(page, "drill.mcap")
+    for name in ("Map", "Main", "Robots", "Story", "Recordings"):
         page.get_by_role("link", name=name).click()
         expect(page.get_by_role("link", name=name)).to_have_attribute("aria-current", "page")
         assert faults(page) == []

@@ -1,6 +1,6 @@
 /** What did the DVA hear, and what did it answer? */
 import { html, useEffect, useState } from '../../vendor/preact.js';
-import { rows as worldRows } from '../store.js';
+import { isPast, rows as worldRows } from '../store.js';
 import { useLog } from '../logs/looking.js';
 import { MessageDetail } from './message_detail.js';
 import { ALL, isNarrow, RequestFilters } from './request_filters.js';
@@ -31,7 +31,7 @@ export function RequestsPage() {
   const more = async () => setOlder([...(await ask(filter, first)), ...older]);
   return html`<main class="page requests-page" id="main" tabindex="-1">
     <h1 class="hidden">Main</h1>
-    <${ServerBar} />
+    ${!isPast.value && html`<${ServerBar} />`}
     <section class="panel requests" aria-label="Log">
       <${RequestFilters} filter=${filter} kinds=${kindsOf(shown)} onFilter=${change}
         isPaused=${paused !== null} onPause=${() => setPaused(paused ? null : shown)}

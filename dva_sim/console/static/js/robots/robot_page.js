@@ -1,6 +1,6 @@
 /** The windows of one robot: what it hears, how its wheels turn, and hands on it. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { maySteer, modeOf } from '../store.js';
+import { isPast, maySteer, modeOf } from '../store.js';
 import { stopRobots } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { CameraPicture } from '../drive/camera.js';
@@ -26,11 +26,12 @@ export function RobotPage({ robot }) {
   return html`<main class="page robot-page" id="main" tabindex="-1">
     <${Head} robot=${robot} />
     <div class="column"><${RobotLog} robot=${robot} /><${RobotLatency} robot=${robot} /></div>
-    <div class="column"><${SideView} robot=${robot} /><${TopView} robot=${robot} /><${Sensors} robot=${robot} /></div>
-    <div class="column"><${ManualControl} robot=${robot} />
+    <div class="column"><${SideView} robot=${robot} /><${TopView} robot=${robot} />
+      ${!isPast.value && html`<${Sensors} robot=${robot} />`}</div>
+    <div class="column">${!isPast.value && html`<${ManualControl} robot=${robot} />`}
       <section class="panel camera-panel" aria-label="Camera"><h2>Camera</h2>
         <${CameraPicture} robot=${robot} /></section>
-      <${Faults} robot=${robot} /></div>
+      ${!isPast.value && html`<${Faults} robot=${robot} />`}</div>
   </main>`;
 }
 
@@ -43,12 +44,12 @@ function Head({ robot }) {
     <h1>${robot.label}</h1>
     <span role="status" aria-label="Mode" class="mode-status"><${ModeMark} mode=${mode} /> ${mode}</span>
     ${shown?.holder && html`<span>held by ${shown.holder}</span>`}
-    <span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>
+    ${!isPast.value && html`<span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
     <span class="gap"></span>
     <a href="#/robots">All robots</a>
-    <button type="button" class="stop-one" disabled=${!maySteer.value}
+    ${!isPast.value && html`<button type="button" class="stop-one" disabled=${!maySteer.value}
       onClick=${() => stopRobots([robot.i])}><${Icon} name="octagon-x" />Stop ${robot.label}</button>
-    <${Reasons} robot=${robot} />
+    <${Reasons} robot=${robot} />`}
   </header>`;
 }
 

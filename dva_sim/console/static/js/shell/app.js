@@ -10,7 +10,6 @@ import { EventsPage } from '../events/events_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
-import { CameraPage } from '../replay/camera_page.js';
 import { ReplayBar } from '../replay/replay_bar.js';
 import { ShelfPage } from '../replay/shelf_page.js';
 import { StoryPage } from '../replay/story_page.js';
@@ -32,12 +31,13 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['network', 'Network', 'activity'],
   ['audit', 'Audit', 'square'],
 ]);
-const NOT_ATTACHED = ['robots', 'drive', 'network']; // what sends is absent where only messages are known
+const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messages tell nothing
 // What sends something is not there in a recording.
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
+  ['robots', 'Robots', 'bot'],
   ['story', 'Story', 'flag'],
-  ['camera', 'Camera', 'camera'],
 ]);
 const SHELF = /** @type {[string, string, string]} */ (['recordings', 'Recordings', 'play']);
 const BODIES = /** @type {Record<string, any>} */ ({
@@ -50,7 +50,6 @@ const BODIES = /** @type {Record<string, any>} */ ({
   network: NetworkPage,
   audit: AuditPage,
   story: StoryPage,
-  camera: CameraPage,
   recordings: ShelfPage,
 });
 

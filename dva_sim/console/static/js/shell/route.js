@@ -4,7 +4,7 @@ import { robots } from '../store.js';
 
 const PAGES = [
   ...['map', 'main', 'devices', 'robots', 'drive', 'events', 'network', 'audit'],
-  ...['story', 'camera', 'recordings'],
+  ...['story', 'recordings'],
 ];
 const MOST_AT_ONCE = 2;
 const hash = signal(location.hash);
