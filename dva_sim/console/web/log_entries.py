@@ -135,10 +135,11 @@ def header_of(data: bytes) -> dict[str, str]:
 
 def payload_of(body: Any) -> str:
     """What a message says, in a few characters: the values of its fields."""
+    names = getattr(body, "_fields", None) or [one.name for one in fields(body)]
     said = ", ".join(
-        f"{one.name} {_value(getattr(body, one.name))}"
-        for one in fields(body)
-        if getattr(body, one.name) not in (None, (), "")
+        f"{name} {_value(getattr(body, name))}"
+        for name in names
+        if getattr(body, name) not in (None, (), "")
     )
     return said if len(said) <= _SHOWN else said[: _SHOWN - 1] + "…"
 
