@@ -67,7 +67,7 @@ bench: $(BENCH)  ## what the program costs, in instructions: make bench AGAINST=
 	@$(BIN)/python tests/benchmarks/meter.py --against "$(AGAINST)" --only "$(ONLY)"
 
 goals: $(DEV)  ## what performance work aims at by the clock: crowds, memory, floods, the console
-	@$(BIN)/python -m pytest tests/benchmarks --benchmark-only --benchmark-disable-gc -p no:cacheprovider -s
+	@$(BIN)/python -m pytest tests/benchmarks --benchmark-disable-gc -p no:cacheprovider -s
 
 clean:  ## remove the environment and all caches, keep results
 	@rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

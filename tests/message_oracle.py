@@ -28,16 +28,23 @@ ELEMENTS = {
     m.Reply: "reply",
 }
 NAMES = {
+    "actor": "ActorID",
     "address": "IpAddr",
+    "advised": "AdvisedID",
+    "author": "AuthorID",
+    "candidates": "Candidate",
     "destination": "DestinationID",
     "device": "DeviceID",
     "devices": "Device",
     "event_id": "EventID",
+    "events": "EventStatus",
     "holder": "HolderID",
     "label": "DeviceLabel",
     "message_id": "MessageID",
     "mission_id": "MissionID",
     "name": "SensorName",
+    "operator": "OperatorID",
+    "responder": "ResponderID",
     "sensor": "SensorName",
     "source": "SourceID",
     "values": "Value",
@@ -117,7 +124,7 @@ def _one_says(element: etree._Element, value: Any) -> bool:
         # The usual task may be left out, and may be said.
         said = [child for child in element if (child.tag, child.text) != ("Task", "confirm")]
         return _all_say(said, _children(value)[:-1])
-    if is_dataclass(value):
+    if _has_parts(value):
         return _all_say(list(element), _children(value))
     return len(element) == 0 and same_value(element.text or "", value)
 
@@ -125,12 +132,21 @@ def _one_says(element: etree._Element, value: Any) -> bool:
 def _children(value: Any) -> list[tuple[str, Any]]:
     """Elements below, in order; what is None is absent."""
     found = []
-    for field in fields(value):
-        held = getattr(value, field.name)
-        for one in held if isinstance(held, tuple) else [held]:
+    for name in _names(value):
+        held = getattr(value, name)
+        for one in held if isinstance(held, tuple) and not _has_parts(held) else [held]:
             if one is not None:
-                found.append((_tag(field.name, one), one))
+                found.append((_tag(name, one), one))
     return found
+
+
+def _has_parts(value: Any) -> bool:
+    return is_dataclass(value) or hasattr(value, "_fields")
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    """Of the parts of a message, or of a part of one."""
+    return tuple(f.name for f in fields(value)) if is_dataclass(value) else value._fields
 
 
 def _tag(name: str, value: Any) -> str:

@@ -27,6 +27,7 @@ addresses = st.ip_addresses(v=4).map(str) | st.ip_addresses(v=4).map("{}:5556".f
 urls = st.text(st.characters(min_codepoint=0x21, max_codepoint=0x7E), min_size=1, max_size=256)
 names = characters(1, 64)
 numbers = st.integers(1, UINT32)
+counts = st.integers(0, UINT32)
 ticks = st.integers(0, 2**53 - 1)
 positions = st.builds(m.Position, real(-90, 90), real(-180, 180))
 speeds = turn_rates = real(-100, 100)
@@ -51,8 +52,61 @@ mission_statuses = st.builds(
 )
 devices = st.builds(m.Device, ids, names, names, addresses)
 held = real(0, 1e6)
+spans, texts, maybe_text = real(0, 1e6), characters(0, 256), st.none() | characters(0, 256)
+maybe_tasks, maybe_count, maybe_ids = st.none() | tasks, st.none() | counts, st.none() | ids
+modes_of_dispatch = st.sampled_from(["automatic", "ask_first"])
+roles = st.none() | st.sampled_from(["look", "drive", "dispatch", "supervise"])
+by_whom = st.none() | st.builds(m.ByWhom, ids, names, spans)
+event_statuses = st.builds(
+    m.EventStatus,
+    numbers,
+    kinds,
+    positions,
+    shares,
+    shares,
+    st.sampled_from(
+        [
+            "pending",
+            "assigned",
+            "on_scene",
+            "confirmed",
+            "contained",
+            "refuted",
+            "escalated",
+            "expired",
+        ]
+    ),
+    spans,
+    spans,
+    counts,
+    st.none() | spans,
+    maybe_tasks,
+    maybe_ids,
+    maybe_ids,
+    maybe_ids,
+    by_whom,
+    st.none() | st.builds(m.LastDecision, ids, names, names, spans, maybe_text),
+    st.none() | st.builds(m.Proposed, ids, tasks, spans, spans),
+    maybe_text,
+)
+dispatch_statuses = st.builds(m.DispatchStatus, modes_of_dispatch, spans, by_whom, roles)
+candidates = st.builds(m.Candidate, ids, names, texts, st.none() | spans)
 contents = st.one_of(
     st.none(),
+    st.builds(m.EventList, st.lists(event_statuses, max_size=2).map(tuple)),
+    event_statuses,
+    st.builds(
+        m.Proposal,
+        numbers,
+        names,
+        texts,
+        maybe_tasks,
+        maybe_ids,
+        st.none() | spans,
+        st.none() | spans,
+        st.lists(candidates, max_size=3).map(tuple),
+    ),
+    dispatch_statuses,
     st.builds(m.DeviceList, st.lists(devices, max_size=6).map(tuple)),
     st.builds(m.SensorInfo, urls, st.lists(sensors, max_size=4).map(tuple)),
     st.builds(m.Permission, ids, *granted),
@@ -134,6 +188,35 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
     m.TaskBid: st.builds(m.TaskBid, numbers, real(0, 1e6)),
     m.TaskAward: st.builds(m.TaskAward, numbers),
     m.Relocation: st.builds(m.Relocation, positions),
+    m.GetEventList: st.builds(m.GetEventList, st.none() | numbers),
+    m.GetDispatch: st.builds(m.GetDispatch),
+    m.SetDispatch: st.builds(m.SetDispatch, modes_of_dispatch, maybe_text),
+    m.Acknowledge: st.builds(m.Acknowledge, numbers),
+    m.Assign: st.builds(m.Assign, numbers, ids, maybe_ids, maybe_tasks, maybe_text, maybe_count),
+    m.TakeOff: st.builds(m.TakeOff, numbers, ids, maybe_text, maybe_count),
+    m.FalseAlarm: st.builds(m.FalseAlarm, numbers, texts, maybe_count),
+    m.Escalate: st.builds(m.Escalate, numbers, maybe_text, maybe_count),
+    m.AddNote: st.builds(m.AddNote, numbers, texts),
+    m.GetProposal: st.builds(m.GetProposal, numbers),
+    m.Revoke: st.builds(m.Revoke, ids, maybe_text),
+    m.EventStatus: event_statuses,
+    m.DispatchStatus: dispatch_statuses,
+    m.AuditRecord: st.builds(
+        m.AuditRecord,
+        ids,
+        names,
+        names,
+        texts,
+        st.integers(0, 999),
+        texts,
+        roles,
+        st.none() | numbers,
+        maybe_ids,
+        maybe_tasks,
+        st.none() | spans,
+        maybe_ids,
+        st.none() | spans,
+    ),
     m.Reply: st.builds(
         m.Reply, st.integers(0, UINT32), st.integers(0, 999), characters(0, 256), contents
     ),

@@ -13,6 +13,7 @@ from dva_sim.core.dispatch import MinEta, Policy
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
 from dva_sim.core.permissions import Access
+from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sensing import Sensing
 from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start
@@ -23,6 +24,7 @@ DVA = "02:00:00:00:00:01"
 ROBOT, OTHER_ROBOT = "02:00:00:01:00:01", "02:00:00:01:00:02"
 GUARD, OTHER_GUARD = "02:00:00:02:00:01", "02:00:00:02:00:02"
 OPERATOR, OTHER_OPERATOR = "02:00:00:03:00:01", "02:00:00:03:00:02"
+ROOM, OTHER_ROOM = "02:00:00:07:00:01", "02:00:00:07:00:02"
 DETECTOR, OTHER_DETECTOR = "02:00:00:04:00:01", "02:00:00:04:00:02"
 TEAM = {GUARD: "Guard", ROBOT: "Robot", OPERATOR: "TeleOp", DETECTOR: "Sensor"}
 HERE = m.Position(38.6612, -9.2058)
@@ -60,9 +62,12 @@ class Office:
         access: Access | None = None,
         sensing: Sensing | None = None,
         supervisors: frozenset[str] = frozenset(),
+        roles: dict[str, str] | None = None,
+        ask_first: bool = False,
     ) -> None:
         self.policy, self.ground, self.access = policy or MinEta(), ground, access
         self.sensing, self.supervisors = sensing, supervisors
+        self.roles, self.ask_first = roles or {}, ask_first
         self.rules = rules or Rules(escalate_after=ESCALATE_AFTER)
         self.number = 0
         self.sent: list[Send] = []
@@ -86,6 +91,8 @@ class Office:
             access=self.access,
             sensing=self.sensing,
             supervisors=self.supervisors,
+            roles=Roles({room: ControlRoomRole(role) for room, role in self.roles.items()}),
+            ask_first=self.ask_first,
         )
 
     # --- what devices say --------------------------------------------------------------

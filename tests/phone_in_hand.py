@@ -14,10 +14,12 @@ KINDS = ("accelerometer", "linear-acceleration", "gyroscope")
 
 LISTEN = """() => { window.sent = []; const send = WebSocket.prototype.send;
 WebSocket.prototype.send = function (text) {
+  if (window.hangs) return;
   window.sent.push(JSON.parse(text)); return send.call(this, text); };
   window.ends = []; const Plain = window.WebSocket;
   window.WebSocket = class extends Plain {
-    constructor(...a) { super(...a); window.ends.push(this); } };
+    constructor(...a) { super(...a); window.ends.push(this);
+      this.addEventListener('message', (e) => window.hangs && e.stopImmediatePropagation()); } };
   window.shaken = []; navigator.vibrate = (what) => window.shaken.push(what); }"""
 HIDE = """Object.defineProperty(document, 'hidden', {value: true, configurable: true});
 document.dispatchEvent(new Event('visibilitychange'));

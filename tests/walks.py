@@ -23,18 +23,22 @@ from dva_sim.core.dispatch import (
 )
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import ACT_STEPS, STEPS, Event, State
+from dva_sim.core.handling import Handling
 from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sessions import Permissions, Send, Sessions
 from dva_sim.core.store import Store
 from dva_sim.core.travel_times import SiteKnowledge, WaitingPlace
 from dva_sim.protocol import messages as m
 
-KINDS = {"Guard": 3, "Robot": 2, "TeleOp": 2, "Sensor": 2}
+KINDS = {"Guard": 3, "Robot": 2, "TeleOp": 2, "Sensor": 2, "ControlRoom": 2}
 DEVICES = {
     f"02:00:00:{kind_number:02X}:00:{number:02X}": kind
     for kind_number, (kind, count) in enumerate(KINDS.items(), 1)
     for number in range(count)
 }
+ROOMS = [device for device, kind in DEVICES.items() if kind == "ControlRoom"]
+ROLES = dict(zip(ROOMS, (ControlRoomRole.SUPERVISE, ControlRoomRole.DISPATCH), strict=True))
 POLICY_NAMES = sorted(POLICIES.keys() - {"oracle"} | {"chaos"})
 EPOCH = 2.0**20  # with times in eighths of a second no digit is lost
 LOOKS = (State.ASSIGNED, State.ON_SCENE)
@@ -89,7 +93,9 @@ class Walk:
             merge_distance=self.luck.choice([0.0, 8.0]),
             order_limit=LIMIT,
             operator_span=1 + seed % 3,
+            decide_within=self.luck.choice([5.0, 20.0]),
         )
+        self.ask_first = self.luck.random() < 0.5
         self.access_until = self.luck.choice([math.inf, 300.0])
         self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
         self.alive = dict.fromkeys(DEVICES, True)
@@ -112,6 +118,8 @@ class Walk:
             sessions=sessions,
             ground=GROUND,
             access=Access((holds,)),
+            roles=Roles(dict(ROLES)),
+            ask_first=self.ask_first,
         )
         _watch(desk)
         return desk
@@ -228,6 +236,31 @@ class Walk:
         number = self.luck.choice(list(running)) if running else self._some_event()
         return self.say(self._any("Guard", "Robot"), m.TaskBid(number, self.luck.random() * 100))
 
+    def _decide(self) -> list[Send]:
+        """Somebody at a control room decides: mostly what can be, and about what is there."""
+        number, device = self._some_event(), self._any("Guard", "Robot")
+        event = self.desk.book.get(number)
+        seen = None if event is None or self.luck.random() < 0.4 else event.handling.decisions
+        if event is not None and event.holder and self.luck.random() < 0.3:
+            device = event.responder or device
+        driver = self._any("TeleOp", "ControlRoom") if self.luck.random() < 0.3 else None
+        task = self.luck.choice([None, "confirm", "contain", "stand_by"])
+        body = self.luck.choice(
+            [
+                m.Assign(number, device, driver, task, None, seen),
+                m.Assign(number, device, driver, task, None, seen),
+                m.TakeOff(number, device, None, seen),
+                m.Acknowledge(number),
+                m.AddNote(number, "a note"),
+                m.GetProposal(number),
+                m.GetEventList(),
+                m.SetDispatch(self.luck.choice(["automatic", "ask_first"])),
+                m.Revoke(self._any("Robot")),
+                *([m.FalseAlarm(number, "toast"), m.Escalate(number)] * (number % 4 == 0)),
+            ]
+        )
+        return self.say(self.luck.choice(ROOMS), body)
+
     def _permission(self) -> list[Send]:
         level = self.luck.choice(["teleoperation", "missions", "both", "sensors"])
         body = m.PermissionRequest(self._any("Robot", "Guard"), level, ("heat_flux",))
@@ -333,6 +366,10 @@ class Walk:
         for grant in self.desk.sessions.permissions.all():
             body = m.PermissionRevocation(grant.robot, grant.holder, grant.session)
             self._take(self.say(grant.holder, body))
+        self._take(self.say(ROOMS[0], m.SetDispatch("automatic")))
+        for event in list(self.desk.book.open.values()):
+            if event.handling.taken_off:  # whom the policy may not send there, it does not
+                self._take(self.say(ROOMS[0], m.Escalate(event.number)))
         # What was begun ends by its limit; then each event takes a few seconds of somebody's.
         bound = 2 * LIMIT + 20.0 + 30.0 * left
         while self.desk.book.open:
@@ -377,6 +414,7 @@ STEPS_OF_A_WALK = {
     "progress": 14,
     "found": 8,
     "bid": 6,
+    "decide": 10,
     "permission": 2,
     "give_back": 1,
     "time": 10,
@@ -431,4 +469,10 @@ def snapshot(desk: Dva) -> dict[str, Any]:
 def _with_sets_in_order(event: Event) -> dict[str, Any]:
     fields = {name: getattr(event, name) for name in Event.__slots__}
     fields["times"] = dict(sorted(event.times.items()))
-    return fields | {"failed": sorted(event.failed), "sent": sorted(event.sent)}
+    handling = vars_of(event.handling) | {"taken_off": sorted(event.handling.taken_off)}
+    sets = {"failed": sorted(event.failed), "sent": sorted(event.sent)}
+    return fields | sets | {"handling": handling}
+
+
+def vars_of(handling: Handling) -> dict[str, Any]:
+    return {name: getattr(handling, name) for name in Handling.__slots__}

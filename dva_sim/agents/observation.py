@@ -14,6 +14,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from dva_sim.kernel.makers import maker
+
 Point = tuple[float, float]
 
 CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
@@ -72,6 +74,9 @@ class Observation(NamedTuple):
     visibility: float = CLEAR
 
 
+make_observation = maker(Observation)
+
+
 class CameraFrame(NamedTuple):
     """An observation on its way; `captured` [s] is for the recorder, not for the operator.
 
@@ -98,6 +103,9 @@ class CameraFrame(NamedTuple):
             return cls(at, float(captured)) if sound else None
         except (ValueError, TypeError, OverflowError, RecursionError):
             return None
+
+
+make_frame = maker(CameraFrame)
 
 
 def _hazard(kind: object, *numbers: float) -> SeenHazard:

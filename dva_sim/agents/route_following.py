@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.population import Person
+from dva_sim.kernel.makers import maker
 
 REACH = 2.0  # on a route in a building, one looks for one's place so far ahead of the last [m]
 BENT = 1.5  # way along a route to what one moves straight; around a right angle, up to 1.41
@@ -48,6 +50,9 @@ class Ahead(NamedTuple):
     offset: float
 
 
+_make_ahead = maker(Ahead)
+
+
 class _Leg(NamedTuple):
     """A straight piece: its beginning [m], the way to its end [m], that squared, and its length."""
 
@@ -63,6 +68,91 @@ def _leg(ax: float, ay: float, bx: float, by: float) -> _Leg:
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
     return _Leg(ax, ay, dx, dy, square, math.sqrt(square))
+
+
+class _Place(NamedTuple):
+    """Where on a route somebody is.
+
+    Attributes:
+        leg: On which piece.
+        along: The way to there [m].
+        x: Of who is there, who may be beside the route [m].
+        y: Likewise.
+        offset: Distance from the route [m]; infinite: not looked for yet.
+    """
+
+    leg: int
+    along: float
+    x: float
+    y: float
+    offset: float
+
+
+_make_place = maker(_Place)
+
+
+ROUNDED = 1e-6  # far more than lengths are rounded by [m]
+
+
+class _Line:
+    """The pieces of a route, which never change.
+
+    Args:
+        points: Corners, shape `(n, 2)` [m], n >= 2.
+    """
+
+    def __init__(self, points: NDArray[np.float64]) -> None:
+        corners = [(float(x), float(y)) for x, y in points]
+        steps = np.hypot(*np.diff(points, axis=0).T)
+        self.legs = [_leg(*start, *end) for start, end in pairwise(corners)]
+        self.at: list[float] = [0.0, *np.cumsum(steps).tolist()]
+        self.begin = _Place(0, 0.0, *corners[0], math.inf)
+        self._last: _Place | None = None
+        self._found = self.begin
+
+    def next_place(self, last: _Place, x: float, y: float, reach: float) -> _Place:
+        """The place of who is here [m] and was at another; found once for all who ask together.
+
+        Args:
+            last: Where it was.
+            x: Position [m].
+            y: Position [m].
+            reach: How far ahead, beyond what one may have come [m].
+        """
+        if last is not self._last or x != self._found.x or y != self._found.y:
+            self._last, self._found = last, self._nearest(last, x, y, reach)
+        return self._found
+
+    def _nearest(self, last: _Place, x: float, y: float, reach: float) -> _Place:
+        """See `next_place`.
+
+        The way along a route is no shorter than the straight one: who is so much farther from a
+        place on it than from the nearest one need not look at what comes within as much behind it.
+        """
+        at, legs, nearest, found = self.at, self.legs, math.inf, (last.leg, 0.0, math.inf, 0.0)
+        end = last.along + reach + BENT * math.hypot(x - last.x, y - last.y)
+        i, count = last.leg, len(legs)
+        while i < count and at[i] <= end:
+            begins = at[i]
+            ax, ay, dx, dy, square, length = legs[i]
+            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
+            share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
+            if at[i + 1] > end:
+                share = min(share, (end - begins) / (at[i + 1] - begins))
+            along, away_x, away_y = (
+                begins + share * length,
+                ax + share * dx - x,
+                ay + share * dy - y,
+            )
+            far = away_x * away_x + away_y * away_y
+            if far < nearest:
+                nearest, found = far, (i, along, away_x, away_y)
+                i += 1
+            else:
+                farther = math.sqrt(far) - math.sqrt(nearest) - ROUNDED
+                i = bisect_right(at, along + farther, i + 2) - 1
+        leg, along, away_x, away_y = found
+        return _make_place(leg, along, x, y, math.hypot(away_x, away_y))
 
 
 class Route:
@@ -81,24 +171,26 @@ class Route:
     """
 
     def __init__(self, points: NDArray[np.float64], reach: float = REACH) -> None:
-        self._points = [(float(x), float(y)) for x, y in points]
-        steps = np.hypot(*np.diff(points, axis=0).T)
-        self._legs = [_leg(*start, *end) for start, end in pairwise(self._points)]
-        self._at: list[float] = [0.0, *np.cumsum(steps).tolist()]
-        self._segment, self._along, self._seen = 0, 0.0, self._points[0]
-        self._offset: float | None = None  # of the place seen last; None: not looked for yet
-        self._reach = reach
+        self._line, self._reach = _Line(points), reach
+        self._place = self._line.begin
         self.points = points
+
+    def twin(self) -> Route:
+        """The same route for somebody else: what both look for at one place is found once."""
+        twin = copy(self)
+        twin.points = self.points.copy()
+        return twin
 
     @property
     def length(self) -> float:
         """Whole way [m]."""
-        return self._at[-1]
+        return self._line.at[-1]
 
     @property
     def left(self) -> float:
         """Way left from the beginning of the piece that one was on when one last looked [m]."""
-        return self._at[-1] - self._at[self._segment]
+        at = self._line.at
+        return at[-1] - at[self._place.leg]
 
     def ahead(self, x: float, y: float, heading: float, look_ahead: float) -> Ahead:
         """What to aim at from a pose; never steps back along the route.
@@ -109,50 +201,34 @@ class Route:
             heading: Heading [rad].
             look_ahead: How far ahead on the route the target lies [m].
         """
-        along, offset = self._project(x, y)
-        tx, ty = self.point_at(along + look_ahead)
+        place = self._go_to(x, y)
+        tx, ty = self.point_at(place.along + look_ahead)
         bearing = wrap(math.atan2(ty - y, tx - x) - heading)
         distance = math.hypot(tx - x, ty - y)
-        return Ahead(bearing, distance, self.length - along, offset)
+        return _make_ahead(bearing, distance, self.length - place.along, place.offset)
 
     def remaining(self, x: float, y: float) -> float:
         """Way left from the place on the route where one is who is here [m], as `ahead` tells."""
-        return self.length - self._project(x, y)[0]
+        return self.length - self._go_to(x, y).along
 
     def advance(self, x: float, y: float) -> None:
         """Keep track of how far one has come who is here [m], as `ahead` does."""
-        self._project(x, y)
+        self._go_to(x, y)
 
-    def _project(self, x: float, y: float) -> tuple[float, float]:
-        """Nearest place within reach of the last one: (way along the route, distance) [m]."""
-        last_x, last_y = self._seen
-        if x == last_x and y == last_y and self._offset is not None:
-            return self._along, self._offset
-        at, legs, nearest, found = self._at, self._legs, math.inf, (0.0, math.inf, 0.0)
-        end = self._along + self._reach + BENT * math.hypot(x - last_x, y - last_y)
-        for i in range(self._segment, len(legs)):
-            begins = at[i]
-            if begins > end:
-                break
-            ax, ay, dx, dy, square, length = legs[i]
-            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
-            share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
-            if at[i + 1] > end:
-                share = min(share, (end - begins) / (at[i + 1] - begins))
-            away_x, away_y = ax + share * dx - x, ay + share * dy - y
-            far = away_x * away_x + away_y * away_y
-            if far < nearest:
-                nearest, found = far, (begins + share * length, away_x, away_y)
-                self._segment = i
-        self._seen, self._along, self._offset = (x, y), found[0], math.hypot(found[1], found[2])
-        return self._along, self._offset
+    def _go_to(self, x: float, y: float) -> _Place:
+        """One's place on the route who is here now [m]."""
+        place = self._place
+        if x != place.x or y != place.y or place.offset == math.inf:
+            self._place = place = self._line.next_place(place, x, y, self._reach)
+        return place
 
     def point_at(self, along: float) -> tuple[float, float]:
         """The place a given way along the route [m]; beyond its end, the end."""
-        i = min(bisect_right(self._at, along), len(self._legs)) - 1
-        ax, ay, dx, dy, _, _ = self._legs[i]
-        length = self._at[i + 1] - self._at[i]
-        share = (along - self._at[i]) / length if length else 1.0
+        at, legs = self._line.at, self._line.legs
+        i = bisect_right(at, along, hi=len(legs)) - 1
+        ax, ay, dx, dy, _, _ = legs[i]
+        length = at[i + 1] - at[i]
+        share = (along - at[i]) / length if length else 1.0
         share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
         return ax + share * dx, ay + share * dy
 
@@ -171,11 +247,17 @@ class View(NamedTuple):
     delay: float
 
 
+make_view = maker(View)
+
+
 class Intent(NamedTuple):
     """What a driver wants the robot to do now: speed [m/s], turn rate [rad/s]."""
 
     speed: float
     turn_rate: float
+
+
+make_intent = maker(Intent)
 
 
 @dataclass(frozen=True)
@@ -210,7 +292,8 @@ def gain_at(limit: float, margin: float, delay: float) -> float:
         margin: The person's own.
         delay: [s]
     """
-    return min(limit, margin / max(delay, SHORTEST))
+    gain = margin / (delay if delay > SHORTEST else SHORTEST)
+    return gain if gain < limit else limit
 
 
 NEAREST_LOOK, FARTHEST_LOOK = 0.8, 1.8  # look-ahead inside a building [m]
@@ -243,9 +326,11 @@ class PurePursuit:
             stop_before: Where to stop: so far before the end of the route [m].
         """
         person, reach, seen = self.person, self.reach, view.seen
-        delay = max(view.delay, SHORTEST)
+        delay = view.delay if view.delay > SHORTEST else SHORTEST
         wanted = person.pace * reach.speed
-        look = min(max(wanted * delay / person.caution, NEAREST_LOOK), FARTHEST_LOOK)
+        look = wanted * delay / person.caution
+        look = look if look > NEAREST_LOOK else NEAREST_LOOK
+        look = look if look < FARTHEST_LOOK else FARTHEST_LOOK
         ahead = route.ahead(seen.x, seen.y, seen.heading, look)
         limit = TURN_UNTIL if self._turning else TURN_FROM
         self._turning = abs(ahead.bearing) > limit
@@ -268,11 +353,12 @@ class PurePursuit:
             look: How far ahead on the route it lies [m].
             speed: As fast as one may [m/s].
         """
-        curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.2)
+        distance = ahead.distance
+        curvature = 2.0 * math.sin(ahead.bearing) / (distance if distance > 0.2 else 0.2)
         most = IN_CURVES * self.reach.turn_rate
         if abs(curvature) * speed > most:
             speed = most / abs(curvature)
-        return Intent(speed, self._clamp(curvature * speed))
+        return make_intent(speed, self._clamp(curvature * speed))
 
     def _clamp(self, turn_rate: float) -> float:
         most = self.reach.turn_rate

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError, ExitCode, error_line
+from dva_sim.protocol.mistakes import READ_BYTES, check_message
 from dva_sim.testing.files import FileVerdict, NotReadError, check_file, schema_text
-from dva_sim.testing.messages import READ_BYTES, check_message
 from dva_sim.testing.promises import TRIALS, CheckedKind, said, tried
 
 STDIN: Final = "-"

@@ -74,8 +74,8 @@ def check(
         list[str],
         Argument(
             metavar="FILE...",
-            help="Messages, studies, scenarios, sites, plans, maps, agents, recordings, traces; "
-            "- reads a message. "
+            help="Messages, studies, scenarios, sites, plans, maps, agents, recordings, traces, "
+            "audit logs; - reads a message. "
             f"Or {_TRIED}, and names of such or mine.py:Mine. "
             "Or link: the emulated one.",
         ),

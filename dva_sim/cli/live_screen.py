@@ -220,7 +220,7 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
 
 
 _ID = re.compile(r"[0-9A-F]{2}(:[0-9A-F]{2}){5}")
-_LABEL = re.compile(r"(robot|guard|operator|detector)-([1-9][0-9]{0,3})")
+_LABEL = re.compile(r"(robot|guard|operator|detector|control-room)-([1-9][0-9]{0,3})")
 
 
 def make_keys(folder: Path, names: Iterable[str]) -> str:

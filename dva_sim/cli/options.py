@@ -47,6 +47,7 @@ def one_of(*words: str) -> Completer:
 STUDIES = names_in("experiments")
 SCENARIOS = names_in("experiments/scenarios", "experiments/scenarios/tasks")
 SITES = names_in("worlds")
+ROBOTS = names_in("agents/robots")
 
 
 MOST_SEED = 2**63 - 1
@@ -204,3 +205,9 @@ Overwrite = Annotated[bool, option_of(api.episode, "overwrite")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
+
+
+Host = Annotated[str, Option(metavar="HOST", help="Address of this machine to listen on.")]
+Port = Annotated[int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)]
+NoOpen = Annotated[bool, Option("--no-open", help="Open no browser.")]
+NoToken = Annotated[bool, Option("--no-token", help="Let everybody in who reaches the page.")]

@@ -1,4 +1,4 @@
-"""The commands that play or replay one scenario: episode, replay, live, keys."""
+"""The commands that play or replay one scenario, or one robot: episode, replay, live, robot."""
 
 from __future__ import annotations
 
@@ -11,8 +11,13 @@ from typer import Argument, Option
 
 from dva_sim import api
 from dva_sim.cli.options import (
+    ROBOTS,
     SCENARIOS,
+    Host,
+    NoOpen,
+    NoToken,
     Overwrite,
+    Port,
     Quiet,
     RunSeed,
     ScenarioName,
@@ -26,6 +31,7 @@ from dva_sim.cli.options import (
     takes,
 )
 from dva_sim.cli.verbosity import loudness
+from dva_sim.kernel.errors import ConfigError
 
 _MOST_PORT = 64_999
 LINKS = "modelled", "real"
@@ -52,19 +58,41 @@ def episode(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> Non
 
 @takes(api.replay)
 def replay(
-    file: str, ros2: str | None, quiet: Quiet = False, verbose: Verbose = False, **pictures: Any
+    file: str,
+    ros2: str | None,
+    console: Annotated[bool, Option("--console", help="Play it on a page in the browser.")] = False,
+    host: Host = "127.0.0.1",
+    port: Port = 8765,
+    no_open: NoOpen = False,
+    no_token: NoToken = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    **pictures: Any,
 ) -> None:
     """Tell and draw a recorded run from its file alone.
 
     Examples:
+        dva-sim replay drill.mcap --console  # play, pause, jump, on a page in the browser
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
     """
+    if console:
+        page = {"host": host, "port": port, "open": not no_open, "token": not no_token}
+        with loudness(quiet, verbose):
+            _show_replay(file=Path(file), **page)
+        return
     from dva_sim.cli import stories  # late: start-up
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     with loudness(quiet, verbose):
         stories.replay(Path(file), Wanted.of(**pictures), None if ros2 is None else Path(ros2))
+
+
+def _show_replay(**asked: Any) -> None:
+    """Play recordings on a page in the browser, until Ctrl-C."""
+    from dva_sim.console.replay.console import ReplayOptions, show_replay  # late: start-up
+
+    show_replay(ReplayOptions(**asked), _say_at_once)
 
 
 def live(
@@ -135,21 +163,28 @@ def live(
 
 def console(
     scenario: Annotated[
-        str,
-        Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path."),
-    ] = "hands-on",
-    port: Annotated[
-        int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)
-    ] = 8765,
-    host: Annotated[
-        str, Option(metavar="HOST", help="Address of this machine to listen on.")
-    ] = "127.0.0.1",
+        str | None,
+        Argument(
+            metavar="SCENARIO",
+            autocompletion=SCENARIOS,
+            help="A scenario by name or path; hands-on if none is named.",
+        ),
+    ] = None,
+    port: Port = 8765,
+    host: Host = "127.0.0.1",
     links: Annotated[
         str, choice(*LINKS, help="As the scenario models them, or sockets that others join.")
     ] = "modelled",
     dva_port: Annotated[
         int, count("With real links: port of the DVA; 0: any.", metavar="PORT", most=_MOST_PORT)
     ] = 0,
+    dva: Annotated[
+        str | None,
+        Option(metavar="HOST:PORT", help="Show what runs at this DVA; SCENARIO gives the plan."),
+    ] = None,
+    keys: Annotated[
+        Path | None, folder("With --dva: keys, one of a control room, from `dva-sim keys`.")
+    ] = None,
     phones: Annotated[
         bool, Option("--phones", help="An address for phones, by https, with a QR code.")
     ] = False,
@@ -159,11 +194,15 @@ def console(
     phones_port: Annotated[
         int, count("Port for phones; 0: any that is free.", metavar="PORT", most=65_535)
     ] = 8766,
-    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
-    no_token: Annotated[
-        bool, Option("--no-token", help="Let everybody in who reaches the page.")
-    ] = False,
+    no_open: NoOpen = False,
+    no_token: NoToken = False,
+    results: Annotated[
+        Path | None, folder("Show the recordings of a study, worst first, and its report.")
+    ] = None,
     record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
+    audit: Annotated[
+        Path | None, file("Keep who did what: .sqlite; a log that is there is gone on with.")
+    ] = None,
     out: Annotated[
         Path | None,
         Option("-o", "--out", metavar="FOLDER", help="Keep tables of what people did there."),
@@ -183,17 +222,44 @@ def console(
         dva-sim console  # two robots, two guards, a fire and a leak
         dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
+        dva-sim console --audit audit.sqlite  # who decided what, for `check`
         dva-sim console -o results/mine  # tables of the drives, for `show` and `report`
         dva-sim console --links real  # over sockets, which other devices may join
+        dva-sim console --dva 127.0.0.1:5600  # what a `dva-sim live` does, here or elsewhere
         dva-sim console --phones  # prints an address to be scanned by a phone
+        dva-sim console --results results/mine  # recordings of a study, the worst first
     """
-    from dva_sim.console.options import ConsoleOptions  # late: start-up
+    if results is not None:
+        page = {"host": host, "port": port, "open": not no_open, "token": not no_token}
+        with loudness(quiet, verbose):
+            _show_replay(results=results, **page)
+        return
+    from dva_sim.console.attached.options import AttachOptions, refuse_with_dva  # late: start-up
+    from dva_sim.console.attached.supervisor import attach  # late: start-up
+    from dva_sim.console.options import DEFAULT, ConsoleOptions  # late: start-up
     from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
     from dva_sim.testing.scenario_mistakes import mistakes_of  # late: start-up
 
     changes = tuple(set_ or ())
+    if dva is not None:
+        own = {"--links": links != "modelled", "--phones": phones, "--record": record, "-o": out}
+        refuse_with_dva([name for name, given in own.items() if given])
+        where = AttachOptions(
+            dva=dva,
+            keys=keys,
+            scenario=scenario,
+            changes=changes,
+            host=host,
+            port=port,
+            token=not no_token,
+            open=not no_open,
+        )
+        attach(where, _say_at_once)
+        return
+    if keys is not None:
+        raise ConfigError("--keys is for --dva: devices of a console encrypt nothing")
     options = ConsoleOptions(
-        scenario=scenario,
+        scenario=scenario or DEFAULT,
         seed=seed,
         changes=changes,
         host=host,
@@ -206,12 +272,71 @@ def console(
         dva_port=dva_port,
         open=not no_open,
         record=record,
+        audit=audit,
         results=out,
         keep_motion=keep_motion,
         overwrite=overwrite,
     )
-    with loudness(quiet, verbose), mistakes_of(scenario, list(changes), seed):
+    with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), seed):
         ConsoleSupervisor(options, _say_at_once).run()
+
+
+def robot(
+    profile: Annotated[
+        str, Argument(metavar="PROFILE", autocompletion=ROBOTS, help="A robot by name or path.")
+    ] = "servrobot",
+    dva: Annotated[
+        str | None,
+        Option(metavar="HOST:PORT", help="Register there at once, and listen; else from the page."),
+    ] = None,
+    number: Annotated[
+        int, count("Which robot it is, which says its id and label.", least=1, most=1000)
+    ] = 1,
+    listen: Annotated[
+        int, count("Port at which it takes requests; 0: any.", metavar="PORT", most=_MOST_PORT)
+    ] = 0,
+    port: Annotated[
+        int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)
+    ] = 8765,
+    host: Annotated[
+        str, Option(metavar="HOST", help="Address of this machine to listen on.")
+    ] = "127.0.0.1",
+    keys: Annotated[Path | None, folder("Keys of the devices, as by `dva-sim keys`.")] = None,
+    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
+    no_token: Annotated[
+        bool, Option("--no-token", help="Let everybody in who reaches the page.")
+    ] = False,
+    seed: RunSeed = 1,
+    set_: Sets = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run one simulated robot over sockets, with windows in the browser.
+
+    It begins off: it is registered at any DVA, and its port opened, from its page.
+
+    Examples:
+        dva-sim robot  # the service robot; register it and open its port on the page
+        dva-sim robot pibot --dva 192.168.1.10:5600  # the model car, at a DVA elsewhere
+        dva-sim robot --number 2 --port 0  # another one beside it: robot-2
+    """
+    from dva_sim.console.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
+
+    options = RobotOptions(
+        profile=profile,
+        number=number,
+        dva=dva,
+        listen=listen,
+        port=port,
+        host=host,
+        keys=keys,
+        open=not no_open,
+        token=not no_token,
+        seed=seed,
+        changes=tuple(set_ or ()),
+    )
+    with loudness(quiet, verbose):
+        RobotSimulator(options, _say_at_once).run()
 
 
 def _say_at_once(line: str) -> None:

@@ -14,6 +14,8 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.robot_actions import RobotActions
+from dva_sim.console.room_actions import AlarmActions, RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
@@ -39,6 +41,15 @@ class Actions:
         self._world = world
         self._seats, self._answers = Seats(), Answers()
         self._phones = PhoneActions(world, self._seats, self._robot, self._stop_one)
+        self._rooms = RoomActions(world, self._seats, self._robot, self._take)
+        self._at_robots = RobotActions(
+            world.windows,
+            self._robot,
+            why_not=self._why_not,
+            labels=world.run.stage.labels,
+            deaf=world.deafen,
+            slow=world.run.audit.expect,
+        )
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)
         self._doers: dict[str, Callable[[str, Line, Said], object]] = {
@@ -55,7 +66,11 @@ class Actions:
             "decline": self._decline,
             "tour": self._tour,
             **self._phones.doers,
+            **self._at_robots.doers,
             **GuardActions(world).doers,
+            **self._rooms.doers,
+            **AlarmActions(world, self._rooms).doers,
+            **world.dva.doers,
         }
 
     def take(self, line: Line) -> None:
@@ -63,12 +78,16 @@ class Actions:
         what, client = line.get("do"), str(line.get("client", ""))
         if what == "input":
             self._input(client, line)
+        elif what == "manual":
+            self._at_robots.input(client, line)
         elif what == "samples":
             self._phones.samples(client, line)
         elif what == "gone":
             self._gone(client)
         elif what == "watch":
             self._watch(line.get("robots"))
+        elif what == "look":
+            self._look(line.get("logs"), line.get("tables"))
         elif isinstance(number := line.get("id"), str):
             self._once(number, client, str(what), line)
 
@@ -78,12 +97,14 @@ class Actions:
             if known is not None:
                 self._tell(known)
             return
-        said = partial(self._said, number)
+        said: Said = partial(self._said, number)
         do = self._doers.get(what)
         if do is None:
             said(False, f"no action {what!r}")
             return
         try:
+            if self._world.audited is not None:
+                said = self._world.audited.answered(what, client, line, said)
             do(client, line, said)
         except (Refused, ConfigError) as error:
             said(False, str(error))
@@ -125,6 +146,7 @@ class Actions:
     def _release(self, client: str, line: Line, said: Said) -> None:
         if str(line["id"]).startswith(BYE):
             self._phones.forget(client)
+            self._rooms.forget(client)
             self._hold()
         if client not in self._seats.taken:
             said(True, "released")
@@ -171,12 +193,16 @@ class Actions:
 
     # --- drives ----------------------------------------------------------------------------
 
+    def _why_not(self) -> str:
+        """Why nobody may drive now; empty: one may."""
+        if self._world.lag.held:
+            return "held: this machine cannot keep up with real time"
+        return "time stands still: go on first" if self._world.clock.paused else ""
+
     def _start(self, client: str, _: Line, said: Said) -> None:
-        person, world = self._person(client), self._world
-        if world.lag.held:
-            raise Refused("held: this machine cannot keep up with real time")
-        if world.clock.paused:
-            raise Refused("time stands still: go on first")
+        person = self._person(client)
+        if why := self._why_not():
+            raise Refused(why)
         person.alert = ""
         person.start(said)
 
@@ -188,6 +214,7 @@ class Actions:
         if "robots" not in line and seat is not None:
             line = {"robots": list(self._world.person(seat.number).robots)}
         robots = self._robots(line)
+        self._at_robots.stop(robots)
         # Who drives a robot from here learns of its end at once, whoever pressed the button.
         own = self._world.person(0 if seat is None else seat.number)
         for person in self._world.persons:
@@ -211,9 +238,11 @@ class Actions:
 
     def _gone(self, client: str) -> None:
         """The page is hidden, or its socket closed: nobody has a hand on it."""
+        self._at_robots.gone(client)
         self._stop_one(client, "stopped: the page was hidden, left or cut off")
 
     def _look_for_the_silent(self) -> None:
+        self._at_robots.look_for_the_silent()
         why = f"stopped: the page was silent for {SILENT_AFTER:g} s while it held on"
         for client in self._seats.silent(time.monotonic()):
             self._stop_one(client, why)
@@ -225,6 +254,7 @@ class Actions:
             self._world.person(seat.number).stop(_nobody, why)
 
     def _stop_all(self, why: str) -> None:
+        self._at_robots.stop(self._world.run.field.robots)
         for client in list(self._seats.taken):
             self._stop_one(client, why)
 
@@ -282,6 +312,11 @@ class Actions:
         numbers = robots if isinstance(robots, list) else []
         ids = {t["id"] for t in self._world.feed.things if t["i"] in numbers}
         self._world.screens.watch(ids)
+
+    def _look(self, logs: Any, tables: Any) -> None:
+        if isinstance(logs, dict) and isinstance(tables, list):
+            self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
+            self._world.dva.looked = "devices" in tables
 
 
 def _nobody(ok: bool, text: str) -> None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.played_run import PlayedRun
 from dva_sim.console.stands import why_stands
-from dva_sim.core.events import FINAL, Event, State
+from dva_sim.core.event_status import state_since
+from dva_sim.core.events import FINAL, Event, EventBook
 from dva_sim.kernel.recorder import Moment
 from dva_sim.live.parts import Rate
-from dva_sim.simulation.full.run import Run
+from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
 SEVERITIES = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
@@ -26,14 +28,15 @@ class Feed:
 
     Args:
         run: Which.
+        book: Events of its DVA, if there is one here.
 
     Attributes:
         things: Everybody, with the number that other lines call them by.
         numbers: Those numbers, by id or name.
     """
 
-    def __init__(self, run: Run) -> None:
-        self._run = run
+    def __init__(self, run: PlayedRun, book: EventBook | None = None) -> None:
+        self._run, self._book = run, book or EventBook()
         self.things: list[Line] = []
         self.numbers: dict[str, int] = {}
         self._rates: dict[str, Rate] = {}
@@ -80,6 +83,12 @@ class Feed:
         """Somebody without a place: an operator, a seat, the DVA."""
         self._number(id_tag, label, kind)
 
+    def add_other(self, id_tag: str, label: str, kind: str, more: Line) -> None:
+        """Somebody who is none of the scenario's, and may be called as one of them."""
+        number = len(self.things)
+        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
+        self.numbers[id_tag] = number
+
     # --- where everybody is ----------------------------------------------------------------
 
     def positions(self) -> Line:
@@ -124,6 +133,7 @@ class Feed:
         return {
             "i": self.numbers[id_tag],
             "mode": mode.value,
+            "by_hand": robot.controller.by_hand is not None,
             "pattern": self.pattern_of(id_tag),
             "battery": round(robot.charge, 3),
             "holder": holder,
@@ -155,33 +165,15 @@ class Feed:
 
     def events(self) -> Line:
         """All that are open, and the last that are over."""
-        book = self._run.dva.desk.book
+        book = self._book
         over = list(book.closed.values())[-KEPT_EVENTS:]
         return {
             "k": "events",
             "t": self.now_ms,
-            "events": [self._event(event) for event in (*over, *book.open.values())],
-        }
-
-    def _event(self, event: Event) -> Line:
-        run, where = self._run, event.position
-        x, y = run.stage.site.frame.to_xy(where.latitude, where.longitude)
-        detected = event.times.get("detected", 0.0)
-        return {
-            "number": event.number,
-            "kind": event.kind,
-            "x_m": round(x, 2),
-            "y_m": round(y, 2),
-            "latitude_deg": where.latitude,
-            "longitude_deg": where.longitude,
-            "room": run.stage.site.room_at(x, y),
-            "severity": next(name for least, name in SEVERITIES if event.severity >= least),
-            "severity_value": round(event.severity, 2),
-            "state": str(event.state),
-            "over": not event.open,
-            "since_ms": round(1000 * _since(event)),
-            "reported_ms": round(1000 * detected),
-            "assigned": [run.stage.labels.get(name, name) for name in _sent(event)],
+            "events": [
+                event_line(event, self._run.stage.site, self._run.stage.labels)
+                for event in (*over, *book.open.values())
+            ],
         }
 
     def story(self) -> Iterator[Line]:
@@ -192,16 +184,26 @@ class Feed:
             yield {"k": "story", "t": round(1000 * time), "who": who, "what": what, "kind": kind}
 
 
-_BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
-
-
-def _since(event: Event) -> float:
-    """When an event came into its state [s]."""
-    times = event.times
-    detected = times.get("detected", 0.0)
-    if event.state is State.PENDING:
-        return max(detected, event.waiting_since)
-    return times.get(_BEGINS.get(event.state, "closed"), detected)
+def event_line(event: Event, site: Site, labels: Mapping[str, str]) -> Line:
+    """How an event stands; labels by id."""
+    where = event.position
+    x, y = site.frame.to_xy(where.latitude, where.longitude)
+    return {
+        "number": event.number,
+        "kind": event.kind,
+        "x_m": round(x, 2),
+        "y_m": round(y, 2),
+        "latitude_deg": where.latitude,
+        "longitude_deg": where.longitude,
+        "room": site.room_at(x, y),
+        "severity": next(name for least, name in SEVERITIES if event.severity >= least),
+        "severity_value": round(event.severity, 2),
+        "state": str(event.state),
+        "over": not event.open,
+        "since_ms": round(1000 * state_since(event)),
+        "reported_ms": round(1000 * event.times.get("detected", 0.0)),
+        "assigned": [labels.get(name, name) for name in _sent(event)],
+    }
 
 
 def _sent(event: Event) -> Iterator[str]:

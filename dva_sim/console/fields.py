@@ -5,12 +5,14 @@ from __future__ import annotations
 import base64
 import math
 import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from dva_sim.simulation.full.run import Run
-from dva_sim.worlds.hazards import QUANTITIES
+from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.worlds.hazards import QUANTITIES, Surroundings
+from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
 MOST_CELLS = 20_000  # of one field
@@ -23,24 +25,33 @@ class HazardFeed:
     """Where hazards are and how far they reach.
 
     Args:
-        run: Which.
+        site: Where.
+        incidents: The hazards of a run.
+        surroundings: What they make of the air and the floor.
+        contained: When incidents are dealt with [s], by their place in `incidents`.
     """
 
-    def __init__(self, run: Run) -> None:
-        self._run = run
-        west, south, east, north = run.stage.site.extent
+    def __init__(
+        self,
+        site: Site,
+        incidents: Sequence[RunHazard],
+        surroundings: Surroundings,
+        contained: Mapping[int, float],
+    ) -> None:
+        self._incidents, self._surroundings = incidents, surroundings
+        self._contained = contained
+        west, south, east, north = site.extent
         area = max(1.0, (east - west) * (north - south))
         self._cell = max(SMALLEST_CELL, math.ceil(10 * math.sqrt(area / MOST_CELLS)) / 10)
-        kinds = {what for i in run.field.incidents if not i.false_alarm for what in i.hazard.shows}
+        kinds = {what for i in incidents if not i.false_alarm for what in i.hazard.shows}
         self._kinds = [kind for kind in QUANTITIES if kind in kinds]
         self._fields: list[Line] = []
         self._next = 0.0
 
     def line(self, now_ms: int) -> Line:
         """Where they are now."""
-        now, run = now_ms / 1000.0, self._run
-        hazards = []
-        for number, incident in enumerate(run.field.incidents):
+        now, hazards = now_ms / 1000.0, []
+        for number, incident in enumerate(self._incidents):
             if not incident.is_there(now):
                 continue
             hazard = incident.hazard
@@ -52,7 +63,7 @@ class HazardFeed:
                     "y_m": round(hazard.position[1], 2),
                     "radius_m": round(hazard.radius(now), 2),
                     "severity": round(hazard.severity(now), 2),
-                    "contained": number in run.field.contained,
+                    "contained": self._contained.get(number, math.inf) <= now,
                 }
             )
         return {"k": "hazards", "t": now_ms, "hazards": hazards, "fields": self._sampled(now)}
@@ -61,7 +72,7 @@ class HazardFeed:
         """The fields, no more often than their cost allows."""
         begun = time.perf_counter()
         if begun >= self._next:
-            going = [i for i in self._run.field.incidents if i.is_there(now)]
+            going = [i for i in self._incidents if i.is_there(now)]
             kinds = [k for k in self._kinds if any(k in i.hazard.shows for i in going)]
             fields = (self._field(kind, now) for kind in kinds)
             self._fields = [field for field in fields if field is not None]
@@ -70,7 +81,7 @@ class HazardFeed:
         return self._fields
 
     def _field(self, kind: str, now: float) -> Line | None:
-        values, extent, unit = self._run.field.surroundings.raster(kind, now, self._cell)
+        values, extent, unit = self._surroundings.raster(kind, now, self._cell)
         cells = np.clip(values * (255.0 / FULL[kind]), 0.0, 255.0).round().astype(np.uint8)
         if not cells.any():
             return None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from dva_sim.console.audit_keeper import check_target as check_audit_target
 from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.real_links import ConsoleSockets, MakeSockets
 from dva_sim.console.web.addresses import own_address
@@ -20,23 +21,40 @@ DEFAULT, DEFAULT_PORT, PHONES_PORT = "hands-on", 8765, 8766
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConsoleOptions:
-    """What to run, and where it is to be seen.
+class PageOptions:
+    """Where pages are to be seen, and by whom.
 
     Attributes:
-        scenario: By name or path.
-        seed: Decides all luck.
-        changes: Of the scenario, `KEY=VALUE`.
         host: Address to listen on.
         port: 0: any that is free.
         token: Whether the address has to hold a secret.
         phones: Whether phones have an address of their own, by https.
         phones_host: Address to listen on for them.
         phones_port: 0: any that is free.
+        open: Whether a browser is opened, where there is one.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = DEFAULT_PORT
+    token: bool = True
+    phones: bool = False
+    phones_host: str = "0.0.0.0"
+    phones_port: int = PHONES_PORT
+    open: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConsoleOptions(PageOptions):
+    """What to run, and where it is to be seen.
+
+    Attributes:
+        scenario: By name or path.
+        seed: Decides all luck.
+        changes: Of the scenario, `KEY=VALUE`.
         links: `modelled` as in a study, or `real`: sockets, which others may join.
         dva_port: Port of the DVA on real links; 0: any that is free.
-        open: Whether a browser is opened, where there is one.
         record: Recording to be made, if any.
+        audit: File of the audit log; None: one that is gone with the console.
         results: Folder for the tables of what people did, if any.
         keep_motion: Folder for the samples of phones whose person agrees, if any.
         overwrite: What is there may be replaced.
@@ -45,16 +63,10 @@ class ConsoleOptions:
     scenario: str = DEFAULT
     seed: int = 1
     changes: tuple[str, ...] = ()
-    host: str = "127.0.0.1"
-    port: int = DEFAULT_PORT
-    token: bool = True
-    phones: bool = False
-    phones_host: str = "0.0.0.0"
-    phones_port: int = PHONES_PORT
     links: str = "modelled"
     dva_port: int = 0
-    open: bool = True
     record: Path | None = None
+    audit: Path | None = None
     results: Path | None = None
     keep_motion: Path | None = None
     overwrite: bool = False
@@ -112,4 +124,6 @@ class ConsoleOptions:
             raise ConfigError("zeromq.conflate: only on modelled links, since messages have parts")
         if self.record is not None:
             check_target(self.record, self.overwrite)
+        if self.audit is not None:
+            check_audit_target(self.audit)
         return scenario

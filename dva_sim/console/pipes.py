@@ -14,8 +14,9 @@ from contextlib import suppress
 from typing import Any
 
 MOST_WAITING = 64  # lines
-NEWEST_ONLY = frozenset({"pos", "frame", "seat", "rows", "hazards", "events"})
-KEPT = frozenset({"scene", "done", "bye", "contain"})  # lines that are never dropped
+NEWEST_ONLY = frozenset({"pos", "frame", "seat", "rows", "hazards", "events", "devices", "told"})
+DROPPED_FIRST = "log"  # whose numbers tell what is missing
+KEPT = frozenset({"scene", "shelf", "done", "bye", "contain"})  # lines that are never dropped
 MOST_LINE = 1 << 20  # of one that is read [B]
 AT_ONCE = 1 << 16  # that are read [B]
 
@@ -53,11 +54,11 @@ class LineOutbox:
         return self._waiting.popitem(last=False)[1][1]
 
     def _drop_one(self) -> None:
-        for place, (kind, _) in self._waiting.items():
-            if kind not in KEPT:
-                del self._waiting[place]
-                self.dropped += 1
-                return
+        lost = [place for place, (kind, _) in self._waiting.items() if kind not in KEPT]
+        logs = [place for place in lost if self._waiting[place][0] == DROPPED_FIRST]
+        for place in (logs or lost)[:1]:
+            del self._waiting[place]
+            self.dropped += 1
 
 
 class LinePipe:

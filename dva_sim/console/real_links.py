@@ -8,6 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.safety_checks import SafetyAudit
@@ -24,6 +26,13 @@ TITLE = "the links are real: they are what the network of this machine makes the
 MakeSockets = Callable[[Scenario, PacedClock, ConsoleRecorder], "ConsoleSockets"]
 
 
+def start_of_day(clock: Clock) -> tuple[float, bool]:
+    """When a clock was at zero, by the clock on the wall [s since midnight]; exactly."""
+    started = time.time() - clock.now
+    local = time.localtime(started)
+    return local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec + started % 1.0, True
+
+
 class ConsoleSockets:
     """The sockets of all devices of a console; each has two ports of its own.
 
@@ -33,6 +42,7 @@ class ConsoleSockets:
         recorder: Told what goes wrong, and of each message.
         host: Address of this machine to listen on.
         port: Of the DVA's requests; its publications have the next one. 0: any two that are free.
+        ring: Keys of the devices; None to run without.
 
     Attributes:
         dva: Where the DVA listens, once it does.
@@ -45,10 +55,11 @@ class ConsoleSockets:
         recorder: ConsoleRecorder,
         host: str = "127.0.0.1",
         port: int = 0,
+        ring: KeyRing | None = None,
     ) -> None:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
         self.dva = ""
-        self.network = SocketNetwork(clock, None, self._tell, scenario.zeromq)
+        self.network = SocketNetwork(clock, ring, self._tell, scenario.zeromq)
 
     def _tell(self, line: str) -> None:
         self._recorder.tell(self._clock.now, "console", line, "link")
@@ -68,9 +79,7 @@ class ConsoleSockets:
 
     def time_of_day(self) -> tuple[float, bool]:
         """See `RealLinks`: by the clock on the wall."""
-        started = time.time() - self._clock.now
-        local = time.localtime(started)
-        return local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec + started % 1.0, True
+        return start_of_day(self._clock)
 
     def watch(self, audit: SafetyAudit) -> None:
         """See `RealLinks`: all devices of ours are in this process, so each message is seen."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Callable, Container
 from typing import Any
 
 from dva_sim.kernel.recorder import DriveLog, Recorder
-from dva_sim.live.recording import LiveRecorder
+from dva_sim.live.recording import LiveRecorder, event_facts
 from dva_sim.simulation.full.run import FILM_PERIOD, Run
 
 KEPT = 200  # of each list of a drive, and of ended drives nothing but the last
 KEPT_DRIVES = 20
 KEPT_COMMANDS = 2000  # on their way
+KEPT_MESSAGES = 2000  # to robots, on their way
 
 Note = Callable[[DriveLog], object]
 
@@ -25,6 +27,7 @@ class ConsoleRecorder(Recorder):
     Attributes:
         on_applied: Told of each drive that has had a command take effect.
         kept: Takes lines for a recording, if there is to be one.
+        robots: Ids of those of whom it is noted when a message to them was sent.
     """
 
     def __init__(self, measured: bool = False) -> None:
@@ -32,6 +35,8 @@ class ConsoleRecorder(Recorder):
         self._measured = measured
         self.on_applied: Note = lambda _: None
         self.kept: LiveRecorder | None = None
+        self.robots: Container[str] = ()
+        self._sent: OrderedDict[bytes, float] = OrderedDict()
         self._numbers: dict[int, int] = {}
         self._known = 0
         self._done: dict[int, list[float]] = {}  # up to when a drive was kept [s]
@@ -52,8 +57,16 @@ class ConsoleRecorder(Recorder):
     ) -> None:
         """See `Recorder`."""
         super().message_sent(time, source, destination, size, payload)
+        if destination in self.robots and isinstance(payload, bytes):
+            self._sent.setdefault(payload, time)  # one sent again counts from the first time on
+            if len(self._sent) > KEPT_MESSAGES:
+                self._sent.popitem(last=False)
         if self.kept is not None:
             self.kept.message(source, payload, sent=True)
+
+    def sent_at(self, payload: bytes) -> float | None:
+        """When a message to a robot was sent [s]; asked once. None: by nobody of this process."""
+        return self._sent.pop(payload, None)
 
     def message_taken(self, node: str, payload: bytes) -> None:
         """A device of ours takes a message over a real link: one of others is kept."""
@@ -120,9 +133,7 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
             kept.put_new("contains", number, when, key=f"contained {number}")
         book = run.dva.desk.book
         for e in (*book.closed.values(), *book.open.values()):
-            at = [e.position.latitude, e.position.longitude]
-            told = e.number, e.kind, at, e.state.value, dict(e.times)
-            kept.put_new("event", *told, key=f"event {e.number}")
+            kept.put_new("event", *event_facts(e), key=f"event {e.number}")
 
     facts()
     clock.every(FILM_PERIOD, sample)

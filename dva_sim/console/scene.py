@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from dva_sim.console import link
 from dva_sim.console.lag import LIMIT
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures import colours
-from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.maps import OCCUPIED
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_export import features_of
@@ -29,9 +31,25 @@ RULES = {
 }
 
 
-def scene_of(run: Run, things: list[Line], name: str, seed: int) -> Line:
-    """The first line that a page gets."""
-    scenario, site = run.scenario, run.stage.site
+def scene_of(
+    scenario: Scenario,
+    site: Site,
+    incidents: Sequence[RunHazard],
+    things: list[Line],
+    *,
+    name: str,
+    seed: int,
+) -> Line:
+    """The first line that a page gets.
+
+    Args:
+        scenario: What is run.
+        site: Where.
+        incidents: Its hazards.
+        things: Everybody, with their numbers.
+        name: Of the scenario.
+        seed: Of the run.
+    """
     return {
         "k": "scene",
         "t": 0,
@@ -47,7 +65,7 @@ def scene_of(run: Run, things: list[Line], name: str, seed: int) -> Line:
         "stale_s": scenario.robot.max_age_s,
         "lag_limit_s": LIMIT,
         "rules": RULES,
-        "legend": legend(run),
+        "legend": legend(incidents),
     }
 
 
@@ -135,7 +153,7 @@ def _to_degrees(site: Site, shape: Any) -> Line:
     return dict(mapping(shapely.LineString(there) if ring else there))
 
 
-def legend(run: Run) -> list[Line]:
+def legend(incidents: Sequence[RunHazard]) -> list[Line]:
     """What the colours and marks of a map mean."""
     kinds = [
         {"kind": kind, "mode": mode, "colour": colour}
@@ -146,7 +164,7 @@ def legend(run: Run) -> list[Line]:
         for mode, colour in modes.items()
     ]
     bodies = [{"kind": kind, "colour": colour} for kind, colour in colours.KINDS.items()]
-    hazards = {i.kind: i.hazard for i in run.field.incidents}
+    hazards = {i.kind: i.hazard for i in incidents}
     marks = [
         {"kind": kind, "title": hazard.title, "colour": hazard.colour, "mark": hazard.mark}
         for kind, hazard in hazards.items()

@@ -111,14 +111,14 @@ class SeatLines:
 
     def _drive(self, held: HeldRobot) -> Line:
         run, log = self._run, held.log
-        robot, reach = run.field.robots[held.robot], run.stage.reach(held.robot)
+        robot, reach = run.field.robots.get(held.robot), run.stage.reach(held.robot)
         acted = self._acted.get(held.robot, {})
         frame = held.frame
         told: Line = {
-            "i": self._feed.numbers[held.robot],
+            "i": self._feed.numbers.get(held.robot),  # of a robot from elsewhere there is none
             "pattern": self._feed.pattern_of(held.robot),
             "phase": held.phase,
-            "mode": robot.controller.mode.value,
+            "mode": "" if robot is None else robot.controller.mode.value,
             "session": held.session,
             "wanted": [
                 round(held.last.speed * reach.speed, 3),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from dva_sim.agents.operator.attention import OperatorSetup
@@ -19,13 +19,15 @@ class LinkSliders:
 
     Args:
         run: Whose.
+        set_usual: Told how long a message usually takes the computer of a robot, by its id [s].
 
     Attributes:
         link: As it is now.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, set_usual: Callable[[str, float], object]) -> None:
         self._run, self.link = run, run.scenario.link
+        self._set_usual = set_usual
         self._wanted: dict[str, float] = {}
 
     def line(self) -> dict[str, Any]:
@@ -72,8 +74,8 @@ class LinkSliders:
         return told, scenario
 
     def _change_processing(self, seconds: float) -> None:
-        for robot in self._run.field.robots.values():
-            robot.inbox.service = lambda: seconds
+        for robot in self._run.field.robots:
+            self._set_usual(robot, seconds)
         self._run.audit.expect(seconds)
 
 

@@ -6,8 +6,9 @@ One thread does everything, and waits for nobody: lines to other processes go in
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from dva_sim.agents.observation import Cameras
@@ -15,19 +16,31 @@ from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.alarm_desk import AlarmDesk
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audited import Audited
+from dva_sim.console.decisions import about_event
+from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
+from dva_sim.console.logs import PERIOD, Logs
 from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.console.robot_windows import RobotWindows
+from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
+from dva_sim.console.stands import why_stands
+from dva_sim.console.strangers import Strangers
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
+from dva_sim.recordings.audit_log import AuditRow, plain_row
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario, phone_profile
@@ -37,7 +50,14 @@ Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
-POSITIONS, ROWS, HAZARDS, TIDY = 0.1, 0.5, 1.0, 1.0  # from one line to the next, real time [s]
+POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = (
+    0.1,
+    0.1,
+    0.5,
+    1.0,
+    1.0,
+    1.0,
+)  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
@@ -56,6 +76,9 @@ class ConsoleWorld:
         clock: Virtual time, at its pace.
         sockets: What carries the messages, if the links are real.
         run: The run.
+        logs: What devices are asked, and answer.
+        windows: Those of the robots.
+        dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
 
@@ -86,10 +109,11 @@ class ConsoleWorld:
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed, self.lag = Feed(self.run), LagRule()
+        self.feed, self.lag = Feed(self.run, self.run.dva.desk.book), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Tell = lambda *_: None
-        self.sliders = LinkSliders(self.run)
+        self.windows = self._windows()
+        self.sliders = LinkSliders(self.run, self.windows.set_usual)
         self.dropped: Callable[[], int] = lambda: 0
         self._console = Console(
             setup=setup_of(self.run.stage, scenario),
@@ -112,11 +136,43 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.strangers = Strangers(self.run, self.feed)
+        self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
+        self.alarms = AlarmDesk(self.run)
+        self.audited: Audited | None = None
+        self._events: list[Line] = []
+        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
-        self.hazards = HazardFeed(self.run)
+        field = self.run.field
+        self.hazards = HazardFeed(
+            self.run.stage.site, field.incidents, field.surroundings, field.contained
+        )
+        self.logs = Logs(self.run.network, self._node_of)
+        self.logs.keep("dva")
+        for id_tag, robot in field.robots.items():
+            hears = partial(self.windows.heard, id_tag)
+            self.logs.listen(robot.device.label, hears, publications=True)
         self._newest: dict[str, Any] = {}
         self.clock.on_late = self._late
         self.hold: Callable[[str], object] = lambda _: None
+
+    def _windows(self) -> RobotWindows:
+        """The robots' windows; a reply that is dropped is told to the audit, like any that goes."""
+        run, recorder = self.run, self.recorder
+        recorder.robots = run.field.robots.keys()
+
+        def lost(robot: str, reply: bytes) -> None:
+            run.audit.sent(run.clock.now, robot, "", reply)
+
+        about = self.feed.numbers, run.stage.labels
+        windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
+        for id_tag in run.field.robots:
+            self.feed.things[self.feed.numbers[id_tag]] |= windows.about(id_tag)
+        return windows
+
+    def deafen(self, robot: str, on: bool) -> None:
+        """The audit is told that a robot hears nothing, or hears again."""
+        (self.run.audit.deaf.add if on else self.run.audit.deaf.discard)(robot)
 
     def serve_cameras(self, base: str) -> None:
         """The robots' pictures are to be had below this URL from now on."""
@@ -125,16 +181,32 @@ class ConsoleWorld:
 
     def begin(self) -> None:
         """Tell the scene, and from then on what changes."""
-        scene = scene_of(self.run, self.feed.things, self.name, self.seed)
-        scene["link"] = self.sliders.line()
-        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
-        self.tell(scene)
+        self.tell_scene()
         self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(WINDOWS, self._tell_windows)
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(DEVICES, self._tell_devices)
         self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def tell_scene(self) -> None:
+        """Tell what does not change, but for where the DVA listens."""
+        run = self.run
+        scene = scene_of(
+            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            name=self.name,
+            seed=self.seed,
+        )
+        scene["link"] = self.sliders.line()
+        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
+        self.tell(scene)
+
+    def _dva_moved(self, address: str) -> None:
+        self.phones.address = address
+        self.tell_scene()
 
     def show_scene(self) -> None:
         """Tell whoever draws, from the beginning, what there is to be seen."""
@@ -142,6 +214,49 @@ class ConsoleWorld:
         self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
         for number, when in self.run.field.contained.items():
             self.show({"k": "contain", "t": round(1000 * when), "n": number})
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
+
+    # --- who did what ------------------------------------------------------------------------
+
+    def keep_audit(self, keeper: AuditKeeper) -> None:
+        """Keep what people do, and what the DVA decides, from now on."""
+        self.audited = Audited(keeper, self.author, self._named)
+        self.run.dva.on_fact = self.audited.decided
+        keeper.on_rows = self._audit_written
+        self.clock.watch(keeper.fileno(), keeper.take)
+
+    def _audit_written(self, rows: Sequence[AuditRow]) -> None:
+        if self.recorder.kept is not None:
+            for row in rows:
+                self.recorder.kept.put("audited", plain_row(row))
+
+    def _tell_audit(self) -> None:
+        if self.audited is None:
+            return
+        keeper = self.audited.keeper
+        line = {"k": "audit", "t": self.feed.now_ms, "rows": keeper.number, "hash": keeper.head}
+        line |= {"problem": keeper.problem, "lasting": keeper.is_lasting}
+        self._tell_new(line | {"file": str(keeper.path) if keeper.is_lasting else ""}, but="t")
+
+    def author(self, client: str) -> str:
+        """What the person of a page is called."""
+        if room := self.rooms.label(client):
+            return room
+        if (guard := self.guards.by_client.get(client)) is not None:
+            return guard.device.label
+        seat = next((n for n, who in self.client_of.items() if who == client), None)
+        if seat is not None:
+            return self._persons[seat].device.label
+        return f"page {client.partition('-')[0]}" if client != "rest" else "program"
+
+    def _named(self, device: str) -> str:
+        """The name of a device by its id, or of things by their numbers."""
+        names = {str(thing["i"]): thing["label"] for thing in self.feed.things}
+        found = [names.get(one, one) for one in device.split(", ")] if device else []
+        return self.run.stage.labels.get(device, ", ".join(found))
 
     @property
     def persons(self) -> list[PersonAgent]:
@@ -186,26 +301,54 @@ class ConsoleWorld:
         }
 
     def _tell_positions(self) -> None:
-        self._tell_new(self.feed.positions(), but="t")
+        line = self.feed.positions()
+        line["p"] += self.strangers.positions()
+        self._tell_new(line, but="t")
 
     def _tell_rows(self) -> None:
+        if self.strangers.come():
+            self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
-        rows = {
+        rows: Line = {
             "k": "rows",
             "t": self.feed.now_ms,
             "clock": self.clock_line(),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
-            "robots": self.feed.robots(self.lag.held),
+            "server": self.dva.port.line(),
+            "robots": [*self.feed.robots(self.lag.held), *self.strangers.robots()],
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
         }
         self.tell(rows)
+        self._tell_alarms(rows["robots"])
 
     def tell_now(self) -> None:
         """Something has changed that nobody shall wait for."""
         self._tell_rows()
         self._tell_seats()
+        self._tell_audit()
+
+    def _tell_windows(self) -> None:
+        def stands(robot: RobotAgent) -> str:
+            return why_stands(robot, self.clock.now, self.lag.held)
+
+        for line in self.windows.lines(self.screens.watched, stands):
+            self._tell_new(line, but="t", key=str(line["i"]))
+
+    def _tell_devices(self) -> None:
+        line = self.dva.devices(self.feed.now_ms)
+        if line is not None:
+            self.tell(line)
+
+    def _tell_logs(self) -> None:
+        for line in self.logs.batches():
+            self.tell(line)
+
+    def _node_of(self, label: str) -> str | None:
+        """The id of a device of the run by its label."""
+        devices = self.run.stage.devices
+        return next((device.id_tag for device in devices if device.label == label), None)
 
     def _tell_hazards(self) -> None:
         self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
@@ -219,7 +362,7 @@ class ConsoleWorld:
 
     def _tell_news(self) -> None:
         """Events, story and seats, as soon as they change; rows when a mode or holder does."""
-        self._tell_new(self.feed.events(), but="t")
+        self._tell_events()
         for line in self.feed.story():
             self.tell(line)
         robots = self.run.field.robots.values()
@@ -228,6 +371,21 @@ class ConsoleWorld:
             self._newest["modes"] = modes
             self._tell_rows()
         self._tell_seats()
+        self._tell_audit()
+
+    def _tell_events(self) -> None:
+        """Events with what was decided on them, and who decides."""
+        line = self.feed.events()
+        told = self.rooms.listener
+        self._events = line["events"] = [
+            event | about_event(told.events, told.told_at, event["number"])
+            for event in line["events"]
+        ]
+        self._tell_new(line, but="t")
+        self._tell_new(self.rooms.line(self.feed.now_ms), but="t")
+
+    def _tell_alarms(self, robots: list[Line]) -> None:
+        self._tell_new(self.alarms.look(self._events, robots, self.feed.now_ms), but="t")
 
     def _tell_seats(self) -> None:
         for client, line in (*self.seat_lines.lines(), *self.guards.lines()):
@@ -286,7 +444,7 @@ class ConsoleWorld:
         if self.lag.measured(time.monotonic(), behind):
             why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
             self.hold(why)
-            self.recorder.tell(self.clock.now, "console", why, "link")
+            self.note(why)
 
     # --- the link --------------------------------------------------------------------------
 

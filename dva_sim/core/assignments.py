@@ -84,6 +84,7 @@ class Rules:
             position so near the event [m].
         bid_within: How long bids are taken [s].
         operator_span: How many robots one operator may have in hand at once.
+        decide_within: How long the policy waits for a person, where it asks first [s].
         declined_pause: Who declines an order, or is not reached, is not asked again for [s].
     """
 
@@ -98,6 +99,7 @@ class Rules:
     arrived_within: float = math.inf
     bid_within: float = 2.0
     operator_span: int = 1
+    decide_within: float = 60.0
     declined_pause: float = 10.0
 
 

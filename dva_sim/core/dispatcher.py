@@ -5,6 +5,7 @@ Robots that go their rounds while nothing happens are sent by the DVA itself (`P
 
 from __future__ import annotations
 
+import copy
 import math
 import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 
 from dva_sim.core.assignments import Assignments
 from dva_sim.core.auctions import Auctions
+from dva_sim.core.audit import Fact
 from dva_sim.core.dispatch import MinEta
 from dva_sim.core.dispatch.situation import (
     Advice,
@@ -23,9 +25,11 @@ from dva_sim.core.dispatch.situation import (
     Relocation,
     Situation,
 )
-from dva_sim.core.events import State
+from dva_sim.core.events import Event, State
 from dva_sim.core.orders import Orders
-from dva_sim.core.registry import ROBOT, DeviceEntry, Registry
+from dva_sim.core.questions import Questions
+from dva_sim.core.registry import CONTROL_ROOM, ROBOT, DeviceEntry, Registry
+from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.core.situation_builder import PolicyView, SituationBuilder, same_place
 from dva_sim.core.travel_times import SiteKnowledge, Travel
@@ -33,6 +37,21 @@ from dva_sim.kernel.plugins import FAILURES
 from dva_sim.protocol import messages as m
 
 DECISIONS = 4  # in a row, where one makes the next necessary
+
+
+@dataclass(frozen=True, slots=True)
+class Advised:
+    """What the policy would do about an event: whom it would send, to do what.
+
+    Attributes:
+        device: Id of the guard or robot.
+        task: `confirm`, `contain` or `stand_by`.
+        arrival_in: When that would be there, as expected [s from now].
+    """
+
+    device: str
+    task: str
+    arrival_in: float
 
 
 class Dispatcher:
@@ -44,10 +63,13 @@ class Dispatcher:
         orders: Gives the orders.
         rng: Luck of policies that use it.
         ground: What is known of the place.
+        roles: What control rooms may do.
+        name: What the policy is called.
 
     Attributes:
         auctions: Who has bid what.
         situations: Gathers what the policy is shown.
+        questions: What the policy asks a person first.
         last_failure: What the policy did wrong last, in words.
     """
 
@@ -58,8 +80,12 @@ class Dispatcher:
         orders: Orders,
         rng: np.random.Generator,
         ground: SiteKnowledge,
+        roles: Roles,
+        name: str = "",
     ) -> None:
-        self.policy, self.orders = policy, orders
+        self.policy, self.orders, self.roles = policy, orders, roles
+        self.name = (name or type(policy).__name__)[:64]
+        self.questions = Questions(orders.rules.decide_within)
         self.auctions = Auctions(orders.rules.bid_within)
         self.situations = SituationBuilder(policy, travel, orders, ground, self.auctions)
         self.last_failure = ""
@@ -81,19 +107,49 @@ class Dispatcher:
         self.auctions.close(self.orders.book, now)
         return sends
 
-    def _decide(self, now: float) -> list[Send]:
-        view = self.situations.look(now)
-        return [] if view is None else self._carry_out(self._advice(view.situation), view, now)
+    def next_deadline(self) -> float:
+        """When something has waited too long for an answer [s]."""
+        return min(self.auctions.next_deadline(), self.questions.next_deadline())
 
-    def _advice(self, situation: Situation) -> Sequence[Advice]:
+    def advised(self, event: Event, now: float) -> Advised | None:
+        """What the policy would do about an event now, or has done; None: nothing."""
+        if (question := self.questions.of(event.number)) is not None:
+            return Advised(question.device, question.task, max(0.0, question.expected - now))
+        view = self.situations.look(now)
+        if view is not None and event in view.events:
+            rng = copy.deepcopy(self._rng)  # who only asks changes nobody's luck
+            for piece in self._advice(view.situation, rng):
+                if isinstance(piece, Assignment) and view.events[piece.task] is event:
+                    way = float(view.situation.eta[piece.task, piece.responder])
+                    device = view.team.entries[piece.responder].device.id_tag
+                    return Advised(device, _task_of(piece, view), way)
+        return self._sent_by_itself(event, now)
+
+    def _sent_by_itself(self, event: Event, now: float) -> Advised | None:
+        handling = event.handling
+        device = handling.advised
+        if not device or device not in (event.responder, event.actor):
+            return None
+        task = "confirm" if device == event.responder else "contain"
+        return Advised(device, task, handling.arrival_in(device, now) or 0.0)
+
+    def _decide(self, now: float) -> list[Send]:
+        view, sends = self.situations.look(now), list[Send]()
+        if view is not None:
+            sends = self._carry_out(self._advice(view.situation, self._rng), view, now)
+        for event in self.questions.settle():
+            self.orders.book.touch(event)
+        return sends
+
+    def _advice(self, situation: Situation, rng: np.random.Generator) -> Sequence[Advice]:
         """The policy's, if it makes sense; else the default's."""
         try:
-            advice = list(self.policy.advise(situation, self._rng))
+            advice = list(self.policy.advise(situation, rng))
             _check_form(advice, situation)
         except FAILURES as error:
             self.orders.counters["policy failed"] += 1
             self.last_failure = f"{type(error).__name__}: {error}"
-            return self._default.advise(situation, self._rng)
+            return self._default.advise(situation, rng)
         return advice
 
     def _carry_out(self, advice: Sequence[Advice], view: PolicyView, now: float) -> list[Send]:
@@ -131,6 +187,8 @@ class Dispatcher:
             return None
         if former is not None and not self.orders.may_preempt(former, now):
             return None
+        if self._waits_for_a_person(choice, view, now):
+            return []
         pilot = None
         if entry.device.device_type == ROBOT:
             if former is None and not view.team.operators:
@@ -138,11 +196,52 @@ class Dispatcher:
             pilot = former.operator if former else view.team.operators.pop(0).device.id_tag
         sends = self.orders.redirect(former, now) if former else []
         responder = entry.device.id_tag
+        self._note(event, choice, view, now)
         self.situations.forget_move(responder)
         if task.stage == "contain":
             return [*sends, self.orders.act(event, responder, now)]
         award = self.auctions.award(event.number, responder)
         return [*sends, self.orders.confirm(event, responder, pilot, now, award)]
+
+    def _waits_for_a_person(self, choice: Assignment, view: PolicyView, now: float) -> bool:
+        """Whether a person is asked first, and still has time."""
+        if not self.questions.asks or not self.somebody_decides():
+            return False
+        event, device = view.events[choice.task], view.team.entries[choice.responder].device
+        way = float(view.situation.eta[choice.task, choice.responder])
+        return self.questions.ask(event, _task_of(choice, view), device.id_tag, way, now)
+
+    def somebody_decides(self) -> bool:
+        """Whether a control room is there whose people may decide."""
+        rooms = self.orders.registry.of_type(CONTROL_ROOM)
+        least = ControlRoomRole.DISPATCH
+        return any(self.roles.of(room.device.id_tag).includes(least) for room in rooms)
+
+    def _note(self, event: Event, choice: Assignment, view: PolicyView, now: float) -> None:
+        """The policy has decided: a fact, and what people are compared with later."""
+        orders = self.orders
+        if not orders.trail.keeps:
+            return
+        device = view.team.entries[choice.responder].device.id_tag
+        way = float(view.situation.eta[choice.task, choice.responder])
+        event.handling.advised, event.handling.expected[device] = device, (now, way)
+        asked = self.questions.asks and self.somebody_decides()
+        why = f"nobody has decided within {self.questions.within:g} s" if asked else ""
+        fact = Fact(
+            time=now,
+            author=orders.sessions.permissions.own,
+            label=self.name,
+            action="assign",
+            event=event.number,
+            device=device,
+            task=_task_of(choice, view),
+            arrival_in=way,
+            cause=why,
+            advised=device,
+            advised_in=way,
+            waited=now - event.times["detected"],
+        )
+        orders.decided(event, fact)
 
     def _announce(self, offer: Announcement, view: PolicyView, now: float) -> list[Send] | None:
         """Ask every idle responder that could go there for a bid."""
@@ -174,6 +273,14 @@ class Dispatcher:
         self.situations.sends_to_wait(entry.device.id_tag, move.station, eta, now)
         self.orders.counters["relocated"] += 1
         return [Send(entry.device.id_tag, m.Relocation(place))]
+
+
+def _task_of(choice: Assignment, view: PolicyView) -> str:
+    """What is to be done, in the words of an order."""
+    task = view.situation.tasks[choice.task]
+    if task.stage == "confirm":
+        return "confirm"
+    return "contain" if view.events[choice.task].state is State.CONFIRMED else "stand_by"
 
 
 def _is_to_look(send: Send) -> bool:

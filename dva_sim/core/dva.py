@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 
 from dva_sim.core.assignments import Rules
+from dva_sim.core.control_rooms import ControlRooms
+from dva_sim.core.device_list import DeviceLister
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dispatcher import Dispatcher, Patrols
 from dva_sim.core.events import Event, EventBook, State, apart
 from dva_sim.core.handovers import Handovers
 from dva_sim.core.orders import Orders
 from dva_sim.core.permissions import Access
-from dva_sim.core.registry import GUARD, OPERATOR, REMOTE, ROBOT, DeviceEntry, Registry
+from dva_sim.core.registry import (
+    CONTROL_ROOM,
+    ROBOT,
+    DeviceEntry,
+    Registry,
+)
+from dva_sim.core.roles import ControlRoomRole, Roles
 from dva_sim.core.sensing import CONFIDENCE, SEVERITY, Sensing, is_no_news, only_felt, within_reach
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Travel
 from dva_sim.protocol import messages as m
-
-LIST_BYTES = 7000  # of a device list, the rest of the message apart [B]
-DEVICE_BYTES = 175  # of one device without its label, at most [B]
-MOST_LISTED = 64
+from dva_sim.protocol.control_room import ControlRoomBody
 
 Reaction = tuple[m.Reply, list[Send]]
 
@@ -42,13 +46,19 @@ class Dva:
         access: Who may ask for what.
         patrols: Which robots go round while nothing happens.
         sensing: Which sensors of robots the DVA heeds.
-        supervisors: Ids of the devices that may take a robot from its holder.
+        supervisors: Ids of the operators that may take a robot from its holder.
+        roles: What each control room may do.
+        ask_first: Whether the policy asks a person before it sends anybody.
+        policy_name: What the policy is called.
+        audit: Whether facts are kept of what is decided.
 
     Attributes:
         registry: Who is there.
         book: What happens.
         orders: Who has to do what.
         dispatcher: Decides who goes.
+        control_rooms: Answers those where people decide.
+        trail: What was decided, to be taken by whoever keeps it.
         counters: How often what happened.
         refused: Messages that were refused.
     """
@@ -66,17 +76,33 @@ class Dva:
         patrols: Patrols | None = None,
         sensing: Sensing | None = None,
         supervisors: frozenset[str] = frozenset(),
+        roles: Roles | None = None,
+        ask_first: bool = False,
+        policy_name: str = "",
+        audit: bool = True,
     ) -> None:
         self.sessions, self.access = sessions, access or Access()
         self.registry, self.book = Registry(), EventBook(rules.merge_distance)
         self.orders = Orders(rules, self.registry, self.book, sessions)
-        self.dispatcher = Dispatcher(policy, travel, self.orders, rng, ground or SiteKnowledge())
+        self.trail, self.roles = self.orders.trail, roles or Roles()
+        self.trail.keeps = audit
+        self.dispatcher = Dispatcher(
+            policy,
+            travel,
+            self.orders,
+            rng,
+            ground or SiteKnowledge(),
+            self.roles,
+            policy_name,
+        )
+        self.dispatcher.questions.asks = ask_first
         self.sensing = sensing or Sensing()
         self.handovers = Handovers(self.orders, supervisors)
+        self.control_rooms = ControlRooms(self.dispatcher, self.handovers, self.roles, self.access)
         self.counters: Counter[str] = self.orders.counters
         self.refused = 0
         self._rules, self._patrols = rules, patrols or Patrols()
-        self._list: tuple[int, tuple[m.Device, ...]] = (-1, ())
+        self._devices = DeviceLister(self.registry)
         self._access_ends = self.access.next_end(-1.0)
 
     # --- what comes in -----------------------------------------------------------------
@@ -169,7 +195,7 @@ class Dva:
         """
         return min(
             self.orders.next_deadline(),
-            self.dispatcher.auctions.next_deadline(),
+            self.dispatcher.next_deadline(),
             self.registry.next_silence(),
             self._access_ends,
             self.sensing.next_due(),
@@ -179,6 +205,14 @@ class Dva:
     def go_on(self) -> list[Send]:
         """What to say again after what an earlier life knew was recalled."""
         return self._and_revocations(self.orders.again())
+
+    def dismiss(self, device: str, now: float) -> list[Send]:
+        """A device is to be there no more: what it held is free, and it is forgotten at once."""
+        if device not in self.registry.entries:
+            return []
+        sends = self._gone(device, now)
+        self._forget(device)
+        return self._and_revocations(sends)
 
     def close(self) -> list[Send]:
         """The DVA closes: all sessions are over."""
@@ -195,7 +229,7 @@ class Dva:
             return self._refuse(message, m.NOT_REGISTERED, text)
         match body:
             case m.EventReport():
-                return self._report(message, body, now)
+                return self._report(message, entry, body, now)
             case m.OrderProgress():
                 return self._progress(message, body, now)
             case m.TaskBid():
@@ -203,16 +237,27 @@ class Dva:
             case m.PermissionRequest():
                 return self._permission(message, entry, body, now)
             case m.PermissionRevocation():
-                return self._give_back(message, body)
+                return self._give_back(message, entry, body, now)
             case m.GetGrant():
                 return self._grant_of(message, entry, body)
             case m.GetDeviceList():
-                return self._ok(message, [], m.DeviceList(self._shown()))
+                return self._ok(message, [], self._devices.listed())
             case m.GetSensorInfo():
                 return self._sensors(message, body)
+            case _ if isinstance(body, ControlRoomBody):
+                return self._dispatch(message, entry, body, now)
             case _:
                 name = type(body).__name__
                 return self._refuse(message, m.NOT_SUPPORTED, f"{name} is not for the DVA")
+
+    def _dispatch(
+        self, message: m.Message, entry: DeviceEntry, body: ControlRoomBody, now: float
+    ) -> Reaction:
+        """What a control room asks, or decides."""
+        answer = self.control_rooms.answer(body, entry.device, now)
+        self.refused += answer.code != m.OK
+        text = answer.text[:256]
+        return m.Reply(message.message_id, answer.code, text, answer.content), list(answer.sends)
 
     def _and_revocations(self, sends: list[Send]) -> list[Send]:
         """What to send, after the word that sessions are over."""
@@ -281,9 +326,22 @@ class Dva:
     def _permission(
         self, message: m.Message, asker: DeviceEntry, body: m.PermissionRequest, now: float
     ) -> Reaction:
+        reply, sends = self._permitted(message, asker, body, now)
+        in_use = body.takeover == "force" or asker.device.device_type == CONTROL_ROOM
+        if in_use and body.level != "sensors":
+            self.control_rooms.asked_for_robot(asker.device, body, reply, now)
+        return reply, sends
+
+    def _permitted(
+        self, message: m.Message, asker: DeviceEntry, body: m.PermissionRequest, now: float
+    ) -> Reaction:
         robot = self.registry.entries.get(body.device)
         if robot is None or robot.device.device_type != ROBOT:
             return self._refuse(message, m.UNKNOWN_DEVICE, f"no robot {body.device}")
+        if asker.device.device_type == CONTROL_ROOM and body.level != "sensors":
+            need = ControlRoomRole.DRIVE
+            if (text := self.control_rooms.may(asker.device, need, "take a robot")) is not None:
+                return self._refuse(message, m.NOT_PERMITTED, text)
         if not self.access.allows(asker.device, robot.device, body.level, now):
             text = f"{asker.device.label} may not have {body.level} of {robot.device.label}"
             return self._refuse(message, m.NOT_PERMITTED, text)
@@ -315,7 +373,7 @@ class Dva:
         now: float,
     ) -> Reaction:
         """Somebody else has the robot: who asks is told who, and may ask that one for it."""
-        if body.takeover == "force" and asker.id_tag not in self.handovers.supervisors:
+        if body.takeover == "force" and not self._may_force(asker):
             text = f"{asker.label} is no supervisor"
             return self._refuse(message, m.NOT_PERMITTED, text)
         step, sends = self.handovers.wish(body, asker, holder, now)
@@ -324,6 +382,12 @@ class Dva:
         sends = sends + self.dispatcher.decide(now) if body.takeover == "force" else sends
         self.refused += 1
         return m.Reply(message.message_id, m.BUSY, text, told), sends
+
+    def _may_force(self, asker: m.Device) -> bool:
+        """Whether a device may take a robot from its holder."""
+        if asker.device_type == CONTROL_ROOM:
+            return self.roles.of(asker.id_tag).includes(ControlRoomRole.SUPERVISE)
+        return asker.id_tag in self.handovers.supervisors
 
     def _sensors(self, message: m.Message, body: m.GetSensorInfo) -> Reaction:
         """What a robot can show, or all of them; they are asked when somebody first asks."""
@@ -337,10 +401,14 @@ class Dva:
             return m.Reply(message.message_id, m.BUSY, text), sends
         return self._ok(message, sends, content)
 
-    def _give_back(self, message: m.Message, body: m.PermissionRevocation) -> Reaction:
+    def _give_back(
+        self, message: m.Message, entry: DeviceEntry, body: m.PermissionRevocation, now: float
+    ) -> Reaction:
         """A holder needs its permission no longer; only its own."""
         if body.holder != message.source or not self.sessions.give_back(body):
             return self._refuse(message, m.BAD_SESSION, "that session is not yours, or is over")
+        if entry.device.device_type == CONTROL_ROOM:
+            self.control_rooms.gave_back(entry.device, body.device, now)
         return self._ok(message, [])
 
     def _grant_of(self, message: m.Message, asker: DeviceEntry, body: m.GetGrant) -> Reaction:
@@ -367,9 +435,11 @@ class Dva:
 
     # --- what happens ------------------------------------------------------------------
 
-    def _report(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
+    def _report(
+        self, message: m.Message, entry: DeviceEntry, body: m.EventReport, now: float
+    ) -> Reaction:
         if body.event_id is None:
-            return self._sighting(message, body, now)
+            return self._raised(message, entry, body, now)
         event = self.book.get(body.event_id)
         if event is None:
             return self._refuse(message, m.UNKNOWN_EVENT, f"no event {body.event_id}")
@@ -379,6 +449,20 @@ class Dva:
         if event.waits_for is not None:
             sends = sends + self.dispatcher.decide(now)
         return self._ok(message, sends)
+
+    def _raised(
+        self, message: m.Message, entry: DeviceEntry, body: m.EventReport, now: float
+    ) -> Reaction:
+        """Somebody reports what has no number yet; a control room as its role allows."""
+        if entry.device.device_type != CONTROL_ROOM:
+            return self._sighting(message, body, now)
+        need = ControlRoomRole.DRIVE
+        if (text := self.control_rooms.may(entry.device, need, "report an event")) is not None:
+            return self._refuse(message, m.NOT_PERMITTED, text)
+        reply, sends = self._sighting(message, body, now)
+        if (event := self.book.near(body.kind, body.position)) is not None:
+            self.control_rooms.raised(event, entry.device, now)
+        return reply, sends
 
     def _sighting(self, message: m.Message, body: m.EventReport, now: float) -> Reaction:
         """Somebody who was not sent sees something, or sees it no longer."""
@@ -411,7 +495,7 @@ class Dva:
                 return []
             self.counters["event raised by a sensor"] += 1
             report = m.EventReport(None, alarm.kind, place, SEVERITY, CONFIDENCE, "detected")
-            return self._sighting(replace(message, body=report), report, now)[1]
+            return self._sighting(message._replace(body=report), report, now)[1]
         others = event.sources.keys() - {robot}
         self.book.merge(event, 0.0)
         self.book.note_source(event, robot, CONFIDENCE)
@@ -474,29 +558,6 @@ class Dva:
 
     # --- answers -----------------------------------------------------------------------
 
-    def _shown(self) -> tuple[m.Device, ...]:
-        """Devices one can do something with, robots first, as many as fit into a message."""
-        version, shown = self._list
-        if version != self.registry.version:
-            shown = self._as_many_as_fit()
-            self._list = self.registry.version, shown
-        return shown
-
-    def _as_many_as_fit(self) -> tuple[m.Device, ...]:
-        shown: list[m.Device] = []
-        room = LIST_BYTES
-        for device in self._listed():
-            room -= DEVICE_BYTES + len(device.label.encode()) + 4 * _escaped(device.label)
-            if room < 0 or len(shown) == MOST_LISTED:
-                break
-            shown.append(device)
-        return tuple(shown)
-
-    def _listed(self) -> Iterable[m.Device]:
-        for device_type in (ROBOT, OPERATOR, REMOTE, GUARD):
-            for entry in self.registry.of_type(device_type):
-                yield entry.device
-
     @staticmethod
     def _ok(
         message: m.Message,
@@ -508,8 +569,3 @@ class Dva:
     def _refuse(self, message: m.Message, code: int, text: str) -> Reaction:
         self.refused += 1
         return m.Reply(message.message_id, code, text), []
-
-
-def _escaped(text: str) -> int:
-    """How many characters take more room in XML, up to four bytes each."""
-    return sum(text.count(sign) for sign in "&<>")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Literal
 
+from dva_sim.core.handling import Handling
 from dva_sim.protocol.messages import Position
 
 
@@ -31,7 +32,7 @@ ACT_STEPS = ("act_assigned", "act_departed", "act_arrived", "contained", "closed
 FINAL = frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED, S.EXPIRED})  # and CONFIRMED, mostly
 _GIVEN_UP = frozenset({S.ESCALATED, S.EXPIRED})
 NEXT: dict[State, frozenset[State]] = {
-    S.PENDING: frozenset({S.ASSIGNED, S.CONFIRMED}) | _GIVEN_UP,
+    S.PENDING: frozenset({S.ASSIGNED, S.CONFIRMED, S.REFUTED}) | _GIVEN_UP,
     S.ASSIGNED: frozenset({S.PENDING, S.ON_SCENE, S.CONFIRMED, S.REFUTED}) | _GIVEN_UP,
     S.ON_SCENE: frozenset({S.PENDING, S.CONFIRMED, S.REFUTED}) | _GIVEN_UP,
     S.CONFIRMED: frozenset({S.CONTAINED, S.REFUTED, S.ESCALATED}),
@@ -68,6 +69,7 @@ class Event:
         failed: Responders that set out and gave the order back.
         sent: Everybody who was ever ordered there; only they can tell what they found.
         times: Time of each step in `STEPS` and `ACT_STEPS` that was taken [s].
+        handling: What was decided on it.
     """
 
     number: int
@@ -89,6 +91,7 @@ class Event:
     failed: set[str] = field(default_factory=set)
     sent: set[str] = field(default_factory=set)
     times: dict[str, float] = field(default_factory=dict)
+    handling: Handling = field(default_factory=Handling)
 
     @property
     def open(self) -> bool:

@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from dva_sim.core.assignments import MOVE, SET_OUT, Assignments, Promise, Promises, Rules
+from dva_sim.core.audit import AuditTrail, Fact
 from dva_sim.core.events import NEXT, Event, EventBook, State, apart
+from dva_sim.core.handling import Choice
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send, Sessions
 from dva_sim.protocol import messages as m
@@ -23,6 +25,7 @@ class Orders:
     Attributes:
         engaged: What each device is working on.
         counters: How often what happened.
+        trail: What was decided.
     """
 
     rules: Rules
@@ -31,6 +34,7 @@ class Orders:
     sessions: Sessions
     engaged: Assignments = field(default_factory=Assignments)
     counters: Counter[str] = field(default_factory=Counter)
+    trail: AuditTrail = field(default_factory=AuditTrail)
     _pauses: list[float] = field(default_factory=list)
     _from_afar: set[tuple[str, int]] = field(default_factory=set)  # who said so, of which event
     _promises: Promises = field(init=False)
@@ -377,13 +381,73 @@ class Orders:
 
     def escalate(self, event: Event, now: float) -> list[Send]:
         """Nobody has come in time: others than the DVA's own have to."""
+        self._ruled(event, "escalate", "it has waited too long", now)
         self.book.move(event, State.ESCALATED, now)
         return self._stand_down(event)
 
     def expire(self, event: Event, now: float) -> list[Send]:
         """Nobody says any longer that there is something."""
+        self._ruled(event, "expire", "nobody reports it any longer", now)
         self.book.move(event, State.EXPIRED, now)
         return self._stand_down(event)
+
+    # --- decided by people -------------------------------------------------------------
+
+    def recall(self, event: Event, device: str, now: float) -> list[Send]:
+        """Who was sent is not to go there any longer; that is no attempt, and no failure."""
+        if device == event.actor:
+            over = Send(device, m.OrderProgress(event.number, OVER))
+            if event.act_taken_up:
+                event.act_taken_up, event.waiting_since = False, now
+            return [over, *self._actor_gone(event, now)]
+        taken_up, event.attempts = event.taken_up, event.attempts - event.taken_up
+        sends = self._called_off(event)
+        if taken_up:
+            event.waiting_since = now
+        self.book.move(event, State.PENDING, now)
+        return sends + self._stand_down(event)
+
+    def settle(self, event: Event, state: State, now: float) -> list[Send]:
+        """An event is over, as a person says: whoever was sent there is free."""
+        sends = self._called_off(event) if _somebody_looks(event) else []
+        self.book.move(event, state, now)
+        return sends + self._stand_down(event)
+
+    def decided(self, event: Event, fact: Fact) -> None:
+        """Something was decided on an event, by whomever."""
+        choice = Choice(
+            fact.author,
+            fact.label,
+            fact.action,
+            fact.time,
+            fact.cause,
+            self.label_of(fact.device) if fact.device else "",
+        )
+        event.handling.decide(choice)
+        self.book.touch(event)
+        self.trail.note(fact)
+
+    def label_of(self, device: str) -> str:
+        """What a device calls itself, if it is known."""
+        entry = self.registry.entries.get(device)
+        return entry.device.label if entry else device
+
+    def _ruled(self, event: Event, action: str, cause: str, now: float) -> None:
+        """A rule has decided on an event."""
+        if self.trail.keeps:
+            own, waited = self.sessions.permissions.own, now - event.times["detected"]
+            self.decided(
+                event,
+                Fact(
+                    time=now,
+                    author=own,
+                    label="rule",
+                    action=action,
+                    event=event.number,
+                    cause=cause,
+                    waited=waited,
+                ),
+            )
 
     # --- the small print ---------------------------------------------------------------
 
@@ -409,6 +473,8 @@ class Orders:
     def _reopen(self, event: Event, now: float) -> list[Send]:
         """Somebody else has to look, if that is not given up."""
         state = State.PENDING if self._goes_on(event, event.taken_up, now) else State.ESCALATED
+        if state is State.ESCALATED:
+            self._ruled(event, "escalate", "orders came to nothing", now)
         self.book.move(event, state, now)
         return self._stand_down(event)
 
@@ -433,6 +499,7 @@ class Orders:
         if event.state is State.CONFIRMED and event.open:
             event.attempts += taken_up
             if not self._goes_on(event, taken_up, now):
+                self._ruled(event, "escalate", "orders came to nothing", now)
                 self.book.move(event, State.ESCALATED, now)
         return []
 

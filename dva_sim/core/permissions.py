@@ -75,6 +75,12 @@ class Access:
         rules = [r for r in self.rules if r.is_about(holder, robot, now)]
         return tuple(s for s in wanted if any(r.sensors is None or s in r.sensors for r in rules))
 
+    def ends(self, holder: Device, robot: Device, level: str, now: float) -> float:
+        """Up to when a device may have a level of permission on a robot, as things stand [s]."""
+        wanted = _INCLUDES.get(level, {level})
+        rules = (r for r in self.rules if r.is_about(holder, robot, now) and wanted <= r.includes)
+        return max((r.until for r in rules), default=now)
+
     def next_end(self, now: float) -> float:
         """When the next rule ceases to hold [s]."""
         return min((r.until for r in self.rules if r.until > now), default=math.inf)

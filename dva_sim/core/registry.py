@@ -12,8 +12,9 @@ from dva_sim.protocol.messages import Device, Position, Registration
 
 ROBOT, GUARD, OPERATOR, DETECTOR = "Robot", "Guard", "TeleOp", "Sensor"
 REMOTE = "Remote Control"  # may drive robots, and is sent no orders
+CONTROL_ROOM = "ControlRoom"  # sees and decides; may drive as its role allows
 SAME_AS = {"Teleoperation": OPERATOR}  # other names of a type
-DRIVERS = frozenset({OPERATOR, REMOTE, *SAME_AS})
+DRIVERS = frozenset({OPERATOR, REMOTE, CONTROL_ROOM, *SAME_AS})
 MAX_DEVICES = 20_000
 FORGET_AFTER = 60.0  # without a word of it [s]
 

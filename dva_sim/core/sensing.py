@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from dva_sim.core.events import Event, EventBook, State, apart
 from dva_sim.core.registry import ROBOT, Registry
 from dva_sim.core.sessions import Send, Sessions
+from dva_sim.core.wire_size import LIST_BYTES, xml_size
 from dva_sim.protocol import messages as m
 
 RENEW = 20.0  # a subscription ends at the robot after 60 s unless it is renewed [s]
@@ -23,7 +24,6 @@ CONFIDENCE = 0.6  # of what a robot's sensor says alone; assumed
 SEVERITY = 0.5  # as of what a person reports who has not seen the source
 NO_NEWS = 600.0  # what was settled there so lately is not reported anew [s]; assumed
 
-LIST_BYTES = 7000  # of a list, the rest of the message apart [B]
 LINE_BYTES, SENSOR_BYTES = 80, 55  # markup of a device and of a sensor, at most [B]
 MOST_LISTED = 64
 
@@ -157,21 +157,16 @@ class Sensing:
 
 def _line(robot: str, info: m.SensorInfo, room: int) -> tuple[m.DeviceSensors | None, int]:
     """What a robot has, as far as there is room, and how much of it that takes [B]."""
-    taken = LINE_BYTES + _size(info.camera_url)
+    taken = LINE_BYTES + xml_size(info.camera_url)
     if taken > room:
         return None, 0
     sensors: list[m.Sensor] = []
     for sensor in info.sensors:
-        taken += SENSOR_BYTES + _size(sensor.name) + _size(sensor.unit)
+        taken += SENSOR_BYTES + xml_size(sensor.name) + xml_size(sensor.unit)
         if taken > room:
             break
         sensors.append(sensor)
     return m.DeviceSensors(robot, info.camera_url, tuple(sensors)), taken
-
-
-def _size(text: str) -> int:
-    """Room for a text in XML, where a few signs take four bytes more [B]."""
-    return len(text.encode()) + 4 * sum(text.count(sign) for sign in "&<>")
 
 
 # --- which event it is ---------------------------------------------------------------------

@@ -156,6 +156,10 @@ class SituationBuilder:
         ]
         return sorted(free, key=_place)
 
+    def operators(self, now: float) -> list[DeviceEntry]:
+        """Operators who may be given a robot now, as `_hands` has them."""
+        return self._hands(self.orders.registry.of_type(OPERATOR), now)
+
     def _hands(self, operators: Iterable[DeviceEntry], now: float) -> list[DeviceEntry]:
         """Operators who may be given a robot, each as often as it may; the least busy first."""
         span, count = self.orders.rules.operator_span, self.orders.engaged.count
@@ -220,6 +224,9 @@ class SituationBuilder:
                 distance[row, robots] = eta[row, robots] = np.inf
             if event.failed:
                 _leave_out_who_failed(event, starts, distance[row], eta[row])
+            if event.handling.taken_off:
+                off = np.array([s.device in event.handling.taken_off for s in starts], dtype=bool)
+                distance[row, off] = eta[row, off] = np.inf
         return distance, eta
 
     def _cover(self, team: KnownTeam, now: float) -> Cover | None:

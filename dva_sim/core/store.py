@@ -19,6 +19,7 @@ from typing import Any
 
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import KEPT_CLOSED, Event, State
+from dva_sim.core.handling import Choice, Handling
 from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Grant
 from dva_sim.kernel.errors import ConfigError
@@ -57,7 +58,7 @@ class Store:
     def __init__(self, file: Path | str, epoch: float = 0.0) -> None:
         self.epoch = epoch
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
-        self._session_changes = 0
+        self._session_changes, self._asks = 0, False
         self._events: dict[int, Event] = {}
         self._devices: dict[str, DeviceEntry | None] = {}
         self._lasting: set[str] = set()
@@ -113,8 +114,10 @@ class Store:
         """
         self._events |= {event.number: event for event in changed}
         self._devices |= dva.registry.changes()
-        changes = _session_changes(dva)
-        if not (self._events or self._devices or changes != self._session_changes):
+        changes, asks = _session_changes(dva), dva.dispatcher.questions.asks
+        if not (
+            self._events or self._devices or changes != self._session_changes or asks != self._asks
+        ):
             return None
         sessions = self._sessions if changes == self._session_changes else _of_sessions(dva)
         lasting = dva.sessions.with_something_open()
@@ -129,7 +132,7 @@ class Store:
                 self._file.execute("ROLLBACK")
             return f"cannot keep its memory: {error}"
         self._events, self._devices, self._sessions = {}, {}, sessions
-        self._session_changes, self._lasting = changes, lasting
+        self._session_changes, self._lasting, self._asks = changes, lasting, asks
         return None
 
     def _write(self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str]) -> None:
@@ -152,7 +155,8 @@ class Store:
             new = now.items() - before.items()
             put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
         count = dva.sessions.permissions.count
-        put("INSERT OR REPLACE INTO about VALUES (?, ?)", [("sessions", count)])
+        asks = dva.dispatcher.questions.asks
+        put(_PUT_ABOUT, [("sessions", count), ("ask_first", int(asks))])
 
     # --- from the file -----------------------------------------------------------------
 
@@ -188,6 +192,8 @@ class Store:
                 dva.orders.engaged.begin(name, event)
         dva.book.total = sum(dva.book.counts.values())
         self._recall_sessions(dva)
+        if self._is_about("ask_first"):
+            self._asks = dva.dispatcher.questions.asks = bool(self._about("ask_first"))
         dva.registry.changes()
         dva.book.changes()
         return found
@@ -210,6 +216,10 @@ class Store:
         self._lasting = dva.sessions.with_something_open()
         permissions.count = max(permissions.count, self._about("sessions"))
 
+    def _is_about(self, name: str) -> bool:
+        found = self._file.execute("SELECT 1 FROM about WHERE name = ?", (name,)).fetchone()
+        return found is not None
+
     def _about(self, name: str) -> int:
         row = self._file.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
         return int(row[0]) if row else 0
@@ -219,6 +229,7 @@ class Store:
 _PUT_DEVICE = """
 INSERT INTO devices VALUES (?, ?) ON CONFLICT (id) DO UPDATE SET data = excluded.data
 """
+_PUT_ABOUT = "INSERT OR REPLACE INTO about VALUES (?, ?)"
 _RECENT = """
 SELECT data FROM (
   SELECT number, data FROM events WHERE open
@@ -237,6 +248,7 @@ def _of_event(event: Event, dva: Dva, epoch: float) -> dict[str, Any]:
         "times": {step: time + epoch for step, time in event.times.items()},
         "failed": sorted(event.failed),
         "sent": sorted(event.sent),
+        "handling": _of_handling(event.handling, epoch),
         "engaged": [name for name in people if name and engaged.is_at(name, event)],
     }
 
@@ -250,7 +262,48 @@ def _event(kept: dict[str, Any], epoch: float) -> Event:
         times={step: time - epoch for step, time in kept["times"].items()},
         failed=set(kept["failed"]),
         sent=set(kept["sent"]),
+        handling=_handling(kept.get("handling"), epoch),
     )
+
+
+def _of_handling(handling: Handling, epoch: float) -> dict[str, Any] | None:
+    """What was decided on an event; nothing of one on which nothing was."""
+    if handling == Handling():
+        return None
+    return {
+        "decisions": handling.decisions,
+        "last": _of_choice(handling.last, epoch),
+        "acknowledged": _of_choice(handling.acknowledged, epoch),
+        "note": handling.note,
+        "taken_off": sorted(handling.taken_off),
+        "expected": {d: (sent + epoch, way) for d, (sent, way) in handling.expected.items()},
+        "advised": handling.advised,
+    }
+
+
+def _handling(kept: dict[str, Any] | None, epoch: float) -> Handling:
+    if kept is None:
+        return Handling()
+    return Handling(
+        kept["decisions"],
+        _choice(kept["last"], epoch),
+        _choice(kept["acknowledged"], epoch),
+        kept["note"],
+        set(kept["taken_off"]),
+        {d: (sent - epoch, way) for d, (sent, way) in kept["expected"].items()},
+        kept["advised"],
+    )
+
+
+def _of_choice(choice: Choice | None, epoch: float) -> list[Any] | None:
+    return None if choice is None else [*choice._replace(time=choice.time + epoch)]
+
+
+def _choice(kept: list[Any] | None, epoch: float) -> Choice | None:
+    if kept is None:
+        return None
+    choice = Choice(*kept)
+    return choice._replace(time=choice.time - epoch)
 
 
 def _session_changes(dva: Dva) -> int:

@@ -12,24 +12,8 @@ from heapq import heappop, heappush
 from typing import Any
 
 import simpy
-from simpy.events import NORMAL, Event
 
 US = 1_000_000
-
-
-def _run(call: Any) -> None:
-    call.action(*call.args)
-
-
-class _Call(Event):
-    """A function due at some time: a bare event, without the list and dictionary of SimPy's own."""
-
-    __slots__ = ("action", "args")
-    _ok = True  # SimPy's own loop asks: nothing has failed
-    callbacks: Any = (_run,)  # what it calls
-
-    def __init__(self, action: Callable[..., object], args: tuple[Any, ...]) -> None:
-        self.action, self.args = action, args
 
 
 class Clock:
@@ -43,15 +27,16 @@ class Clock:
 
     def __init__(self) -> None:
         self.env = simpy.Environment(initial_time=0)
+        self._queue: Any = self.env._queue  # of when [us], in which order, what, with what
         self.now = 0.0
 
     def call_at(self, time: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
-        self._put(round(time * US), _Call(action, args))
+        self._put(round(time * US), action, args)
 
     def call_after(self, delay: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` after `delay` [s]."""
-        self._put(round((self.now + delay) * US), _Call(action, args))
+        self._put(round((self.now + delay) * US), action, args)
 
     def every(
         self, period: float, action: Callable[[], object], start: float | None = None
@@ -61,31 +46,32 @@ class Clock:
 
         def tick() -> None:
             if action() is not False:
-                self._put(env._now + step, call)
+                self._put(env._now + step, tick, ())
 
-        call = _Call(tick, ())
-        self._put(env._now if start is None else round(start * US), call)
+        self._put(env._now if start is None else round(start * US), tick, ())
 
     def run(self, until: float) -> None:
         """Let time pass up to `until` [s]; what is due then happens when time goes on."""
-        end, queue = round(until * US), self.env._queue
+        end, env, queue = round(until * US), self.env, self._queue
         if until > self.now:
             while queue and queue[0][0] < end:
-                self.step()
+                env._now, _, action, args = heappop(queue)  # as in `step`, without its call
+                self.now = env._now / US
+                action(*args)
             self._set(end)
 
     def step(self) -> None:
-        """Let the next event happen: what SimPy's own step does, without asking for failures."""
+        """Let the next event happen."""
         env = self.env
-        env._now, _, _, call = heappop(env._queue)
+        env._now, _, action, args = heappop(self._queue)
         self.now = env._now / US
-        call.action(*call.args)  # type: ignore[attr-defined]
+        action(*args)
 
-    def _put(self, at: float, call: _Call) -> None:
-        """It is due at a time [us]: what SimPy's own `schedule` does, without its call."""
+    def _put(self, at: float, action: Callable[..., object], args: tuple[Any, ...]) -> None:
+        """It is due at a time [us], after all that was put there before."""
         env = self.env
         now = env._now
-        heappush(env._queue, (at if at > now else now, NORMAL, next(env._eid), call))
+        heappush(self._queue, (at if at > now else now, next(env._eid), action, args))
 
     def _set(self, now: float) -> None:
         """It is that time [us], and nothing before it is due."""

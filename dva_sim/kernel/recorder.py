@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.kernel.makers import maker
+
 
 class Moment(NamedTuple):
     """One line of the timeline.
@@ -72,6 +74,9 @@ class Issued(NamedTuple):
     captured: float
 
 
+make_issued = maker(Issued)
+
+
 class Accepted(NamedTuple):
     """A command that a robot accepted, whoever sent it.
 
@@ -91,6 +96,25 @@ class Accepted(NamedTuple):
     message_id: int
     seen_tick: int | None
     arrived: float
+    time: float
+
+
+make_accepted = maker(Accepted)
+
+
+class ByHand(NamedTuple):
+    """What somebody does who drives a robot by hand, at the robot itself, and is obeyed.
+
+    Attributes:
+        robot: Which, by id.
+        who: The hand.
+        what: `takes`, `drives`, `lets go`, or `stops` by the emergency button.
+        time: Now [s].
+    """
+
+    robot: str
+    who: str
+    what: str
     time: float
 
 
@@ -116,6 +140,9 @@ class Applied(NamedTuple):
     captured: float
 
 
+_make_applied = maker(Applied)
+
+
 class Shown(NamedTuple):
     """A frame on the operator's screen.
 
@@ -130,6 +157,9 @@ class Shown(NamedTuple):
     tick: int
 
 
+make_shown = maker(Shown)
+
+
 class Followed(NamedTuple):
     """What an operator wants, by which picture; times in [s].
 
@@ -142,6 +172,9 @@ class Followed(NamedTuple):
     captured: float
     shown: float
     time: float
+
+
+_make_followed = maker(Followed)
 
 
 class DrivenBy(NamedTuple):
@@ -232,7 +265,7 @@ class DriveLog:
         """
         for frame in reversed(self.frames):
             if frame.tick == tick:
-                self.intents.append(Followed(frame.captured, frame.time, now))
+                self.intents.append(_make_followed(frame.captured, frame.time, now))
                 return frame.captured
             if frame.tick < tick:
                 break
@@ -247,12 +280,17 @@ class Recorder:
         keep_traffic: Also keep each message sent, for pictures and recordings.
 
     Attributes:
+        messages: How many were sent.
+        bytes: Of all of them [B].
+        counters: Whatever else is counted, by what it is.
         on_accepted: Told of each command that a robot accepts.
+        on_hand: Told of what is done to a robot by hand.
     """
 
     def __init__(self, keep_traffic: bool = False) -> None:
         self.timeline: list[Moment] = []
         self.tracks: dict[str, list[TrackPoint]] = defaultdict(list)
+        self.messages = self.bytes = 0
         self.counters: Counter[str] = Counter()
         self.violations: Counter[str] = Counter()
         self.drives: list[DriveLog] = []
@@ -262,6 +300,7 @@ class Recorder:
         self.exposure: dict[str, float] = defaultdict(float)
         self._issued: dict[tuple[str, int], Issued] = {}
         self.on_accepted: Callable[[Accepted], object] = lambda _: None
+        self.on_hand: Callable[[ByHand], object] = lambda _: None
 
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
         """Add a line to the timeline."""
@@ -276,8 +315,8 @@ class Recorder:
         self, time: float, source: str, destination: str, size: int, payload: Any
     ) -> None:
         """Count a message, and keep it if pictures are wanted."""
-        self.counters["messages"] += 1
-        self.counters["bytes"] += size
+        self.messages += 1
+        self.bytes += size
         if self.traffic is not None:
             self.traffic.append(Sent(time, source, destination, size, payload))
 
@@ -299,7 +338,7 @@ class Recorder:
         if issued is None:
             return
         ages = issued.sample_age, issued.captured
-        command = Applied(issued.made, issued.sent, arrived, now, until, *ages)
+        command = _make_applied(issued.made, issued.sent, arrived, now, until, *ages)
         drive.applied.append(command)
 
     def drive_ordered(self, drive: DriveLog) -> None:

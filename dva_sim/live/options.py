@@ -71,7 +71,7 @@ class LiveOptions:
             raise ConfigError(f"--port {self.port} should be from 1 to 64999")
         if self.duration is not None and not 0 < self.duration < math.inf:
             raise ConfigError(f"--for {self.duration:g} should be a number of seconds above 0")
-        if self.dva is not None and not _is_address(self.dva):
+        if self.dva is not None and not is_address(self.dva):
             raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
         scenario = self._built()
         if scenario.operator.strategy == "oracle":
@@ -140,7 +140,7 @@ def trace_of(label: str) -> str:
     return f"{label}.trace.jsonl"
 
 
-def _is_address(text: str) -> bool:
+def is_address(text: str) -> bool:
     """Whether it is a host and a port; the next port must be one, too."""
     found = re.fullmatch(r"[^:\s]+:([0-9]{1,5})", text)
     return found is not None and 0 < int(found[1]) < 65_535

@@ -24,9 +24,9 @@ from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.options import PARTS, LiveOptions, trace_of
-from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines
+from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_facts
 from dva_sim.protocol.exchange import LOW_BITS
-from dva_sim.simulation.full.control_room import add_dva, add_operator
+from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.dva_trace import traced
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import FILM_PERIOD
@@ -104,7 +104,11 @@ class DvaPart:
         trace = _trace_of("dva", stage, options)
         if trace is not None:
             self._agent.desk = traced(self._agent.desk, trace, stage, memory)
+        if isinstance(stage.recorder, LiveRecorder):
+            recorder = stage.recorder
+            self._agent.on_fact = lambda fact: recorder.put("fact", fact.row())
         self._agent.start()
+        self._dispatcher = add_dispatcher(stage)
         self._stage = stage
         book = self._agent.desk.book
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
@@ -114,9 +118,7 @@ class DvaPart:
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: how the events stand."""
         for e in self._events():
-            at = [e.position.latitude, e.position.longitude]
-            told = e.number, e.kind, at, e.state.value, dict(e.times)
-            recorder.put_new("event", *told, key=f"event {e.number}")
+            recorder.put_new("event", *event_facts(e), key=f"event {e.number}")
 
     def rows(self) -> list[Row]:
         """See `LivePart`: what the first so many told the DVA, who is there before who is not."""

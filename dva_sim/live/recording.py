@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -30,7 +31,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings.writing import PART, check_target, write_recording
+from dva_sim.recordings.writing import PART, SENT, check_target, write_recording
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.hazards import draw_incidents
@@ -173,6 +174,16 @@ class LiveRecorder(Recorder):
     def trace(self, who: str, line: str) -> bool:
         """Keep a line of somebody's decisions."""
         return self.put("trace", self._clock.now, who, line)
+
+
+def event_facts(event: Event) -> Line:
+    """What is kept of an event of the DVA, after the word `event`."""
+    at = [event.position.latitude, event.position.longitude]
+    sent = {who: getattr(event, who) for who in SENT}
+    return [
+        *(event.number, event.kind, at, event.state.value, dict(event.times)),
+        *(event.severity, sent),
+    ]
 
 
 class TraceLines:
@@ -340,7 +351,7 @@ def finish(part: Path, target: Path, own_code: bool = True) -> float:
         raise ConfigError("names a class in a file, which is run for no recording", part)
     playback = told.playback()
     about = {"time": "real, from the start of the run", "live": "over sockets"}
-    write_recording(playback, target, about=about, traces=told.traces)
+    write_recording(playback, target, about=about, traces=told.traces, audit=told.audit)
     part.unlink(missing_ok=True)
     return playback.duration
 
@@ -369,9 +380,11 @@ class _Told:
     def __init__(self, part: Path) -> None:
         self.recorder = Recorder(keep_traffic=True)
         self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
+        self.audit: list[tuple[float, dict[str, Any]]] = []
         self.duration, self.radii = 0.0, dict[str, float]()
         self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
         self._events: dict[int, Event] = {}
+        self._facts: list[Fact] = []
         self._drives: dict[tuple[str, int], DriveLog] = {}
         try:
             with part.open("rb") as file:
@@ -416,6 +429,8 @@ class _Told:
             duration=self.duration,
             contained=self._contained,
             endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
+            events=events,
+            facts=self._facts,
         )
 
     def _traffic(self) -> Iterator[Sent]:
@@ -480,11 +495,19 @@ class _Told:
     def _contains(self, number: int, when: float) -> None:
         self._contained[number] = when
 
-    def _event(
-        self, number: int, kind: str, at: list[float], state: str, times: dict[str, float]
-    ) -> None:
-        event = Event(number, kind, Position(*at), 0.0, state=State(state), times=times)
+    def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
+        """See `event_facts`; what an earlier version did not say is left open."""
+        times, severity, sent = (*more, 0.0, {})[:3]
+        event = Event(
+            number, kind, Position(*at), severity, state=State(state), times=times, **sent
+        )
         self._events[number] = event
+
+    def _fact(self, held: dict[str, Any]) -> None:
+        self._facts.append(Fact(**held))
+
+    def _audited(self, row: dict[str, Any]) -> None:
+        self.audit.append((float(row["time_s"]), row))
 
     def _trace(self, when: float, who: str, line: str) -> None:
         self.traces[who].append((when, line))

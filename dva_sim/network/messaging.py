@@ -65,8 +65,24 @@ class Wire(Protocol):
 OnReply = Callable[[int, bytes], object]
 
 
+class RequestTap(Protocol):
+    """Somebody who looks at what reaches a node; see `dva_sim.network.tap`."""
+
+    def serve(self, service: Service, request: Request) -> None:
+        """Let the service take the request, and see its answer."""
+
+    def heard(self, publisher: str, payload: Any) -> None:
+        """A publication has reached the node."""
+
+
 class Transport(Protocol):
-    """What carries messages between nodes; a node is named by the id of its device."""
+    """What carries messages between nodes; a node is named by the id of its device.
+
+    Attributes:
+        taps: Who looks at what reaches a node, by the id of the node.
+    """
+
+    taps: dict[str, RequestTap]
 
     @property
     def clock(self) -> Clock:

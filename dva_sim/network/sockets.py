@@ -18,7 +18,7 @@ import zmq
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.messaging import OnReply, Request, Service
+from dva_sim.network.messaging import OnReply, Request, RequestTap, Service
 from dva_sim.network.realtime import LiveClock, Poller, has_more
 from dva_sim.network.security import Refusal, Security, Socket, user_of
 
@@ -193,6 +193,8 @@ class SocketSubscription:
                 return
             if len(frames) == 2:
                 self._network.note(self._node, frames[1], sent=False)
+                if (tap := self._network.taps.get(self._node)) is not None:
+                    tap.heard(self._peer, frames[1])
                 self._handler(frames[1])
             else:
                 self._network.counters["publications of another form"] += 1
@@ -247,6 +249,7 @@ class SocketNetwork:
     Attributes:
         counters: What was refused or could not be sent, by reason.
         watcher: Told of each message: a node here, the content, whether that node sends it.
+        taps: See `Transport`.
     """
 
     def __init__(
@@ -268,6 +271,7 @@ class SocketNetwork:
         clock.every(GIVE_BACK, self._give_back)
         self.counters: Counter[str] = Counter()
         self.watcher: Callable[[str, Any, bool], object] | None = None
+        self.taps: dict[str, RequestTap] = {}
         self._addresses: dict[str, str] = {}
         self._services: dict[str, Service] = {}
         self._routers: dict[str, Socket] = {}
@@ -418,7 +422,11 @@ class SocketNetwork:
             self.send(router, [*route, reply])
 
         # The first frame is what the socket itself calls the connection: nobody can take another's.
-        service(Request(data, answer, sender, route[0]))
+        request, tap = Request(data, answer, sender, route[0]), self.taps.get(node)
+        if tap is None:
+            service(request)
+        else:
+            tap.serve(service, request)
 
     def note(self, node: str, payload: Any, sent: bool = True) -> None:
         """Somebody may want to know what is said here."""

@@ -10,7 +10,7 @@ from typing import Any
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.connections import AnyConnection, Connector
 from dva_sim.network.link import Link
-from dva_sim.network.messaging import OnReply, Request, Service
+from dva_sim.network.messaging import OnReply, Request, RequestTap, Service
 from dva_sim.network.zmtp import ZmtpConnection
 
 FRAMING = 9  # ZMTP header of a frame above 255 bytes; the few shorter messages count the same [B]
@@ -34,6 +34,7 @@ class VirtualNetwork:
 
     Attributes:
         dropped: Publications that found the pipe of a subscriber full.
+        taps: See `Transport`.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class VirtualNetwork:
         self.delivered = delivered or (lambda *_: None)
         self.connector = connector or Connector()
         self.dropped = 0
+        self.taps: dict[str, RequestTap] = {}
         self._services: dict[str, Service] = {}
         self._gone: set[str] = set()
         self._clients: dict[str, dict[VirtualClient, None]] = defaultdict(dict)
@@ -225,8 +227,12 @@ class VirtualWire(VirtualClient):
             service = network.service(self.peer)
             if service is not None:
                 network.delivered(network.clock.now, self.node, self.peer, data)
-                answer = partial(self._answer, made, tag)
-                service(Request(data, answer, peer=self.node))
+                request = Request(data, partial(self._answer, made, tag), peer=self.node)
+                tap = network.taps.get(self.peer)
+                if tap is None:
+                    service(request)
+                else:
+                    tap.serve(service, request)
 
         made = network.connector.connect(
             network.clock,
@@ -288,6 +294,8 @@ class VirtualSubscription(VirtualClient):
 
         def heard(payload: Any) -> None:
             network.delivered(network.clock.now, self.peer, self.node, payload)
+            if (tap := network.taps.get(self.node)) is not None:
+                tap.heard(self.peer, payload)
             self._handler(payload)
 
         return network.connector.connect(

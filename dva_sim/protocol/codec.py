@@ -89,7 +89,7 @@ def _set_teleop(groups: _Groups) -> m.SetTeleOp | None:
     tick = int(seen) if seen else None
     if tick and tick > MAX_TICK:
         return None
-    return m.SetTeleOp(float(speed), float(turn_rate), tick)
+    return m.make_set_tele_op(float(speed), float(turn_rate), tick)
 
 
 def _status(groups: _Groups) -> m.RobotStatus | None:
@@ -164,7 +164,7 @@ def read_canonical(data: bytes) -> m.Message | None:
     body = read_body(rest[1:])
     if body is None or message_id > MAX_UINT32 or (session and session > MAX_SESSION):
         return None
-    return m.Message(
+    return m.make_message(
         destination.decode(), message_id, source.decode(), clock.decode(), session, body
     )
 
@@ -203,8 +203,11 @@ def encode(message: Message) -> bytes:
     return data
 
 
+@lru_cache(maxsize=64)
 def decode(data: bytes) -> Message:
     """The message in `data`; whatever the bytes, a message or a `ProtocolError`.
+
+    What was published is read by each who hears it: the same bytes are validated once.
 
     Raises:
         ProtocolError: not a message by the specification; the reason fits into a reply.

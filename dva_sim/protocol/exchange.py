@@ -8,7 +8,7 @@ from enum import Enum
 from hashlib import blake2b
 
 from dva_sim.protocol.codec import encode, timestamp
-from dva_sim.protocol.messages import Body, Heartbeat, Message
+from dva_sim.protocol.messages import Body, Heartbeat, Message, make_message
 
 NOON = 43_200.0  # when a run in virtual time begins [s since midnight]
 LOW_BITS = 32  # of a session: nobody can guess them; the bits above only grow
@@ -45,7 +45,7 @@ class Outbox:
         self._last_id += 1
         held = None if isinstance(body, Heartbeat) else session
         stamp = timestamp(self._start + now, self._exact)
-        return Message(destination, self._last_id, self.source, stamp, held, body)
+        return make_message(destination, self._last_id, self.source, stamp, held, body)
 
     def encode(self, destination: str, body: Body, now: float, session: int = 0) -> bytes:
         """The same as bytes."""

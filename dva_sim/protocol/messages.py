@@ -1,4 +1,4 @@
-"""The messages of the DVA, one frozen dataclass per element of `protocol/dva.xsd`.
+"""The messages of the DVA, one frozen class per element of `protocol/dva.xsd`.
 
 The specification with its rules of use is `protocol/README.md`. Units are SI; angles are in
 radians except latitude and longitude, which are WGS-84 degrees. Devices are named by ids such
@@ -8,51 +8,64 @@ as `70:1A:04:F9:81:D6`, with capital letters, so that one device has one spellin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
-OK: Final = 0
-BAD_MESSAGE: Final = 1
-NOT_REGISTERED: Final = 2
-NOT_PERMITTED: Final = 3
-BAD_SESSION: Final = 4
-OUT_OF_ORDER: Final = 5
-STALE: Final = 6
-WRONG_MODE: Final = 7
-BUSY: Final = 8
-UNKNOWN_DEVICE: Final = 9
-UNKNOWN_SENSOR: Final = 10
-UNKNOWN_EVENT: Final = 11
-NOT_SUPPORTED: Final = 12
-
-CODE_NAMES: Final = {
-    OK: "ok",
-    BAD_MESSAGE: "bad message",
-    NOT_REGISTERED: "not registered",
-    NOT_PERMITTED: "not permitted",
-    BAD_SESSION: "bad session",
-    OUT_OF_ORDER: "out of order",
-    STALE: "stale",
-    WRONG_MODE: "wrong mode",
-    BUSY: "busy",
-    UNKNOWN_DEVICE: "unknown device",
-    UNKNOWN_SENSOR: "unknown sensor",
-    UNKNOWN_EVENT: "unknown event",
-    NOT_SUPPORTED: "not supported",
-}
-"""Reply codes in words, for logs and for the text of a reply."""
-OBEYS_NO_MORE: Final = (NOT_PERMITTED, BAD_SESSION, WRONG_MODE)  # the next fares no better
+from dva_sim.kernel.makers import maker
+from dva_sim.protocol.control_room import (
+    Acknowledge,
+    AddNote,
+    Assign,
+    AuditRecord,
+    ByWhom,
+    Candidate,
+    ControlRoomBody,
+    ControlRoomContent,
+    DispatchStatus,
+    Escalate,
+    EventList,
+    EventStatus,
+    FalseAlarm,
+    GetDispatch,
+    GetEventList,
+    GetProposal,
+    LastDecision,
+    Proposal,
+    Proposed,
+    Revoke,
+    SetDispatch,
+    TakeOff,
+)
+from dva_sim.protocol.missions import (
+    CancelMission,
+    GetMissionStatus,
+    GoTo,
+    Inspect,
+    MissionStatus,
+    Patrol,
+    ReturnToBase,
+)
+from dva_sim.protocol.places import Position
+from dva_sim.protocol.reply_codes import (
+    BAD_MESSAGE,
+    BAD_SESSION,
+    BUSY,
+    CODE_NAMES,
+    NOT_PERMITTED,
+    NOT_REGISTERED,
+    NOT_SUPPORTED,
+    OBEYS_NO_MORE,
+    OK,
+    OUT_OF_ORDER,
+    STALE,
+    UNKNOWN_DEVICE,
+    UNKNOWN_EVENT,
+    UNKNOWN_SENSOR,
+    WRONG_MODE,
+)
 
 EventKind = Literal["fire", "gas_leak", "flood"]
 EVENT_KINDS: Final[tuple[str, ...]] = get_args(EventKind)
 """What messages call what happens; whatever else happens is told of as one of these."""
-
-
-@dataclass(frozen=True, slots=True)
-class Position:
-    """A place on the WGS-84 ellipsoid, in degrees."""
-
-    latitude: float
-    longitude: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +98,10 @@ class StartTeleOp:
     """Begin teleoperation in the session of the header."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetTeleOp:
+class SetTeleOp(NamedTuple):
     """Drive so until the next command.
+
+    It is made so often that it is a named tuple, as the message around it: that takes a third.
 
     Attributes:
         speed: Forward speed [m/s].
@@ -99,6 +113,9 @@ class SetTeleOp:
     speed: float
     turn_rate: float
     seen_tick: int | None = None
+
+
+make_set_tele_op = maker(SetTeleOp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,73 +167,6 @@ class PersonStatus:
 
     activity: str
     position: Position
-
-
-@dataclass(frozen=True, slots=True)
-class GoTo:
-    """Visit these places in this order; 1 to 64 of them."""
-
-    waypoints: tuple[Position, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Patrol:
-    """Visit these places in this order, 1 to 64 of them, and begin anew.
-
-    Attributes:
-        waypoints: The places of one lap.
-        laps: How many laps, up to 1000; 0: until the mission is cancelled.
-    """
-
-    waypoints: tuple[Position, ...]
-    laps: int
-
-
-@dataclass(frozen=True, slots=True)
-class Inspect:
-    """Go to where the place of an event can be seen, face it, and say what is in view.
-
-    Attributes:
-        event_id: The event.
-        kind: `fire`, `gas_leak` or `flood`.
-        position: Where it is.
-    """
-
-    event_id: int
-    kind: str
-    position: Position
-
-
-@dataclass(frozen=True, slots=True)
-class ReturnToBase:
-    """Go back to where the robot stood when it was switched on."""
-
-
-@dataclass(frozen=True, slots=True)
-class CancelMission:
-    """Give up the mission and stand idle."""
-
-
-@dataclass(frozen=True, slots=True)
-class GetMissionStatus:
-    """Ask a robot how its newest mission stands; answered with `MissionStatus`."""
-
-
-@dataclass(frozen=True, slots=True)
-class MissionStatus:
-    """How the newest mission of a robot stands: published when it changes, and told if asked.
-
-    Attributes:
-        mission_id: MessageID of the message that began it; 0 if there was none.
-        mission_state: `none`, `under_way`, `waiting`, `replanning`, `done` or `failed`.
-        waypoints_left: Places still to be visited, of the present lap; at most 64.
-        reason: Why, in words, up to 256 characters; may be empty.
-    """
-
-    mission_id: int
-    mission_state: str
-    waypoints_left: int
-    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -513,7 +463,16 @@ class Permission:
     sensors: tuple[str, ...] = ()
 
 
-Content = DeviceList | SensorInfo | Permission | MissionStatus | Holder | SessionFloor | SensorList
+Content = (
+    DeviceList
+    | SensorInfo
+    | Permission
+    | MissionStatus
+    | Holder
+    | SessionFloor
+    | SensorList
+    | ControlRoomContent
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -566,12 +525,12 @@ Body = (
     | TaskBid
     | TaskAward
     | Relocation
+    | ControlRoomBody
     | Reply
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+class Message(NamedTuple):
     """A body and the header that every message carries.
 
     Attributes:
@@ -589,3 +548,6 @@ class Message:
     timestamp: str
     session: int | None
     body: Body
+
+
+make_message = maker(Message)

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from lxml import etree
 
+from dva_sim.protocol import control_room_xml as control_room
 from dva_sim.protocol import messages as m
 
 _Element = etree._Element
@@ -205,6 +206,7 @@ _CONTENT_READERS: Final[dict[str, Callable[[_Element], Any]]] = {
     "Holder": _read_holder,
     "SessionFloor": lambda element: m.SessionFloor(_int(element[0])),
     "SensorList": _read_sensor_list,
+    **control_room.CONTENT_READERS,
 }
 _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "StartTeleOp": lambda element: m.StartTeleOp(),
@@ -232,6 +234,7 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "TaskBid": _read_task_bid,
     "TaskAward": lambda element: m.TaskAward(_int(element[0])),
     "Relocation": lambda element: m.Relocation(_read_position(element[0])),
+    **control_room.READERS,
 }
 _PAYLOAD_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "RobotStatus": _read_status,

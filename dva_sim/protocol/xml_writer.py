@@ -6,113 +6,15 @@ valid by construction; templates are six times faster than building trees.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from functools import lru_cache
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
-from dva_sim.protocol import limits
+from dva_sim.protocol import control_room_xml as control_room
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.limits import bounds, choices, length, most
+from dva_sim.protocol import xml_values as v
+from dva_sim.protocol.limits import most
 
 DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
-_T = TypeVar("_T")
-
-
-def _bad(reason: str) -> ProtocolError:
-    return ProtocolError(m.BAD_MESSAGE, reason)
-
-
-def _real(name: str, kind: str) -> Callable[[float], str]:
-    low, high = bounds(kind)
-
-    def write(value: float) -> str:
-        if low <= value <= high:
-            # float() because a numpy scalar spells its own type in its repr.
-            return repr(float(value))
-        raise _bad(f"{name} must be within {low:g} and {high:g}, not {value!r}")
-
-    return write
-
-
-def _integer(name: str, kind: str) -> Callable[[int], str]:
-    low, high = bounds(kind)
-
-    def write(value: int) -> str:
-        if low <= value <= high:
-            return f"{value:d}"
-        raise _bad(f"{name} must be within {low} and {high}, not {value!r}")
-
-    return write
-
-
-def _optional(element: str, write: Callable[[_T], str], value: _T | None) -> str:
-    return "" if value is None else f"<{element}>{write(value)}</{element}>"
-
-
-def _escape(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-
-
-def _string(name: str, pattern: str, form: str) -> Callable[[str], str]:
-    match = re.compile(pattern).fullmatch
-
-    @lru_cache(maxsize=1024)
-    def write(value: str) -> str:
-        if match(value):
-            return _escape(value)
-        raise _bad(f"{name} must be {form}, not {value!r}")
-
-    return write
-
-
-def _text_of(name: str, kind: str, form: str) -> Callable[[str], str]:
-    """Text that has a length; `form` says what characters it has."""
-    least, most_ = length(kind)
-    told = f"{least} to {most_} {form}" if least else f"up to {most_} {form}"
-    return _string(name, f"(?=(?s:.{{{least},{most_}}})\\Z){limits.pattern(kind)}", told)
-
-
-def _choice(name: str, kind: str) -> Callable[[str], str]:
-    return _string(name, "|".join(choices(kind)), " or ".join(choices(kind)))
-
-
-_device_id = _string("an id", limits.pattern("DeviceID"), "like 70:1A:04:F9:81:D6")
-_clock = _string("Timestamp", limits.pattern("Timestamp"), "HH:MM:SS")
-_name = _text_of("a name", "Name", "printable characters")
-_text = _text_of("Text", "Text", "printable characters")
-_address = _string("IpAddr", limits.pattern("Address"), "like 192.168.1.48 or with :port")
-_url = _text_of("CameraUrl", "Url", "ASCII characters without spaces")
-_mode = _choice("Mode", "Mode")
-_level = _choice("Level", "Level")
-_kind = _choice("Kind", "EventKind")
-_finding = _choice("Finding", "Finding")
-_task = _choice("Task", "Task")
-_mission_state = _choice("MissionState", "MissionState")
-_state = _choice("State", "OrderState")
-_takeover = _choice("Takeover", "Takeover")
-
-_message_id = _integer("MessageID", "Positive")
-_answers = _integer("Answers", "Natural")
-_session_id = _integer("SessionID", "SessionID")
-_session = _integer("Session", "Session")
-_event_id = _integer("EventID", "Positive")
-_code = _integer("Code", "Code")
-_tick = _integer("a tick", "Tick")
-_mission_id = _integer("MissionID", "Natural")
-_laps = _integer("Laps", "Laps")
-_waypoints_left = _integer("WaypointsLeft", "WaypointsLeft")
-
-_speed = _real("Speed", "Speed")
-_turn_rate = _real("TurnRate", "TurnRate")
-_heading = _real("Heading", "Heading")
-_latitude = _real("Latitude", "Latitude")
-_longitude = _real("Longitude", "Longitude")
-_unit = _real("Severity and Confidence", "Fraction")
-_frequency = _real("Frequency", "Frequency")
-_duration = _real("a duration", "Duration")
-_measured = _real("Value", "Measured")
 
 _VALUES = most("SensorValue", "Value")
 _WAYPOINTS = most("GoTo", "Waypoint")
@@ -122,66 +24,59 @@ _DEVICES = most("DeviceList", "Device")
 _LISTED = most("SensorList", "Device")
 
 
-def _write_position(at: m.Position, tag: str = "Position") -> str:
-    return (
-        f"<{tag}><Latitude>{_latitude(at.latitude)}</Latitude>"
-        f"<Longitude>{_longitude(at.longitude)}</Longitude></{tag}>"
-    )
-
-
 def _write_registration(body: m.Registration | m.Device) -> str:
     return (
-        f"<DeviceLabel>{_name(body.label)}</DeviceLabel>"
-        f"<DeviceType>{_name(body.device_type)}</DeviceType>"
-        f"<IpAddr>{_address(body.address)}</IpAddr>"
+        f"<DeviceLabel>{v.name(body.label)}</DeviceLabel>"
+        f"<DeviceType>{v.name(body.device_type)}</DeviceType>"
+        f"<IpAddr>{v.address(body.address)}</IpAddr>"
     )
 
 
 def _write_set_teleop(body: m.SetTeleOp) -> str:
-    seen = _optional("SeenTick", _tick, body.seen_tick)
+    seen = v.optional("SeenTick", v.tick, body.seen_tick)
     return (
-        f"<TeleOp><SetTeleOp><Speed>{_speed(body.speed)}</Speed>"
-        f"<TurnRate>{_turn_rate(body.turn_rate)}</TurnRate>{seen}</SetTeleOp></TeleOp>"
+        f"<TeleOp><SetTeleOp><Speed>{v.speed(body.speed)}</Speed>"
+        f"<TurnRate>{v.turn_rate(body.turn_rate)}</TurnRate>{seen}</SetTeleOp></TeleOp>"
     )
 
 
 def _write_status(body: m.RobotStatus) -> str:
     return (
-        f"<RobotStatus><Mode>{_mode(body.mode)}</Mode>{_write_position(body.position)}"
-        f"<Heading>{_heading(body.heading)}</Heading><Speed>{_speed(body.speed)}</Speed>"
-        f"<TurnRate>{_turn_rate(body.turn_rate)}</TurnRate><Tick>{_tick(body.tick)}</Tick>"
+        f"<RobotStatus><Mode>{v.mode(body.mode)}</Mode>{v.position(body.position)}"
+        f"<Heading>{v.heading(body.heading)}</Heading><Speed>{v.speed(body.speed)}</Speed>"
+        f"<TurnRate>{v.turn_rate(body.turn_rate)}</TurnRate><Tick>{v.tick(body.tick)}</Tick>"
         "</RobotStatus>"
     )
 
 
 def _write_robot_holder(body: m.RobotHolder) -> str:
-    holder = _optional("HolderID", _device_id, body.holder)
-    label = _optional("DeviceLabel", _name, body.label)
-    held = f"<HeldFor>{_duration(body.held_for)}</HeldFor>"
-    code = _optional("Code", _code, body.code)
+    holder = v.optional("HolderID", v.device_id, body.holder)
+    label = v.optional("DeviceLabel", v.name, body.label)
+    held = f"<HeldFor>{v.duration(body.held_for)}</HeldFor>"
+    code = v.optional("Code", v.code, body.code)
     return f"<RobotHolder>{holder}{label}{held}{code}</RobotHolder>"
 
 
 def _write_person_status(body: m.PersonStatus) -> str:
     return (
-        f"<PersonStatus><Activity>{_name(body.activity)}</Activity>"
-        f"{_write_position(body.position)}</PersonStatus>"
+        f"<PersonStatus><Activity>{v.name(body.activity)}</Activity>"
+        f"{v.position(body.position)}</PersonStatus>"
     )
 
 
 def _write_get_sensor_info(body: m.GetSensorInfo) -> str:
-    device = _optional("DeviceID", _device_id, body.device)
+    device = v.optional("DeviceID", v.device_id, body.device)
     return f"<Sensor><GetSensorInfo>{device}</GetSensorInfo></Sensor>"
 
 
 def _write_sensor_value(body: m.SensorValue) -> str:
     if not 1 <= len(body.values) <= _VALUES:
-        raise _bad(f"SensorValue must have 1 to {_VALUES} values, not {len(body.values)}")
-    values = "".join([f"<Value>{_measured(value)}</Value>" for value in body.values])
+        raise v.bad(f"SensorValue must have 1 to {_VALUES} values, not {len(body.values)}")
+    values = "".join([f"<Value>{v.measured(value)}</Value>" for value in body.values])
     return (
-        f"<Sensor><SensorValue><SensorName>{_name(body.sensor)}</SensorName>"
-        f"{values}<Unit>{_name(body.unit)}</Unit>"
-        f"<Tick>{_tick(body.tick)}</Tick></SensorValue></Sensor>"
+        f"<Sensor><SensorValue><SensorName>{v.name(body.sensor)}</SensorName>"
+        f"{values}<Unit>{v.name(body.unit)}</Unit>"
+        f"<Tick>{v.tick(body.tick)}</Tick></SensorValue></Sensor>"
     )
 
 
@@ -191,19 +86,19 @@ def _write_go_to(body: m.GoTo) -> str:
 
 def _write_waypoints(waypoints: tuple[m.Position, ...]) -> str:
     if not 1 <= len(waypoints) <= _WAYPOINTS:
-        raise _bad(f"a mission must have 1 to {_WAYPOINTS} waypoints, not {len(waypoints)}")
-    return "".join(_write_position(at, "Waypoint") for at in waypoints)
+        raise v.bad(f"a mission must have 1 to {_WAYPOINTS} waypoints, not {len(waypoints)}")
+    return "".join(v.position(at, "Waypoint") for at in waypoints)
 
 
 def _write_patrol(body: m.Patrol) -> str:
     way = _write_waypoints(body.waypoints)
-    return f"<Mission><Patrol>{way}<Laps>{_laps(body.laps)}</Laps></Patrol></Mission>"
+    return f"<Mission><Patrol>{way}<Laps>{v.laps(body.laps)}</Laps></Patrol></Mission>"
 
 
 def _write_inspect(body: m.Inspect) -> str:
     return (
-        f"<Mission><Inspect><EventID>{_event_id(body.event_id)}</EventID>"
-        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}</Inspect></Mission>"
+        f"<Mission><Inspect><EventID>{v.event_id(body.event_id)}</EventID>"
+        f"<Kind>{v.kind(body.kind)}</Kind>{v.position(body.position)}</Inspect></Mission>"
     )
 
 
@@ -213,187 +108,187 @@ def _write_mission(body: m.MissionStatus) -> str:
 
 def _write_mission_status(body: m.MissionStatus) -> str:
     return (
-        f"<MissionStatus><MissionID>{_mission_id(body.mission_id)}</MissionID>"
-        f"<MissionState>{_mission_state(body.mission_state)}</MissionState>"
-        f"<WaypointsLeft>{_waypoints_left(body.waypoints_left)}</WaypointsLeft>"
-        f"<Reason>{_text(body.reason)}</Reason></MissionStatus>"
+        f"<MissionStatus><MissionID>{v.mission_id(body.mission_id)}</MissionID>"
+        f"<MissionState>{v.mission_state(body.mission_state)}</MissionState>"
+        f"<WaypointsLeft>{v.waypoints_left(body.waypoints_left)}</WaypointsLeft>"
+        f"<Reason>{v.text(body.reason)}</Reason></MissionStatus>"
     )
 
 
 def _write_dev_sub(body: m.DevSub) -> str:
     return (
-        f"<DevSub><SensorName>{_name(body.sensor)}</SensorName>"
-        f"<Frequency>{_frequency(body.frequency)}</Frequency></DevSub>"
+        f"<DevSub><SensorName>{v.name(body.sensor)}</SensorName>"
+        f"<Frequency>{v.frequency(body.frequency)}</Frequency></DevSub>"
     )
 
 
 def _write_permission_request(body: m.PermissionRequest) -> str:
-    takeover = _optional("Takeover", _takeover, body.takeover)
+    takeover = v.optional("Takeover", v.takeover, body.takeover)
     return (
-        f"<Access><PermissionRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
-        f"<Level>{_level(body.level)}</Level>{_write_sensor_names(body.sensors)}"
+        f"<Access><PermissionRequest><DeviceID>{v.device_id(body.device)}</DeviceID>"
+        f"<Level>{v.level(body.level)}</Level>{_write_sensor_names(body.sensors)}"
         f"{takeover}</PermissionRequest></Access>"
     )
 
 
 def _write_sensor_names(names: tuple[str, ...]) -> str:
     if len(names) > _NAMES:
-        raise _bad(f"at most {_NAMES} sensors fit into a message, not {len(names)}")
-    return "".join(f"<SensorName>{_name(name)}</SensorName>" for name in names)
+        raise v.bad(f"at most {_NAMES} sensors fit into a message, not {len(names)}")
+    return "".join(f"<SensorName>{v.name(name)}</SensorName>" for name in names)
 
 
 def _write_granted(body: m.PermissionGrant | m.Permission) -> str:
     """What a grant and the reply about it have in common."""
-    address = _optional("IpAddr", _address, body.address)
+    address = v.optional("IpAddr", v.address, body.address)
     return (
-        f"<Level>{_level(body.level)}</Level><Session>{_session(body.session)}</Session>"
+        f"<Level>{v.level(body.level)}</Level><Session>{v.session(body.session)}</Session>"
         f"{address}{_write_sensor_names(body.sensors)}"
     )
 
 
 def _write_permission_grant(body: m.PermissionGrant) -> str:
     return (
-        f"<Access><PermissionGrant><HolderID>{_device_id(body.holder)}</HolderID>"
+        f"<Access><PermissionGrant><HolderID>{v.device_id(body.holder)}</HolderID>"
         f"{_write_granted(body)}</PermissionGrant></Access>"
     )
 
 
 def _write_permission_revocation(body: m.PermissionRevocation) -> str:
     return (
-        f"<Access><PermissionRevocation><DeviceID>{_device_id(body.device)}</DeviceID>"
-        f"<HolderID>{_device_id(body.holder)}</HolderID>"
-        f"<Session>{_session(body.session)}</Session></PermissionRevocation></Access>"
+        f"<Access><PermissionRevocation><DeviceID>{v.device_id(body.device)}</DeviceID>"
+        f"<HolderID>{v.device_id(body.holder)}</HolderID>"
+        f"<Session>{v.session(body.session)}</Session></PermissionRevocation></Access>"
     )
 
 
 def _write_handover_request(body: m.HandoverRequest) -> str:
     return (
-        f"<Access><HandoverRequest><DeviceID>{_device_id(body.device)}</DeviceID>"
-        f"<HolderID>{_device_id(body.holder)}</HolderID>"
-        f"<DeviceLabel>{_name(body.label)}</DeviceLabel></HandoverRequest></Access>"
+        f"<Access><HandoverRequest><DeviceID>{v.device_id(body.device)}</DeviceID>"
+        f"<HolderID>{v.device_id(body.holder)}</HolderID>"
+        f"<DeviceLabel>{v.name(body.label)}</DeviceLabel></HandoverRequest></Access>"
     )
 
 
 def _write_get_grant(body: m.GetGrant) -> str:
-    holder = _device_id(body.holder)
+    holder = v.device_id(body.holder)
     return f"<Access><GetGrant><HolderID>{holder}</HolderID></GetGrant></Access>"
 
 
 def _write_event_report(body: m.EventReport) -> str:
-    number = _optional("EventID", _event_id, body.event_id)
+    number = v.optional("EventID", v.event_id, body.event_id)
     return (
-        f"<Event><EventReport>{number}<Kind>{_kind(body.kind)}</Kind>"
-        f"{_write_position(body.position)}<Severity>{_unit(body.severity)}</Severity>"
-        f"<Confidence>{_unit(body.confidence)}</Confidence>"
-        f"<Finding>{_finding(body.finding)}</Finding></EventReport></Event>"
+        f"<Event><EventReport>{number}<Kind>{v.kind(body.kind)}</Kind>"
+        f"{v.position(body.position)}<Severity>{v.unit(body.severity)}</Severity>"
+        f"<Confidence>{v.unit(body.confidence)}</Confidence>"
+        f"<Finding>{v.finding(body.finding)}</Finding></EventReport></Event>"
     )
 
 
 def _write_order(body: m.Order) -> str:
-    device = _optional("DeviceID", _device_id, body.device)
+    device = v.optional("DeviceID", v.device_id, body.device)
     # Left out where it is the usual one, so that a receiver of version 1.1 understands it.
-    task = "" if body.task == "confirm" else f"<Task>{_task(body.task)}</Task>"
+    task = "" if body.task == "confirm" else f"<Task>{v.task(body.task)}</Task>"
     return (
-        f"<Event><Order><EventID>{_event_id(body.event_id)}</EventID>"
-        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}{device}{task}"
+        f"<Event><Order><EventID>{v.event_id(body.event_id)}</EventID>"
+        f"<Kind>{v.kind(body.kind)}</Kind>{v.position(body.position)}{device}{task}"
         "</Order></Event>"
     )
 
 
 def _write_order_progress(body: m.OrderProgress) -> str:
     return (
-        f"<Event><OrderProgress><EventID>{_event_id(body.event_id)}</EventID>"
-        f"<State>{_state(body.state)}</State></OrderProgress></Event>"
+        f"<Event><OrderProgress><EventID>{v.event_id(body.event_id)}</EventID>"
+        f"<State>{v.state(body.state)}</State></OrderProgress></Event>"
     )
 
 
 def _write_task_announcement(body: m.TaskAnnouncement) -> str:
     return (
-        f"<Event><TaskAnnouncement><EventID>{_event_id(body.event_id)}</EventID>"
-        f"<Kind>{_kind(body.kind)}</Kind>{_write_position(body.position)}"
-        f"<Severity>{_unit(body.severity)}</Severity>"
-        f"<BidWithin>{_duration(body.bid_within)}</BidWithin></TaskAnnouncement></Event>"
+        f"<Event><TaskAnnouncement><EventID>{v.event_id(body.event_id)}</EventID>"
+        f"<Kind>{v.kind(body.kind)}</Kind>{v.position(body.position)}"
+        f"<Severity>{v.unit(body.severity)}</Severity>"
+        f"<BidWithin>{v.duration(body.bid_within)}</BidWithin></TaskAnnouncement></Event>"
     )
 
 
 def _write_task_bid(body: m.TaskBid) -> str:
     return (
-        f"<Event><TaskBid><EventID>{_event_id(body.event_id)}</EventID>"
-        f"<ArrivalIn>{_duration(body.arrival_in)}</ArrivalIn></TaskBid></Event>"
+        f"<Event><TaskBid><EventID>{v.event_id(body.event_id)}</EventID>"
+        f"<ArrivalIn>{v.duration(body.arrival_in)}</ArrivalIn></TaskBid></Event>"
     )
 
 
 def _write_task_award(body: m.TaskAward) -> str:
-    number = _event_id(body.event_id)
+    number = v.event_id(body.event_id)
     return f"<Event><TaskAward><EventID>{number}</EventID></TaskAward></Event>"
 
 
 def _write_relocation(body: m.Relocation) -> str:
-    return f"<Event><Relocation>{_write_position(body.position)}</Relocation></Event>"
+    return f"<Event><Relocation>{v.position(body.position)}</Relocation></Event>"
 
 
 def _write_reply(body: m.Reply) -> str:
     content = "" if body.content is None else _CONTENT_WRITERS[type(body.content)](body.content)
     return (
-        f"<reply><Answers>{_answers(body.answers)}</Answers><Code>{_code(body.code)}</Code>"
-        f"<Text>{_text(body.text)}</Text>{content}</reply>"
+        f"<reply><Answers>{v.answers(body.answers)}</Answers><Code>{v.code(body.code)}</Code>"
+        f"<Text>{v.text(body.text)}</Text>{content}</reply>"
     )
 
 
 def _write_device_list(content: m.DeviceList) -> str:
     if len(content.devices) > _DEVICES:
-        raise _bad(f"DeviceList must have at most {_DEVICES} devices, not {len(content.devices)}")
+        raise v.bad(f"DeviceList must have at most {_DEVICES} devices, not {len(content.devices)}")
     devices = "".join(
-        f"<Device><IdTag>{_device_id(device.id_tag)}</IdTag>{_write_registration(device)}</Device>"
+        f"<Device><IdTag>{v.device_id(device.id_tag)}</IdTag>{_write_registration(device)}</Device>"
         for device in content.devices
     )
     return f"<DeviceList>{devices}</DeviceList>"
 
 
 def _write_sensor_info(content: m.SensorInfo) -> str:
-    url = _url(content.camera_url)
+    url = v.url(content.camera_url)
     return f"<SensorInfo><CameraUrl>{url}</CameraUrl>{_write_sensors(content.sensors)}</SensorInfo>"
 
 
 def _write_sensors(sensors: tuple[m.Sensor, ...]) -> str:
     if len(sensors) > _SENSORS:
-        raise _bad(f"a device must have at most {_SENSORS} sensors, not {len(sensors)}")
+        raise v.bad(f"a device must have at most {_SENSORS} sensors, not {len(sensors)}")
     return "".join(
-        f"<Sensor><SensorName>{_name(sensor.name)}</SensorName>"
-        f"<Unit>{_name(sensor.unit)}</Unit></Sensor>"
+        f"<Sensor><SensorName>{v.name(sensor.name)}</SensorName>"
+        f"<Unit>{v.name(sensor.unit)}</Unit></Sensor>"
         for sensor in sensors
     )
 
 
 def _write_sensor_list(content: m.SensorList) -> str:
     if len(content.devices) > _LISTED:
-        raise _bad(f"SensorList must have at most {_LISTED} devices, not {len(content.devices)}")
+        raise v.bad(f"SensorList must have at most {_LISTED} devices, not {len(content.devices)}")
     return f"<SensorList>{''.join(map(_write_device_sensors, content.devices))}</SensorList>"
 
 
 def _write_device_sensors(device: m.DeviceSensors) -> str:
-    camera = _optional("CameraUrl", _url, device.camera_url)
+    camera = v.optional("CameraUrl", v.url, device.camera_url)
     return (
-        f"<Device><DeviceID>{_device_id(device.device)}</DeviceID>"
+        f"<Device><DeviceID>{v.device_id(device.device)}</DeviceID>"
         f"{camera}{_write_sensors(device.sensors)}</Device>"
     )
 
 
 def _write_holder(content: m.Holder) -> str:
     return (
-        f"<Holder><HolderID>{_device_id(content.holder)}</HolderID>"
-        f"<DeviceLabel>{_name(content.label)}</DeviceLabel>"
-        f"<HeldFor>{_duration(content.held_for)}</HeldFor></Holder>"
+        f"<Holder><HolderID>{v.device_id(content.holder)}</HolderID>"
+        f"<DeviceLabel>{v.name(content.label)}</DeviceLabel>"
+        f"<HeldFor>{v.duration(content.held_for)}</HeldFor></Holder>"
     )
 
 
 def _write_session_floor(content: m.SessionFloor) -> str:
-    return f"<SessionFloor><Session>{_session(content.session)}</Session></SessionFloor>"
+    return f"<SessionFloor><Session>{v.session(content.session)}</Session></SessionFloor>"
 
 
 def _write_permission(content: m.Permission) -> str:
     return (
-        f"<Permission><DeviceID>{_device_id(content.device)}</DeviceID>"
+        f"<Permission><DeviceID>{v.device_id(content.device)}</DeviceID>"
         f"{_write_granted(content)}</Permission>"
     )
 
@@ -410,6 +305,7 @@ _CONTENT_WRITERS: Final[dict[type, Callable[[Any], str]]] = {
     m.Holder: _write_holder,
     m.SessionFloor: _write_session_floor,
     m.SensorList: _write_sensor_list,
+    **control_room.CONTENT_WRITERS,
 }
 _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.Emergency: ("EmergencyMsg", _always("")),
@@ -447,6 +343,7 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
     m.TaskBid: ("SimpleMsg", _write_task_bid),
     m.TaskAward: ("SimpleMsg", _write_task_award),
     m.Relocation: ("SimpleMsg", _write_relocation),
+    **{kind: ("SimpleMsg", write) for kind, write in control_room.WRITERS.items()},
     m.Reply: ("SimpleMsg", _write_reply),
 }
 
@@ -454,11 +351,11 @@ _WRITERS: Final[dict[type, tuple[str, Callable[[Any], str]]]] = {
 def _write_session(message: m.Message) -> str:
     if type(message.body) is m.Heartbeat:
         if message.session is not None:
-            raise _bad("a heartbeat carries no session")
+            raise v.bad("a heartbeat carries no session")
         return ""
     if message.session is None:
-        raise _bad("only a heartbeat carries no session; before one is granted it is 0")
-    return f"<SessionID>{_session_id(message.session)}</SessionID>"
+        raise v.bad("only a heartbeat carries no session; before one is granted it is 0")
+    return f"<SessionID>{v.session_id(message.session)}</SessionID>"
 
 
 def write(message: m.Message) -> str:
@@ -470,11 +367,11 @@ def write(message: m.Message) -> str:
     try:
         kind, write_body = _WRITERS[type(message.body)]
         return (
-            f"{DECLARATION}<msg><{kind}><DestinationID>{_device_id(message.destination)}</DestinationID>"
-            f"<MessageID>{_message_id(message.message_id)}</MessageID>"
-            f"<SourceID>{_device_id(message.source)}</SourceID>"
-            f"<Timestamp>{_clock(message.timestamp)}</Timestamp>"
+            f"{DECLARATION}<msg><{kind}><DestinationID>{v.device_id(message.destination)}</DestinationID>"
+            f"<MessageID>{v.message_id(message.message_id)}</MessageID>"
+            f"<SourceID>{v.device_id(message.source)}</SourceID>"
+            f"<Timestamp>{v.clock(message.timestamp)}</Timestamp>"
             f"{_write_session(message)}{write_body(message.body)}</{kind}></msg>"
         )
     except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise _bad(f"a value of the wrong type: {error}") from error
+        raise v.bad(f"a value of the wrong type: {error}") from error

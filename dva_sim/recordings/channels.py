@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import heapq
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.observation import CameraFrame
+from dva_sim.core.audit import Fact
 from dva_sim.kernel.recorder import Sent, TrackPoint
 from dva_sim.recordings import messages
 from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
@@ -310,8 +312,10 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
     }
 
 
-STORY, MESSAGES, DECISIONS = "/story", "/messages", "/decisions/"
-SCREEN, COMMANDS, CAMERA = "screen", "commands", "camera"  # last parts of topics
+STORY, MESSAGES, DECISIONS, AUDIT = "/story", "/messages", "/decisions/", "/audit"
+FACTS = "/facts"
+# Last parts of topics.
+SCREEN, COMMANDS, CAMERA, APPLIED = "screen", "commands", "camera", "applied"
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
 
 
@@ -329,6 +333,24 @@ def told(playback: Playback) -> Iterator[ChannelMessage]:
             line=0,
             kind=moment.kind,
         )
+
+
+def facts(playback: Playback) -> Iterator[ChannelMessage]:
+    """What was decided, by whom and why, where people take part; without, the story tells."""
+    for fact in playback.facts if playback.people_decide else ():
+        content = {_IN_SECONDS.get(name, name): value for name, value in fact.row().items()}
+        del content["time"]
+        yield stamped(fact.time, FACTS, "dva_sim.Fact", **content)
+
+
+def fact_of(time: float, content: Mapping[str, Any]) -> Fact:
+    """The fact that a message of `facts` holds."""
+    names = {written: name for name, written in _IN_SECONDS.items()}
+    held = {names.get(name, name): value for name, value in content.items() if name != "timestamp"}
+    return Fact(time=time, **held)
+
+
+_IN_SECONDS = {name: f"{name}_s" for name in ("arrival_in", "advised_in", "waited")}
 
 
 def said(playback: Playback) -> Iterator[ChannelMessage]:
@@ -350,11 +372,18 @@ def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[Chann
             yield ChannelMessage(time, f"{DECISIONS}{name}", "dva_sim.Decision", content)
 
 
+def audited(rows: Sequence[tuple[float, Mapping[str, Any]]]) -> Iterator[ChannelMessage]:
+    """The rows of an audit log, with their hashes."""
+    for time, row in rows:
+        content = {"timestamp": messages.stamp(time), "row": json.dumps(row)}
+        yield ChannelMessage(time, AUDIT, "dva_sim.Audited", content)
+
+
 def names_of(labels: Mapping[str, str]) -> dict[str, str]:
     """A name for each id that fits into a topic, and that no other id has."""
     names: dict[str, str] = {}
     for device, label in labels.items():
-        name = label.replace(" ", "-")
+        name = label.replace(" ", "-").replace("/", "-")
         taken = name in names.values()
         names[device] = f"{name}-{device.replace(':', '')}" if taken else name
     return names
@@ -362,9 +391,9 @@ def names_of(labels: Mapping[str, str]) -> dict[str, str]:
 
 def shown(playback: Playback) -> Iterator[ChannelMessage]:
     """The frames that come onto the operators' screens."""
-    labels = playback.labels
+    labels, names = playback.labels, names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
-        topic, whose = f"/{labels[drive.operator]}/{SCREEN}", labels[drive.robot]
+        topic, whose = f"/{names[drive.operator]}/{SCREEN}", labels[drive.robot]
         for at in drive.frames:
             said = {"drive": number, "robot": whose, "captured_s": at.captured}
             yield stamped(at.time, topic, "dva_sim.Shown", **said)
@@ -372,9 +401,9 @@ def shown(playback: Playback) -> Iterator[ChannelMessage]:
 
 def commanded(playback: Playback) -> Iterator[ChannelMessage]:
     """What the phones make of the tilt."""
-    labels = playback.labels
+    labels, names = playback.labels, names_of(playback.labels)
     for number, drive in enumerate(playback.recorder.drives):
-        topic, whose = f"/{labels[drive.operator]}/{COMMANDS}", labels[drive.robot]
+        topic, whose = f"/{names[drive.operator]}/{COMMANDS}", labels[drive.robot]
         for time, speed, turn_rate in drive.commands:
             made = {"speed_m_s": round(speed, 5), "turn_rate_rad_s": round(turn_rate, 5)}
             yield stamped(time, topic, "dva_sim.Command", drive=number, robot=whose, **made)
@@ -386,7 +415,7 @@ def applied(playback: Playback) -> Iterator[ChannelMessage]:
         for a in drive.applied:
             yield stamped(
                 a.time,
-                f"/{playback.labels[drive.robot]}/applied",
+                f"/{playback.labels[drive.robot]}/{APPLIED}",
                 "dva_sim.Applied",
                 made_s=a.issued,
                 sent_s=a.sent,

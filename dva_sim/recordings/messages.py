@@ -98,6 +98,7 @@ _WORDS: dict[str, Schema] = {
     "number": _NUMBER,
     "maybe": {"type": ["number", "null"]},
     "text": {"type": "string"},
+    "words": {"type": ["string", "null"]},
     "flag": {"type": "boolean"},
     "count": {"type": "integer", "minimum": 0},
     "nsec": {"type": "integer", "minimum": 0, "maximum": 999_999_999},

@@ -21,8 +21,10 @@ import numpy as np
 import pydantic
 from numpy.typing import NDArray
 
+from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.kernel.recorder import Applied, DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels, messages, writing
 from dva_sim.recordings.messages import XML
 from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
@@ -144,6 +146,7 @@ class Opened:
             file does not say.
         lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
         traces: The lines of what was decided, by who decides.
+        audit: The rows of the audit log.
     """
 
     playback: Playback
@@ -151,6 +154,7 @@ class Opened:
     tables: dict[str, list[dict[str, Any]]] | None
     lasted: float
     traces: dict[str, list[str]] = field(default_factory=dict)
+    audit: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def is_whole(self) -> bool:
@@ -288,6 +292,8 @@ def _opened(raw: _Raw) -> Opened:
         duration=raw.time if raw.is_cut else run["duration_s"],
         contained=contained,
         endings=[] if raw.is_cut else [_ending(entry) for entry in run.get("endings", [])],
+        events=[_event(entry) for entry in run.get("events", [])],
+        facts=[channels.fact_of(time, held) for time, held in raw.said.get(channels.FACTS, ())],
     )
     tables = _tables(raw.files[TABLES]) if TABLES in raw.files else None
     traces = {
@@ -295,7 +301,8 @@ def _opened(raw: _Raw) -> Opened:
         for topic, said in raw.said.items()
         if topic.startswith(channels.DECISIONS)
     }
-    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces)
+    audit = [json.loads(entry["row"]) for _, entry in raw.said.get(channels.AUDIT, ())]
+    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces, audit)
 
 
 def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:
@@ -320,6 +327,18 @@ def _incident(number: int, entry: Mapping[str, Any], told: Said) -> RunHazard:
 
 def _ending(entry: Mapping[str, Any]) -> Ending:
     return Ending(entry["outcome"], inf if entry["time_s"] is None else entry["time_s"])
+
+
+def _event(entry: Mapping[str, Any]) -> Event:
+    return Event(
+        number=entry["number"],
+        kind=entry["kind"],
+        position=Position(entry["latitude_deg"], entry["longitude_deg"]),
+        severity=entry["severity"],
+        state=State(entry["state"]),
+        **{who: entry[who] for who in writing.SENT},
+        times=dict(entry["times_s"]),
+    )
 
 
 def _surroundings(
@@ -415,7 +434,21 @@ def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
         for time, made in said if topic.endswith(f"/{channels.COMMANDS}") else ():
             command = time, made["speed_m_s"], made["turn_rate_rad_s"]
             drives[made["drive"]].commands.append(command)
+    for drive in drives:
+        for time, told in raw.said.get(f"/{run['labels'][drive.robot]}/{channels.APPLIED}", ()):
+            if drive.ordered <= time and (drive.ended is None or time <= drive.ended):
+                drive.applied.append(_applied(time, told))
     return drives
+
+
+def _applied(time: float, told: Mapping[str, Any]) -> Applied:
+    until, captured = told["until_s"], told["captured_s"]
+    return Applied(
+        *(told["made_s"], told["sent_s"], told["arrived_s"], time),
+        inf if until is None else until,
+        nan,
+        nan if captured is None else captured,
+    )
 
 
 Columns = dict[str, NDArray[Any]]

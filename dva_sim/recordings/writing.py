@@ -22,6 +22,7 @@ from typing import IO, Any
 import numpy as np
 
 from dva_sim import __version__
+from dva_sim.core.events import Event
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import refuse_to_replace
@@ -94,6 +95,7 @@ FORMAT = 1  # of what is attached; a reader refuses a later one
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
+SENT = ("responder", "operator", "actor")  # to an event
 DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
 SUFFIX, PART = ".mcap", ".part"  # a recording; what a live run puts together until its end
 CHUNK = 256 * 1024  # what a file that was cut short loses at most, unpacked [B]
@@ -147,6 +149,7 @@ def write_recording(
     tables: Tables | None = None,
     about: Mapping[str, str] | None = None,
     traces: Mapping[str, Sequence[tuple[float, str]]] | None = None,
+    audit: Sequence[tuple[float, Mapping[str, Any]]] = (),
 ) -> None:
     """Write a run as MCAP, in its time from zero.
 
@@ -156,6 +159,7 @@ def write_recording(
         tables: What was measured, rows by table; goes with it as JSON.
         about: More to say of the run, such as its place in a study.
         traces: What was decided: lines with their time [s], by who decides.
+        audit: Rows of an audit log, with their time [s].
 
     Raises:
         DvaSimError: the file cannot be written.
@@ -164,7 +168,8 @@ def write_recording(
     if playback.recorder.traffic is None:
         raise ValueError("a recording needs a run made with keep_traffic")
     with whole_file(path) as file:
-        _write(playback, file, tables, dict(about or {}), traces or {})
+        decided = [*channels.decided(traces or {}), *channels.audited(audit)]
+        _write(playback, file, tables, dict(about or {}), decided)
 
 
 def _beside(path: Path) -> Path:
@@ -204,6 +209,7 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
     yield from channels.beliefs(playback)
     yield from channels.fixes(playback)
     yield from channels.told(playback)
+    yield from channels.facts(playback)
     yield from channels.commanded(playback)
     yield from channels.said(playback)
     yield from channels.applied(playback)
@@ -211,7 +217,11 @@ def every_message(playback: Playback) -> Iterator[ChannelMessage]:
 
 
 def _write(
-    playback: Playback, file: IO[bytes], tables: Tables | None, about: Any, traces: Any
+    playback: Playback,
+    file: IO[bytes],
+    tables: Tables | None,
+    about: Any,
+    decided: Sequence[ChannelMessage],
 ) -> None:
     from mcap.writer import Writer
 
@@ -226,11 +236,13 @@ def _write(
     writer.add_metadata(ABOUT, _about(playback) | about | {DIGEST: digest(attached)})
     for name, data in attached.items():
         writer.add_attachment(0, 0, name, _media_type(name), data)
-    _add_messages(writer, playback, files, traces)
+    _add_messages(writer, playback, files, decided)
     writer.finish()
 
 
-def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes], traces: Any) -> None:
+def _add_messages(
+    writer: Any, playback: Playback, files: Mapping[str, bytes], decided: Sequence[ChannelMessage]
+) -> None:
     """All messages in order of time; schemas and channels are opened when first used."""
     ids = {name: device for device, name in channels.names_of(playback.labels).items()}
     counts: Counter[int] = Counter()
@@ -251,7 +263,7 @@ def _add_messages(writer: Any, playback: Playback, files: Mapping[str, bytes], t
         ends = {"source": source, "destination": destination}
         return int(writer.register_channel(topic, XML, number, ends))
 
-    said = chain(every_message(playback), channels.decided(traces))
+    said = chain(every_message(playback), decided)
     every = [_packed(message) for message in said]
     plan = next((data for name, data in files.items() if name.endswith(".geojson")), None)
     if plan is not None:
@@ -292,10 +304,25 @@ def facts(playback: Playback) -> dict[str, Any]:
             {"outcome": ending.outcome, "time_s": messages.finite(ending.time)}
             for ending in playback.endings
         ],
+        "events": [_event(event) for event in playback.events],
         "drives": [
             {key: getattr(drive, key.removesuffix("_s")) for key in DRIVE}
             for drive in playback.recorder.drives
         ],
+    }
+
+
+def _event(event: Event) -> dict[str, Any]:
+    """An event as the DVA knew it in the end; the times say how it stood before."""
+    return {
+        "number": event.number,
+        "kind": event.kind,
+        "latitude_deg": event.position.latitude,
+        "longitude_deg": event.position.longitude,
+        "severity": event.severity,
+        "state": event.state.value,
+        **{who: getattr(event, who) for who in SENT},
+        "times_s": event.times,
     }
 
 

@@ -1,4 +1,7 @@
-"""Recordings and traces: their messages are valid, and every decision is made the same again."""
+"""What proves something: recordings, traces and audit logs.
+
+Messages are valid, every decision is made the same again, and a chain of rows is whole.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.testing.messages import Problem, check_message
+from dva_sim.protocol.mistakes import Problem, check_message
 
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 
@@ -19,6 +22,7 @@ Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was l
 def check_recording(path: Path) -> Found:
     """What is wrong with a recording, and doubts: its messages, and the decisions it holds."""
     from dva_sim.recordings import read_recording  # late: start-up
+    from dva_sim.recordings.audit_log import verify_plain  # late: start-up
 
     try:
         opened = read_recording(path)
@@ -35,6 +39,11 @@ def check_recording(path: Path) -> Found:
         replayed = _replayed([line.encode() for line in lines], path)
         problems += [Problem(1, 1, f"{who}, line {p.line}: {p.text}") for p in replayed.problems]
         note += f", {replayed.decisions} decisions of {who}"
+    if opened.audit:
+        found = verify_plain(opened.audit)
+        if wrong := found.problem:
+            problems.append(Problem(1, 1, f"audit log: row {wrong.number} {wrong.text}"))
+        note += f", an audit log whose last row is {found.rows} with the hash {found.head}"
     return problems, [] if opened.is_whole else ["was cut short"], note
 
 
@@ -43,6 +52,25 @@ def check_trace(path: Path) -> Found:
     *lines, rest = path.read_bytes().split(b"\n")
     replayed = _replayed(lines, path)
     return replayed.problems, [CUT] if rest else [], f"{replayed.decisions} decisions"
+
+
+def check_audit_log(path: Path) -> Found:
+    """The first row of an audit log that is wrong, what is odd in it, and its last hash.
+
+    A problem's line is the row's number.
+    """
+    from dva_sim.recordings.audit_log import verify  # late: start-up
+
+    try:
+        found = verify(path)
+    except ConfigError as error:
+        return [Problem(1, 1, error.problem)], [], ""
+    wrong = found.problem
+    problems = (
+        [] if wrong is None else [Problem(wrong.number, 1, f"row {wrong.number} {wrong.text}")]
+    )
+    rows = "1 row" if found.rows == 1 else f"{found.rows} rows"
+    return problems, list(found.doubts), f"{rows}, the last one with the hash {found.head}"
 
 
 class _Replayed(NamedTuple):

@@ -32,13 +32,13 @@ from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
+from dva_sim.protocol.mistakes import Problem
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario, model_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.transport import TransportScenario
-from dva_sim.testing.messages import Problem
 from dva_sim.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.validation.network.reference import PlanConfig, load_plan
 from dva_sim.worlds.geo import GeoFrame

@@ -16,7 +16,7 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.protocol.limits import schema_file
-from dva_sim.testing.messages import READ_BYTES, Problem, check_message, not_text
+from dva_sim.protocol.mistakes import READ_BYTES, Problem, check_message, not_text
 
 YAML_BYTES: Final = 256 * 1024
 PLAN_BYTES: Final = 16 * 1024 * 1024
@@ -28,10 +28,12 @@ _SUFFIXES: Final = {
     ".yml": "configuration",
     ".mcap": "recording",
     ".jsonl": "trace",
+    ".sqlite": "audit log",
 }
 _UNKNOWN: Final = (
     "cannot be recognised; should be a message (.xml), a plan (.geojson), a recording (.mcap), "
-    "a trace of decisions (.jsonl), or a study, scenario, site, ROS map or agent profile (.yaml)"
+    "a trace of decisions (.jsonl), an audit log (.sqlite), or a study, scenario, site, ROS map or "
+    "agent profile (.yaml)"
 )
 
 
@@ -65,7 +67,7 @@ def check_file(path: Path) -> FileVerdict:
         return _check_plan(path)
     if kind == "configuration":
         return _check_yaml(path)
-    if kind in ("recording", "trace"):
+    if kind in _EVIDENCE:
         return _check_evidence(kind, path)
     if path.suffix == ".part":
         told = "holds what a live run left; dva-sim replay makes a recording of it"
@@ -78,6 +80,8 @@ def _by_content(head: bytes) -> str | None:
     text = head.lstrip()
     if text.startswith(b"<"):
         return "message"
+    if head.startswith(b"SQLite format 3\0"):
+        return "audit log"
     return "plan" if text.startswith(b"{") and b'"FeatureCollection"' in text else None
 
 
@@ -114,11 +118,18 @@ def _check_plan(path: Path) -> FileVerdict:
     return FileVerdict("plan", _flawed(path, PLAN_BYTES) or check_plan(path))
 
 
+_EVIDENCE: Final = {
+    "recording": "check_recording",
+    "trace": "check_trace",
+    "audit log": "check_audit_log",
+}  # how each is judged
+
+
 def _check_evidence(kind: str, path: Path) -> FileVerdict:
-    from dva_sim.testing.evidence import check_recording, check_trace  # late: start-up
+    from dva_sim.testing import evidence  # late: start-up
 
     _read(path, 1)
-    return FileVerdict(kind, *(check_recording if kind == "recording" else check_trace)(path))
+    return FileVerdict(kind, *getattr(evidence, _EVIDENCE[kind])(path))
 
 
 def _check_yaml(path: Path) -> FileVerdict:

@@ -31,8 +31,9 @@ from typing import Final, Generic, NamedTuple, TypeVar
 import pymunk
 from pymunk._chipmunk_cffi import lib
 
+from dva_sim.kernel.makers import maker
 from dva_sim.worlds.drives import DriveSpec
-from dva_sim.worlds.geo import Pose
+from dva_sim.worlds.geo import Pose, make_pose
 
 SAME_CONTACT: Final = 0.5  # touching again within this time is the same contact [s]
 JAM_TIME: Final = 5.0  # asked to move for so long, in contact [s]; assumed
@@ -107,6 +108,7 @@ get_velocity, get_position = lib.cpBodyGetVelocity, lib.cpBodyGetPosition
 get_spin, get_angle = lib.cpBodyGetAngularVelocity, lib.cpBodyGetAngle
 set_velocity, set_spin = lib.cpBodySetVelocity, lib.cpBodySetAngularVelocity
 set_force, set_torque = lib.cpBodySetForce, lib.cpBodySetTorque
+step_space = lib.cpSpaceStep
 
 
 class AskedFor(Generic[T]):
@@ -161,6 +163,7 @@ class Ticks:
 
     def __init__(self, dt: float) -> None:
         self.dt, self.space = dt, pymunk.Space()
+        self._raw_space, self._have_changed = self.space._space, True
         self._tick_us = round(dt * US)
         self._tick, self._now_us = 0, 0
         self._awake: dict[Body, None] = {}  # a set that keeps its order
@@ -169,13 +172,18 @@ class Ticks:
         """A body was asked for something, or was touched: it is pushed from the next tick on."""
         self._awake[body] = None
 
+    def change(self) -> None:
+        """Shapes or bodies have come or gone."""
+        self._have_changed = True
+
     def forget(self, body: Body) -> None:
         """A body is not pushed any more."""
         self._awake.pop(body, None)
 
     def tick_at(self, time: float) -> float:
         """The first tick that begins at `time` [s] or later."""
-        return math.inf if time == math.inf else -(round(-max(time, 0.0) * US) // self._tick_us)
+        time = time if time > 0.0 else 0.0
+        return math.inf if time == math.inf else -(round(-time * US) // self._tick_us)
 
     @property
     def time(self) -> float:
@@ -184,7 +192,8 @@ class Ticks:
 
     def next_tick(self) -> int:
         """The first tick that a set point given now can reach."""
-        return max(self._tick, -(-self._now_us // self._tick_us))
+        due = -(-self._now_us // self._tick_us)
+        return due if due > self._tick else self._tick
 
     def advance_to(self, time: float) -> None:
         """Let the bodies move up to `time` [s], in whole ticks; never back."""
@@ -193,19 +202,24 @@ class Ticks:
             return
         self._now_us = now_us
         due = now_us // self._tick_us
-        step, dt, awake = self.space.step, self.dt, self._awake
-        while self._tick < due and awake:
-            stand = []
-            for body in awake:
-                if not body.push(self._tick, dt):
-                    stand.append(body)
+        tick, dt, awake = self._tick, self.dt, self._awake
+        while tick < due and awake:
+            stand = [body for body in awake if not body.push(tick, dt)]
             for body in stand:
                 del awake[body]
             if awake:
-                step(dt)
-            self._tick += 1
-        if self._tick < due:
+                self._step(dt)
+            self._tick = tick = tick + 1
+        if tick < due:
             self._tick = due
+
+    def _step(self, dt: float) -> None:
+        """Let the library step: without its care for what callbacks add or remove, as none do."""
+        if self._have_changed:
+            self.space.step(dt)
+            self._have_changed = False
+        else:
+            step_space(self._raw_space, dt)
 
 
 class Body:
@@ -292,6 +306,9 @@ class TickTarget(NamedTuple):
     speed: float
     turn_rate: float
     end: float
+
+
+_make_target = maker(TickTarget)
 
 
 STOP = TickTarget(0.0, 0.0, math.inf)
@@ -402,7 +419,7 @@ class RobotBody(Body):
     def pose(self) -> Pose:
         """Where it is, as of the last whole tick; the heading counts full turns."""
         place = get_position(self._raw)
-        return Pose(place.x, place.y, get_angle(self._raw))
+        return make_pose(place.x, place.y, get_angle(self._raw))
 
     @property
     def grip(self) -> float:
@@ -436,10 +453,12 @@ class RobotBody(Body):
         if not (math.isfinite(speed) and math.isfinite(turn_rate)) or math.isnan(until):
             self._asked.put(start, STOP)
         else:
-            speed = min(max(speed, 0.0), spec.max_speed)
-            turn_rate = min(max(turn_rate, -spec.max_turn_rate), spec.max_turn_rate)
+            most, fastest = spec.max_speed, spec.max_turn_rate
+            speed = 0.0 if speed < 0.0 else most if speed > most else speed
+            if not -fastest <= turn_rate <= fastest:
+                turn_rate = math.copysign(fastest, turn_rate)
             speed, turn_rate = self.motors.set_point(speed, turn_rate)
-            self._asked.put(start, TickTarget(speed, turn_rate, world.tick_at(until)))
+            self._asked.put(start, _make_target(speed, turn_rate, world.tick_at(until)))
         world.wake(self)
 
     @property

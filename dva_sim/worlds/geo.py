@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from dva_sim.kernel.makers import maker
+
 # WGS-84: semi-major axis [m] and first eccentricity squared.
 _A = 6_378_137.0
 _F = 1 / 298.257223563
@@ -19,6 +21,9 @@ class Pose(NamedTuple):
     x: float
     y: float
     heading: float
+
+
+make_pose = maker(Pose)
 
 
 @dataclass(frozen=True)

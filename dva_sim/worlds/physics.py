@@ -178,6 +178,7 @@ class World(Ticks):
         self.people.remove(person)
         self.forget(person)
         self.space.remove(person.body, person.shape)
+        self.change()
         del self._by_shape[person.shape]
 
     def _check_place(self, kind: str, name: str, pose: Pose, radius: float) -> None:
@@ -196,6 +197,7 @@ class World(Ticks):
     def _add(self, body: Body) -> None:
         body.shape.filter = pymunk.ShapeFilter(categories=_MOVING)
         self.space.add(body.body, body.shape)
+        self.change()
         self._by_shape[body.shape] = body
 
     def neighbours(self, x: float, y: float, within: float) -> list[tuple[Body, float]]:

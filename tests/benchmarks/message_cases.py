@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 Work = Callable[[], float]
@@ -84,11 +85,13 @@ def hop(kind: str, canonical: bool = True) -> Work:
         "Heartbeat": m.Heartbeat(),
     }
     session = None if kind == "Heartbeat" else 1425
-    ids = "70:1A:04:F9:81:D6", 124, "56:2B:04:E4:56:D8", "12:30:56"
-    message, tail = m.Message(*ids, session, bodies[kind]), b"" if canonical else b"\n"
+    to, rest = "70:1A:04:F9:81:D6", ("56:2B:04:E4:56:D8", "12:30:56", session, bodies[kind])
+    tail = b"" if canonical else b"\n"
+    numbers = count(1)  # no message is like one before
 
     def work() -> float:
         for _ in range(MESSAGES):
+            message = m.Message(to, next(numbers), *rest)
             assert codec.decode(codec.encode(message) + tail) is not None
         return MESSAGES
 

@@ -15,7 +15,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,10 @@ def spent(work: Any) -> float:
 def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
     """Measure one case in a copy of this process; what goes wrong is told instead."""
     if copy := os.fork():
-        os.waitpid(copy, 0)
+        _, status = os.waitpid(copy, 0)
+        if status:
+            told = {"case": name, "error": f"crashed ({os.waitstatus_to_exitcode(status)})"}
+            write(told, into)
         return
     from benchmarks.counting import COUNTERS
 
@@ -57,9 +60,14 @@ def in_a_copy(name: str, counter: str, repeats: int, into: Path) -> None:
             told = measured(name, COUNTERS[counter](), repeats)
     except BaseException as error:  # pytest's skip, too
         told = {"case": name, "error": traceback.format_exception_only(error)[-1].strip()}
+    write(told, into)
+    os._exit(0)
+
+
+def write(told: dict[str, Any], into: Path) -> None:
+    """Add what is told of a case to the others."""
     with into.open("a") as file:
         file.write(json.dumps(told) + "\n")
-    os._exit(0)
 
 
 def read(into: Path) -> Iterator[dict[str, Any]]:
@@ -72,6 +80,7 @@ if __name__ == "__main__":
     from benchmarks.cases import CASES, SECOND, warm
 
     if any(CASES[case].per == SECOND for case in sys.argv[4:]):
-        warm()
+        with suppress(ImportError):  # each case tells what this version lacks
+            warm()
     for case in sys.argv[4:]:
         in_a_copy(case, sys.argv[1], int(sys.argv[2]), Path(sys.argv[3]))

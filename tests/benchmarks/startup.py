@@ -28,12 +28,15 @@ COMMANDS = {
     "site": "site show hall -o {out}/site.png",
     "new": "new {out}/mine",
     "keys": "keys {out}/keys drive-to-event",
+    "demo": "demo -o {results}/manifest.json/demo",
     "show": "show {results}",
     "export": "export {results} -o {out}/runs.csv",
     "compare": "compare {results} {results}",
     "episode": "episode drive-to-event --set horizon_s=1",
     **{name: f"{name} {NOBODY}" for name in ("run", "register", "tune", "report", "replay")},
+    "phone-log": f"phone-log {NOBODY}",
     **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate")},
+    "robot": f"robot {NOBODY}",
 }
 PREFIX = "start-up: "
 REPEATS = 3

@@ -8,10 +8,7 @@ state, half at the camera.
 from __future__ import annotations
 
 import json
-import os
-import re
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -22,8 +19,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.console_visits import console, load
 from benchmarks.goals import goal
-from patience import PATIENCE_S, becomes
+from patience import PATIENCE_S
 from scipy import stats
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -31,27 +29,7 @@ from websockets.sync.client import connect
 SLOW = 20  # clients
 PAIRS, SAMPLES, SETTLE_S = 12, 100, 1.0
 PERIOD_S = 0.02  # of inputs
-WORDS = ("console", "--no-open", "--port", "0")
 MOST = 5.0  # the difference of the 99th percentiles should be less [ms]
-
-
-@contextmanager
-def console(folder: Path) -> Iterator[tuple[str, str]]:
-    """The real thing: its host and port, and the token of who drives."""
-    out = folder / "out"
-    with out.open("wb") as file:
-        command = [sys.executable, "-m", "dva_sim.cli", *WORDS]
-        environment = {**os.environ, "DVA_SIM_NO_BROWSER": "1"}
-        process = subprocess.Popen(command, stdout=file, stderr=file, env=environment)
-    try:
-        wanted = re.compile(r"^Console: +http://(\S+)/\?token=(\S+)\n", re.MULTILINE)
-        assert becomes(lambda: wanted.search(out.read_text()) or process.poll() is not None)
-        found = wanted.search(out.read_text())
-        assert found is not None, out.read_text()
-        yield found[1], found[2]
-    finally:
-        process.terminate()
-        process.wait(PATIENCE_S)
 
 
 class Hand:
@@ -179,7 +157,8 @@ def block(hand: Hand, place: str, token: str, slow: bool) -> float:
 
 
 def test_slow_clients_cost_a_driver_nothing(tmp_path: Path) -> None:
-    with console(tmp_path) as (place, token):
+    with console(tmp_path) as running:
+        place, token = running.place
         hand = Hand(place, token)
         hand.ask("take", robots=[0])
         hand.turn(2.0)
@@ -197,7 +176,7 @@ def test_slow_clients_cost_a_driver_nothing(tmp_path: Path) -> None:
         f"\ninput to set point, p99 of {SAMPLES} samples: {p99[:, 0].mean():.1f} ms alone, "
         f"{p99[:, 1].mean():.1f} ms beside {SLOW} slow clients; paired difference "
         f"{gaps.mean():+.1f} ms, 95 % interval "
-        f"{gaps.mean() - half:+.1f} to {gaps.mean() + half:+.1f} ms"
+        f"{gaps.mean() - half:+.1f} to {gaps.mean() + half:+.1f} ms; {load()}"
     )
     goal("the difference [ms]", gaps.mean(), most=MOST)
 

@@ -23,7 +23,7 @@ TWINS = sorted(set(COMMANDS) & set(dva_sim.__all__))
 ADDED = {
     "compare": {"measure", "by", "fail_if", "as_json"},
     "episode": {"quiet", "verbose"},
-    "replay": {"quiet", "verbose"},
+    "replay": {"console", "host", "port", "no_open", "no_token", "quiet", "verbose"},
     "report": {"quiet", "verbose"},
     "run": {"dry_run", "quiet", "verbose"},
     "show": {"as_json"},

@@ -20,7 +20,8 @@ FAST_DEG = 30.0
 class FakePhone:
     """What a phone is known by, and how it is calibrated."""
 
-    def __init__(self, number: int, label: str, kind: str) -> None:
+    def __init__(self, number: int, label: str, kind: str, registered: bool = True) -> None:
+        self.registered = registered
         self.id, self.label, self.kind = f"02:00:00:03:00:{number:02X}", label, kind
         self.address = f"127.0.0.1:{5700 + number}"
         self.device: str | None = None
@@ -50,7 +51,7 @@ class FakePhone:
             "id": self.id,
             "label": self.label,
             "address": self.address,
-            "registered": True,
+            "registered": self.registered,
             "device": self.device,
             "level": self.level,
             "calibrated": self.calibration is not None,
@@ -116,6 +117,7 @@ class PhoneDesk:
 
     def do_phone_calibrate(self: Any, asked: dict[str, Any]) -> str:
         seat = self.own_seat(asked["client"])
+        seat.phone = seat.phone or FakePhone(0, "", "", registered=False)
         seat.phone.calibration = asked
         self.tell(seat)
         return "counts from the next drive on"
@@ -123,8 +125,7 @@ class PhoneDesk:
     def do_samples(self: Any, asked: dict[str, Any]) -> None:
         seat = self.own_seat(asked["client"])
         seat.heard = time.monotonic()
-        if seat.phone is None:
-            return
+        seat.phone = seat.phone or FakePhone(0, "", "", registered=False)
         speed, turn = seat.phone.read(asked)
         if seat.phase == "driving":
             seat.wanted = (speed * 0.5, turn * 0.5236) if asked["hand"] else (0.0, 0.0)

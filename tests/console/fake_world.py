@@ -26,6 +26,8 @@ from PIL import Image, ImageDraw
 
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
 
+from fake_control_room import ControlRoomDesk  # noqa: E402
+from fake_dva import FakeDva  # noqa: E402
 from fake_phones import FakePhone, PhoneDesk  # noqa: E402
 from fake_scene import LINK, Scene, Walker  # noqa: E402
 
@@ -81,7 +83,7 @@ class Seat:
         }
 
 
-class FakeWorld(PhoneDesk):
+class FakeWorld(PhoneDesk, ControlRoomDesk):
     """The fake itself.
 
     Args:
@@ -98,6 +100,7 @@ class FakeWorld(PhoneDesk):
         self.toured = False  # from then on robots that nobody drives stand
         self.done: dict[str, dict[str, Any]] = {}
         self.phones, self.guards = 0, dict[str, dict[str, Any]]()
+        self.dva, self.looked = FakeDva(), frozenset[str]()
         self.more: dict[str, Any] = {}  # of the answer to an action
         self.pictures = not options.no_pictures
         self.socket, theirs = socket.socketpair()
@@ -105,8 +108,10 @@ class FakeWorld(PhoneDesk):
         words = [sys.executable, "-m", "dva_sim.console.web", "--fd", str(theirs.fileno())]
         words += ["--pictures-fd", str(their_painter.fileno()), "--port", str(options.port)]
         words += ["--no-token"] if options.no_token else []
+        self.folder = tempfile.TemporaryDirectory()
+        self.hostile = options.hostile
+        words += ["--audit", str(self.open_desk(options.audit or self.folder.name))]
         if options.phones:
-            self.folder = tempfile.TemporaryDirectory()
             words += ["--phones-host", "127.0.0.1", "--phones-port", "0"]
             words += ["--certificates", self.folder.name]
         numbers = theirs.fileno(), their_painter.fileno()
@@ -157,14 +162,39 @@ class FakeWorld(PhoneDesk):
             more = {"tour": self.scene.tour()} if what == "tour" else self.more
             self.done[key] = {"k": "done", "id": key, "ok": ok, "text": text, **more}
             self.say(self.done[key])
+            if what.startswith(("event", "alarm", "dispatch", "room")) and "proposal" not in what:
+                self.tell_events()
 
     # --- actions -----------------------------------------------------------------------
 
     def do_serving(self, asked: dict[str, Any]) -> None:
-        print(f"Console: {asked['drive']}", flush=True)
+        print(f"Console: {asked['supervise']}", flush=True)
         print(f"Look only: {asked['look']}", flush=True)
         print(f"Phone: {asked['phone']}", flush=True)
         self.say(self.scene.line())
+        self.say(self.dva.log(self.ms, 12))
+
+    def do_look(self, asked: dict[str, Any]) -> None:
+        self.looked = frozenset(asked["tables"])
+        self._tell_devices()
+
+    def _tell_devices(self) -> None:
+        if "devices" in self.looked:
+            self.say(self.dva.devices(self.scene.robots))
+
+    def do_server_stop(self, asked: dict[str, Any]) -> str:
+        self.dva.listens = False
+        self.say(self.rows())
+        return "the server is stopped"
+
+    def do_server_start(self, asked: dict[str, Any]) -> None:
+        self.dva.listens, self.dva.port = True, asked["port"]
+        self.say(self.rows())
+
+    def do_fake_add(self, asked: dict[str, Any]) -> None:
+        number = f"02:00:00:0F:00:{len(self.dva.fakes) + 1:02X}"
+        self.dva.fakes.append(self.dva.row(asked["label"], number, fake=True, link=None))
+        self._tell_devices()
 
     def do_tour(self, asked: dict[str, Any]) -> str:
         self.toured = True
@@ -282,6 +312,7 @@ class FakeWorld(PhoneDesk):
             "clock": clock | {"held_by_lag": False},
             "link": {**self.link, "kind": "modelled", "trace": None},
             "dropped": 0,
+            "server": self.dva.server(),
             "robots": [self._row(robot, holders.get(robot.index)) for robot in self.scene.robots],
             "people": [{"i": p.index, "doing": "walks"} for p in self.scene.people],
         }
@@ -381,18 +412,25 @@ class FakeWorld(PhoneDesk):
                     self.paint()
             self._regularly(ticks)
 
+    def tell_events(self) -> None:
+        """Events and what hangs on them, when they change, as the real world does."""
+        lines = [self.with_decisions(self.scene.events(self.t)), *self.dispatch_lines()]
+        if lines != self.events:
+            self.events = lines
+            for line in lines:
+                self.say(line)
+
     def _regularly(self, ticks: int) -> None:
         if ticks % 25 == 1:
             self.say(self.rows())
         if ticks % 50 == 2:
             self.say(self.scene.hazards(self.t) | {"t": self.ms})
         if ticks % 100 == 3:
-            events = self.scene.events(self.t)
-            if events != self.events:  # the real world tells of them when they change, too
-                self.events = events
-                self.say(events | {"t": self.ms})
+            self.tell_events()
             who = self.scene.all[ticks % len(self.scene.all)].label
             self.say({"k": "story", "who": who, "what": "looks around", "kind": "event"})
+            self.say(self.dva.log(self.ms, 1))
+            self._tell_devices()
         for seat in self.seats.values():
             if (seat.robots or seat.phone) and ticks % 3 == 0:
                 self.say(seat.line(self))
@@ -408,6 +446,7 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=10)
     parser.add_argument("--people", type=int, default=100)
     parser.add_argument("--site", default="caparica", help="or office-block, campus, ...")
+    parser.add_argument("--audit", help="file of its audit log")
     parser.add_argument("--hostile", action="store_true", help="a robot is called <script>")
     world = FakeWorld(parser.parse_args())
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

@@ -10,7 +10,7 @@ import pytest
 from dva_sim.console.web.access import Asked, Role, Tokens, name_in, rules
 from dva_sim.console.web.addresses import own_address
 
-TOKENS = Tokens("looks", "drives")
+TOKENS = Tokens("looks", "drives", dispatch="sends", supervise="rules")
 HERE = rules("127.0.0.1", 8123, tokens=TOKENS)
 EVERYWHERE = rules("0.0.0.0", 8123, ["Lab-PC.example"], TOKENS)
 
@@ -95,6 +95,9 @@ def test_a_role_belongs_to_a_token_wherever_it_is_shown():
     assert HERE.role({}, {"token": "drives"}) is Role.DRIVE
     assert HERE.role({"authorization": "Bearer drives"}, {}) is Role.DRIVE
     assert HERE.role(cookie, {"token": "drives"}) is Role.DRIVE
+    assert HERE.role(cookie, {"token": "sends"}) is Role.DISPATCH
+    assert HERE.role({"authorization": "Bearer sends"}, {"token": "rules"}) is Role.SUPERVISE
+    assert HERE.role({}, {"token": "sends"}) < Role.SUPERVISE
 
 
 @pytest.mark.parametrize(
@@ -116,13 +119,13 @@ def test_the_cookie_is_kept_from_scripts_and_other_sites():
 
 def test_tokens_are_long_and_differ():
     one, two = Tokens.drawn(), Tokens.drawn()
-    assert len({one.look, one.drive, two.look, two.drive}) == 4
+    assert len({*vars(one).values(), *vars(two).values()}) == 10
     assert min(map(len, (*vars(one).values(),))) >= 32
 
 
-def test_without_tokens_everybody_may_drive_but_no_foreign_page():
+def test_without_tokens_everybody_may_do_all_but_no_foreign_page():
     free = rules("127.0.0.1", 8123, tokens=Tokens())
-    assert free.role({}, {}) is Role.DRIVE
+    assert free.role({}, {}) is Role.SUPERVISE
     assert free.refusal(Asked("127.0.0.1:8123", "http://evil.example"))[0] == 403
     assert free.refusal(Asked("evil.example:8123", "http://evil.example:8123"))[0] == 421
 

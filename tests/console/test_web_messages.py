@@ -9,7 +9,8 @@ import pytest
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import (
     ACTIONS,
-    NOT_BY_PHONE,
+    CONTROL_ROOM,
+    NEEDS,
     Bucket,
     asked_of,
     check_role,
@@ -242,7 +243,17 @@ def test_a_phone_may_do_what_a_phone_does_and_who_looks_nothing():
         check_role(Role.PHONE, name)
         with pytest.raises(BadMessage, match="only look"):
             check_role(Role.LOOK, name)
-    for name in NOT_BY_PHONE:
-        check_role(Role.DRIVE, name)
+    for name, least in NEEDS.items():
+        check_role(least, name)
         with pytest.raises(BadMessage, match="may not"):
             check_role(Role.PHONE, name)
+
+
+def test_who_drives_sends_nobody_and_only_a_supervisor_takes_a_robot_from_its_holder():
+    for name in (name for name in CONTROL_ROOM if NEEDS[name] > Role.DRIVE):
+        with pytest.raises(BadMessage, match=f"may not {name.replace('_', ' ')}; an address "):
+            check_role(Role.DRIVE, name)
+        check_role(Role.SUPERVISE, name)
+    check_role(Role.DISPATCH, "event_assign")
+    with pytest.raises(BadMessage, match="this address may not take over"):
+        check_role(Role.DISPATCH, "take_over")

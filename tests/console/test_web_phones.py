@@ -6,14 +6,17 @@ import http.client
 import json
 import ssl
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from console_served import Answer, Served, serving
 from patience import PATIENCE_S
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from dva_sim.console.qr_code import half_blocks, svg
+from dva_sim.console.web.certificate_files import certificates
+from dva_sim.console.web.certificates import Hosts
 
 REGISTER = {"server": "127.0.0.1", "port": 5600, "label": "my phone", "type": "Teleoperation"}
 
@@ -181,7 +184,8 @@ def test_what_a_phone_asks_reaches_the_world_and_the_answer_comes_back_whole(con
     you, drive = phone
     drive.send(json.dumps({"id": "reg-1", "do": "phone_register", **REGISTER}))
     asked = console.next_asked("phone_register")
-    assert asked == {"id": "reg-1", "do": "phone_register", "client": you["client"], **REGISTER}
+    by = {"id": "reg-1", "client": you["client"], "role": "phone"}
+    assert asked == {"do": "phone_register", **by, **REGISTER}
     more = {"phone": {"id": "02:00", "label": "my phone", "address": "127.0.0.1:5700"}}
     console.say({"k": "done", "id": "reg-1", "ok": True, "text": "registered", **more})
     assert json.loads(drive.recv(PATIENCE_S))["phone"] == more["phone"]
@@ -226,6 +230,22 @@ def test_a_phone_that_is_gone_stops(console):
         assert console.next_asked("gone")["client"] == you["client"]
 
 
+def test_a_page_that_lost_its_connection_unnoticed_keeps_its_name_and_a_copy_gets_another(console):
+    """As on a change of network: the old connection is dead, and nobody has said so here."""
+    with wss(console, "/ws/state?page=one", console.phone) as old:
+        name = json.loads(old.recv(PATIENCE_S))["client"]
+        with wss(console, f"/ws/state?client={name}&page=copy", console.phone) as copy:
+            assert json.loads(copy.recv(PATIENCE_S))["client"] != name
+        with wss(console, f"/ws/state?client={name}&page=one", console.phone) as again:
+            assert json.loads(again.recv(PATIENCE_S))["client"] == name
+            with pytest.raises(ConnectionClosed):
+                list(old)
+            with wss(console, f"/ws/drive?client={name}", console.phone):  # it is still here
+                console.say({"k": "seat", "seat": name, "drives": [], "phase": "held"})
+                while json.loads(again.recv(PATIENCE_S)).get("phase") != "held":
+                    pass
+
+
 def test_the_line_of_a_guard_reaches_its_page_alone(console):
     one, other = console.page(console.phone), console.page(console.phone)
     console.say({"k": "guard", "t": 5, "seat": one.client, "guard": 9, "label": "guard-1"})
@@ -246,6 +266,17 @@ def test_a_folder_that_cannot_be_written_leaves_all_else_as_it_is(tmp_path):
         assert len(served.serving["told"]) == 1
         assert "no address for phones: no certificate can be kept in" in served.serving["told"][0]
         assert served.ask("/healthz").status == 200
+
+
+def test_an_expired_certificate_is_renewed_at_the_start_and_a_phone_gets_in(tmp_path):
+    hosts = Hosts.of(["127.0.0.1", "localhost"])
+    long_ago = datetime.now(UTC) - timedelta(days=500)
+    certificates(tmp_path, hosts, long_ago)
+    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(tmp_path))
+    with serving(*words) as served:
+        told = " ".join(served.serving["told"])
+        assert "the certificate for phones is made anew" in told
+        assert ask(served, "/phone", token=served.phone).status == 200  # verified
 
 
 def test_codes_are_dark_on_light_with_a_rim():

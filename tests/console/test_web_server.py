@@ -259,7 +259,8 @@ def test_headers_without_end_are_refused(console):
 def test_an_action_answers_when_the_simulation_has(console):
     def simulate():
         asked = console.next_asked("take")
-        assert asked == {"do": "take", "robots": [1], "client": "rest", "id": "rest-1"}
+        by = {"client": "rest", "id": "rest-1", "role": "drive"}
+        assert asked == {"do": "take", "robots": [1], **by}
         console.say({"k": "done", "t": 1, "id": "rest-1", "ok": False, "text": "BUSY since 0:12"})
 
     thread = Thread(target=simulate)

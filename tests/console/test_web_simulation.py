@@ -114,5 +114,7 @@ def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
         say(end, {"k": "bye", "why": "over"})
         await simulation.ended.wait()
         assert [line["text"] for line in told[1:]] == ["over"] * MOST_PENDING
+        simulation.ask({"id": "after", "do": "start"}, told.append)
+        assert (told[-1]["id"], told[-1]["text"]) == ("after", "over")
 
     play(story)

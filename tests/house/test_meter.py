@@ -1,9 +1,13 @@
 """What `make bench` counts with, and how it tells it."""
 
+import os
 import platform
 
 import pytest
-from benchmarks import counting, meter
+from benchmarks import cases, counting, meter, runner, startup
+from typer.main import get_command
+
+from dva_sim.cli import app
 
 
 @pytest.mark.skipif(platform.system() != "Linux", reason="perf_event_open is Linux's")
@@ -45,6 +49,17 @@ def test_a_case_that_the_other_version_lacks_is_told_and_does_not_count_as_a_cra
     rows = list(meter.lines(ours, {"a task": {"error": "ImportError: no such module"}}))
     assert rows[1].split() == ["a", "task", "run", "9.00", "M", "-", "-", "-"]
     assert rows[2] == "before, a task: ImportError: no such module"
+
+
+def test_the_start_of_every_command_is_measured():
+    commands = {words.split()[0] for words in startup.COMMANDS.values()}
+    assert set(get_command(app).list_commands(None)) <= commands
+
+
+def test_a_case_whose_process_dies_is_told_as_a_crash(tmp_path, monkeypatch):
+    monkeypatch.setitem(cases.CASES, "dies", cases.Case("run", lambda: os._exit(7)))
+    runner.in_a_copy("dies", counting.Nothing.name, 0, tmp_path / "told")
+    assert list(runner.read(tmp_path / "told")) == [{"case": "dies", "error": "crashed (7)"}]
 
 
 def test_a_ratio_is_told_where_both_its_cases_were_measured():

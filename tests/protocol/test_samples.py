@@ -30,27 +30,44 @@ def stem(path):
     return path.stem
 
 
-NEW_IN_1_4 = {
-    *("get-grant", "get-sensor-info-device", "handover-request"),
-    *("permission-request-ask", "permission-request-force", "permission-request-no"),
-    *("reply-holder", "reply-sensor-list", "reply-session-floor"),
-    *("robot-holder", "robot-holder-nobody", "robot-holder-refusing"),
+NEW = {
+    "1.4": {
+        *("get-grant", "get-sensor-info-device", "handover-request"),
+        *("permission-request-ask", "permission-request-force", "permission-request-no"),
+        *("reply-holder", "reply-sensor-list", "reply-session-floor"),
+        *("robot-holder", "robot-holder-nobody", "robot-holder-refusing"),
+    },
+    "1.5": {
+        *("acknowledge", "add-note", "assign", "assign-contain", "assign-operator"),
+        *("audit-record", "audit-record-policy", "dispatch-status", "escalate", "event-status"),
+        *("event-status-pending", "false-alarm", "get-dispatch", "get-event-list"),
+        *("get-event-list-above", "get-proposal", "reply-dispatch-status", "reply-event-list"),
+        *("reply-event-status", "reply-proposal", "reply-proposal-nobody", "revoke"),
+        *("set-dispatch", "take-off"),
+    },
 }
-OLD = etree.XMLSchema(file=str(Path(__file__).parents[1] / "data" / "dva-1.3.xsd"))
+OLD = {
+    version: etree.XMLSchema(file=str(Path(__file__).parents[1] / "data" / f"dva-{version}.xsd"))
+    for version in ("1.3", "1.4")
+}
 
 
-def test_a_peer_of_1_3_understands_all_samples_but_those_of_what_1_4_adds():
-    refused = {path.stem for path in VALID if not OLD.validate(etree.parse(path))}
-    assert refused == NEW_IN_1_4
+@pytest.mark.parametrize(
+    ("version", "added"), [("1.3", NEW["1.4"] | NEW["1.5"]), ("1.4", NEW["1.5"])]
+)
+def test_an_older_peer_understands_all_samples_but_those_of_what_was_added_since(version, added):
+    refused = {path.stem for path in VALID if not OLD[version].validate(etree.parse(path))}
+    assert refused == added
 
 
+@pytest.mark.parametrize("version", OLD)
 @pytest.mark.parametrize("path", INVALID, ids=stem)
-def test_1_4_accepts_nothing_that_is_marked_invalid_of_1_3(path):
+def test_nothing_that_is_marked_invalid_was_accepted_before(path, version):
     try:
         tree = etree.parse(path)
     except etree.XMLSyntaxError:
         return
-    assert OLD.validate(tree) == SCHEMA.validate(tree)
+    assert OLD[version].validate(tree) == SCHEMA.validate(tree)
 
 
 @pytest.mark.parametrize("path", VALID, ids=stem)

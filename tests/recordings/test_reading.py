@@ -1,5 +1,6 @@
 """What is read back from a recording is what was written, as far as the file goes."""
 
+import dataclasses
 import random
 import resource
 
@@ -130,6 +131,19 @@ def test_messages_screens_and_commands_come_back(folder):
     assert len(driven.commands) == len(drove.commands) > 100
     robot = drove.robot
     assert len(now.views[robot]) == len(then.views[robot]) > 100
+
+
+def test_what_a_person_calls_a_phone_breaks_no_recording(tmp_path):
+    run = drive()
+    (drove,) = run.recorder.drives
+    labels = run.labels | {drove.operator: "A/B <b>?\u00e9</b> /pose"}
+    path = tmp_path / "named.mcap"
+    write_recording(dataclasses.replace(run, labels=labels), path, tables=tables_of(run))
+    now = read_recording(path).playback
+    assert now.labels[drove.operator] == labels[drove.operator]
+    assert [s[:3] for s in now.recorder.traffic] == [s[:3] for s in run.recorder.traffic]
+    assert len(now.recorder.drives[0].commands) == len(drove.commands)
+    assert set(now.recorder.tracks) == set(run.recorder.tracks)
 
 
 def test_the_tables_come_with_it(folder):
@@ -274,3 +288,24 @@ def test_a_recording_of_a_later_form_is_refused(tmp_path, monkeypatch):
     write_recording(drive(), tmp_path / "later.mcap")
     with pytest.raises(ConfigError, match=f"made by dva-sim {__version__} .* its form 2 is later"):
         read_recording(tmp_path / "later.mcap")
+
+
+# --- what people decide --------------------------------------------------------------------
+
+
+def test_what_was_decided_by_whom_and_why_is_part_of_a_recording(tmp_path):
+    recording = run_of("asked-first", 120)
+    write_recording(recording, tmp_path / "asked.mcap")
+    back = read_recording(tmp_path / "asked.mcap").playback
+    people = [fact for fact in recording.facts if fact.role is not None]
+    assert people
+    assert [f.action for f in back.facts] == [f.action for f in recording.facts]
+    for read, kept in zip(back.facts, recording.facts, strict=True):
+        assert read.time == pytest.approx(kept.time, abs=1e-6)
+        assert read.row() | {"time": 0} == kept.row() | {"time": 0}
+
+
+def test_a_recording_without_people_who_decide_holds_no_facts(folder):
+    with (folder / "drill.mcap").open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert "/facts" not in topics

@@ -11,6 +11,7 @@ from dva_sim.simulation.models import model_of
 SHORT = {
     "drive-to-event": {"horizon_s": 20, "disturbance.kind": "refuse", "disturbance.after_s": 2},
     "evacuation": {"horizon_s": 5},
+    "asked-first": {"horizon_s": 5},
     "small-shift": {"horizon_s": 3000, "dispatch.containment": True},
     "tasks/fitts-lag": {"trials": 1},
     "tasks/fitts-tilt": {"trials": 1},
@@ -36,7 +37,7 @@ def numbers_of(name):
 @pytest.mark.parametrize(
     "names",
     [
-        ("drive-to-event", "evacuation"),
+        ("drive-to-event", "evacuation", "asked-first"),
         ("small-shift",),
         (
             "tasks/fitts-lag",

@@ -282,7 +282,13 @@ EXPECTED = {
         both_robots_at_the_fire, dear=True
     ),
     # Using it
-    "dva-sim console": NOT_HERE,
+    "dva-sim console": NOT_HERE,  # tests/console has what one sees of it
+    "dva-sim console --links real": NOT_HERE,
+    "dva-sim console --phones": NOT_HERE,
+    "dva-sim console -o results/mine": NOT_HERE,
+    "dva-sim console --results results/mine": NOT_HERE,
+    "dva-sim replay drill.mcap --console": NOT_HERE,
+    "dva-sim robot": NOT_HERE,
     "dva-sim list": Expected(
         told("req-rep-vs-pub-sub", "fire-drill", "caparica", "servrobot", "hazard_team")
     ),

@@ -2,7 +2,9 @@
 
 import os
 import re
+import sqlite3
 import tracemalloc
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from command_line import call
 from dva_sim.cli import checks
 from dva_sim.experiments.study import cell_grid
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.audit_log import BEGIN, END, AuditEntry, AuditLog
 from dva_sim.validation.network.emulator import cell, self_check
 from dva_sim.validation.network.emulator.self_check import LinkFinding
 
@@ -285,3 +288,31 @@ def test_there_is_one_emulated_link_without_names_and_options():
 def test_a_file_named_link_is_asked_for_by_its_path(check):
     code, lines = check("./link")
     assert (code, lines[-1]) == (2, "1 file: 1 not read")
+
+
+def test_an_audit_log_is_followed_to_the_first_row_that_is_wrong(check, here):
+    log = AuditLog(here / "audit.sqlite")
+    log.append([AuditEntry(time_s=1.0, at_utc="", author="ana", action=a) for a in (BEGIN, "note")])
+    code, (doubt, valid, _) = check("audit.sqlite")
+    assert code == 0
+    assert doubt.startswith("audit.sqlite: warning: its last row is not an end")
+    said = f"audit.sqlite: audit log: valid; 2 rows, the last one with the hash {log.head}"
+    assert valid == said
+    log.append([AuditEntry(time_s=2.0, at_utc="", author="ana", action=END)])
+    log.close()
+
+    with closing(sqlite3.connect(here / "audit.sqlite", isolation_level=None)) as file:
+        file.execute("DROP TRIGGER audit_is_not_changed")
+        file.execute("UPDATE audit SET author = 'bob' WHERE number = 2")
+    code, (wrong, *_) = check("audit.sqlite")
+    assert code == 1
+    assert wrong.startswith("audit.sqlite:2:1: row 2 was changed")
+
+
+def test_another_file_of_sqlite_is_no_audit_log(check, here):
+    with closing(sqlite3.connect(here / "memory")) as file:
+        file.execute("CREATE TABLE about (name, value)")
+    code, (wrong, *_) = check("memory")
+
+    assert code == 1
+    assert wrong.startswith("memory:1:1: row 1 is no audit log")

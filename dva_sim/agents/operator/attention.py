@@ -15,12 +15,13 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, repeat
 from typing import Protocol
 
 import numpy as np
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.agents.observation import Observation, topic_in
+from dva_sim.agents.observation import Observation, make_observation, topic_in
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
 from dva_sim.agents.population import Person
@@ -227,7 +228,7 @@ class DriverSeat:
     def judge(self, seen: Observation) -> Observation:
         """A frame as the person takes it: place and heading with an error."""
         person, error = self.person, self._errors
-        return Observation(
+        return make_observation(
             seen.tick,
             seen.x + person.position_error * next(error),
             seen.y + person.position_error * next(error),
@@ -241,5 +242,4 @@ class DriverSeat:
 
 def _normals(rng: np.random.Generator, block: int = 512) -> Iterator[float]:
     """Standard normal numbers without end, drawn in blocks."""
-    while True:
-        yield from rng.normal(size=block).tolist()
+    return chain.from_iterable(rng.normal(size=block).tolist() for _ in repeat(None))

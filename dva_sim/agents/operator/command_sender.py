@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 from dva_sim.agents.device import HOLDER, AgentDevice, command_topic
 from dva_sim.agents.operator.refusals import Refusals
 from dva_sim.agents.tilt import TiltApp, TiltCommand, TiltSources
+from dva_sim.kernel.makers import maker
 from dva_sim.kernel.plugins import FAILURES, said
-from dva_sim.kernel.recorder import DriveLog, Issued
+from dva_sim.kernel.recorder import DriveLog, make_issued
 from dva_sim.network.messaging import Requester, Subscription
 from dva_sim.network.patterns import PATTERNS, Pattern
 from dva_sim.protocol.codec import encode
-from dva_sim.protocol.messages import Message, Reply, RobotHolder, SetTeleOp
+from dva_sim.protocol.messages import Message, Reply, RobotHolder, make_set_tele_op
 
 
 class Made(NamedTuple):
@@ -22,6 +23,9 @@ class Made(NamedTuple):
     command: TiltCommand
     time: float
     seen_tick: int
+
+
+_make_made = maker(Made)
 
 
 class CommandSender:
@@ -116,14 +120,14 @@ class CommandSender:
             return None
         command = self._phone.look(now)
         self.drive.samples, self.drive.values = self._phone.samples, self._phone.values
-        return None if command is None else Made(command, now, tick)
+        return None if command is None else _make_made(command, now, tick)
 
     def _message(self, made: Made) -> Message:
         """A command that is sent now; its tick is of when it was made."""
         now, command = self.clock.now, made.command
-        body = SetTeleOp(command.speed, command.turn_rate, made.seen_tick)
+        body = make_set_tele_op(command.speed, command.turn_rate, made.seen_tick)
         message = self._device.outbox.message(self.drive.robot, body, now, self._session)
-        issued = Issued(made.time, now, command.sample_age, command.captured)
+        issued = make_issued(made.time, now, command.sample_age, command.captured)
         self._device.recorder.command_issued(message.source, message.message_id, issued)
         self.drive.sent += 1
         self.drive.commands.append((made.time, command.speed, command.turn_rate))

@@ -47,18 +47,19 @@ class DelayEstimate:
         self._start = self._next_look = start
         self._step, self._period = step, LOOK_STEPS * step
         self._last: float | None = None
-        self._weights = 1.0 / scale[0], 1.0 / scale[1]
+        self._weights = np.array([[1.0 / scale[0]], [1.0 / scale[1]]])
+        self._motion = np.zeros((2, 1))
         self._lags = np.arange(1, round(LONGEST / step) + 1) * step
         self._offset = self._filled = 2 * len(self._lags)
         self._asked = np.zeros((2, 4 * len(self._lags)))
-        self._intent = (0.0, 0.0)
+        self._intent = np.zeros((2, 1))
         self._misfit = FIRM * np.abs(self._lags - guess)
         self.value = guess
 
     def intend(self, now: float, one: float, other: float) -> None:
         """The person asks for this from `now` [s] on: speed and turn rate, or two velocities."""
         self._remember(now)
-        self._intent = one, other
+        self._intent[0, 0], self._intent[1, 0] = one, other
 
     def see(self, now: float, one: float, other: float, over: float = 0.0) -> None:
         """The picture shows this motion at `now` [s].
@@ -76,12 +77,13 @@ class DelayEstimate:
         self._next_look = now + self._period
         self._remember(now)
         steps = min(max(1, round(over / self._step)), len(self._lags))
-        first, second = self._past(steps)
-        error = np.abs(first - one)
-        error *= self._weights[0]
-        turn = np.abs(second - other)
-        turn *= self._weights[1]
-        error += turn
+        motion = self._motion
+        motion[0, 0], motion[1, 0] = one, other
+        errors = self._past(steps) - motion
+        np.abs(errors, out=errors)
+        errors *= self._weights
+        error = errors[0]
+        error += errors[1]
         np.minimum(error, MOST, out=error)
         passed = 0.0 if self._last is None else min(now - self._last, FADES_IN)
         self._last = now
@@ -112,6 +114,5 @@ class DelayEstimate:
             return
         while due >= self._asked.shape[1]:
             self._asked = np.hstack([self._asked, np.zeros_like(self._asked)])
-        self._asked[0, self._filled : due] = self._intent[0]
-        self._asked[1, self._filled : due] = self._intent[1]
+        self._asked[:, self._filled : due] = self._intent
         self._filled = due

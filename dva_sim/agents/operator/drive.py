@@ -24,12 +24,11 @@ from dva_sim.agents.operator.strategies import (
     Reach,
     Strategy,
     Truth,
-    View,
     gain_at,
 )
 from dva_sim.agents.operator.supervision import REFUSED, Work
 from dva_sim.agents.population import Person
-from dva_sim.agents.route_following import Route
+from dva_sim.agents.route_following import Route, make_view
 from dva_sim.agents.tilt import Phone
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
@@ -165,6 +164,12 @@ class Teleoperation(Work):
         self._let_go_until = 0.0
         self._without_effect = 0
         self._failures: dict[str, int] = {}
+        self._plugged_in: list[tuple[Phone | CommandSender | Strategy, str, str]] = [
+            (seat.phone, "a phone", "holds a phone that fails")
+        ]
+        if isinstance(self._strategy, Strategy):
+            what = "lets go, as its strategy fails"
+            self._plugged_in.append((self._strategy, "an operator", what))
         self._least_left, self._nearer_at = math.inf, 0.0
 
     def begin(self) -> None:
@@ -175,6 +180,9 @@ class Teleoperation(Work):
         self._device.recorder.drive_begins(self._device.id_tag)
         seat.delay = DelayEstimate(now, seat.delay.value)
         self._sender = self._make_sender()
+        self._plugged_in.insert(
+            1, (self._sender, "a pattern", "loses commands, as its pattern fails")
+        )
         self._sender.start()
         if isinstance(self._strategy, Oracle):
             self._clock.every(Oracle.DELAY, self._look_at_truth)
@@ -237,22 +245,18 @@ class Teleoperation(Work):
         if route is not None:
             # The guess is made when a frame is perceived, so it holds the perceptual delay.
             drive, delay = self._strategy.drive, seat.delay.value
-            view = View(now, judged, delay)
+            view = make_view(now, judged, delay)
             usual = lambda keep: drive(route, view, keep)  # noqa: E731
             self._intend(self._steer(judged, delay, usual), judged.tick)
 
     def _count_failures(self) -> None:
         """Count what a plug-in of a user got wrong; tell of the first time."""
-        self._note("a phone", self._seat.phone, "holds a phone that fails")
-        if self._sender is not None:
-            self._note("a pattern", self._sender, "loses commands, as its pattern fails")
-        if isinstance(self._strategy, Strategy):
-            self._note("an operator", self._strategy, "lets go, as its strategy fails")
+        for plugged_in, whose, what in self._plugged_in:
+            if plugged_in.failures != self._failures.get(whose, 0):
+                self._note(whose, plugged_in, what)
 
     def _note(self, whose: str, plugged_in: Phone | CommandSender | Strategy, what: str) -> None:
         known, failures = self._failures.get(whose, 0), plugged_in.failures
-        if failures == known:
-            return
         self._failures[whose] = failures
         if failures > known:
             count = self._device.recorder.counters
@@ -336,8 +340,9 @@ class Teleoperation(Work):
 
     def _take(self, points: NDArray[np.float64]) -> Route:
         """Go this way `(n, 2)` [m] from now on."""
-        self._route, self._lent = Route(points), Route(points.copy())
-        return self._route
+        self._route = route = Route(points)
+        self._lent = route.twin()
+        return route
 
     def _gets_nowhere(self, left: float) -> bool:
         """Whether the way left [m] has not become less for a long time, whatever was tried."""

@@ -54,7 +54,7 @@ class Gathered:
         self._texts: list[str] = []
         self.failed: Callable[[], object] = lambda: None
 
-    def __call__(self, done: bool, text: str) -> None:
+    def __call__(self, done: bool, text: str, /, **_: object) -> None:
         """One of them has come."""
         self._left -= 1
         self._good = self._good and done

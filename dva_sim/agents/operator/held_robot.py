@@ -10,12 +10,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal
 
-from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.device import STATUS, AgentDevice
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.operator.handheld import Console, Input, Said
-from dva_sim.agents.operator.supervision import BLIND_AFTER
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.kernel.recorder import DriveLog, Shown
@@ -25,6 +24,7 @@ from dva_sim.protocol import messages as m
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
 STILL_WANTED = 0.3  # what was wanted no longer ago holds when a drive begins [s]
 MOST_INPUTS = 4096  # that are remembered until they act
+LOST_AFTER = 9.0  # without a word of the robot: three times its watchdog [s]
 
 
 class HeldRobot:
@@ -63,6 +63,8 @@ class HeldRobot:
         self._alert, self._let_go = alert, let_go
         self.phase: HeldPhase = "asking"
         self.session, self.event = 0, 0
+        self._address, self._has_answered = "", False
+        self._starting: Said | None = None
         self.log: DriveLog | None = None
         self.frame: CameraFrame | None = None
         self.arrived = 0.0
@@ -73,6 +75,8 @@ class HeldRobot:
         self._inputs: deque[Input] = deque(maxlen=MOST_INPUTS)
         self._sender: CommandSender | None = None
         self._picture: Subscription | None = None
+        self._status: Subscription | None = None
+        self._heard, self._tick = -math.inf, -math.inf  # of the newest status [s], [ms]
         self._stopped_at = -math.inf
         self.on_frame: Callable[[HeldRobot, CameraFrame], object] = lambda *_: None
 
@@ -99,6 +103,7 @@ class HeldRobot:
                 said(False, "given back meanwhile")
             elif isinstance(reply.content, m.Permission):
                 self.session, self.phase = reply.content.session, "held"
+                self._address = reply.content.address or ""
                 self._watch()
                 said(True, f"{self.label} is yours")
             else:
@@ -125,7 +130,8 @@ class HeldRobot:
         """The DVA says that a session is over; the robot has been told, too."""
         if self.phase != "gone" and session == self.session:
             self.end("gave up")
-            self._alert(f"{self.label}: the permission was revoked")
+            known = "" if self._has_answered else f"; {self._silence()}"
+            self._alert(f"{self.label}: the permission was revoked{known}")
             self._be_gone()
 
     def taken_back(self, outcome: str) -> None:
@@ -136,14 +142,19 @@ class HeldRobot:
 
     def _be_gone(self) -> None:
         self.phase = "gone"
-        if self._picture is not None:
-            self._picture.close()
-            self._picture = None
+        for heard in (self._picture, self._status):
+            if heard is not None:
+                heard.close()
+        self._picture = self._status = None
         self._let_go(self)
 
     def _watch(self) -> None:
         def seen(picture: Subscription) -> None:
-            self._picture = picture
+            self._picture, self._has_answered = picture, True
+
+        def blind(url: str) -> None:
+            self._has_answered = True
+            self._alert(f"{self.label}: no camera to watch at {url!r}")
 
         steps.watch(
             self.device,
@@ -152,9 +163,46 @@ class HeldRobot:
             topic=self._console().setup.topic,
             on_frame=self._on_frame,
             seen=seen,
-            blind=lambda url: self._alert(f"{self.label}: no camera to watch at {url!r}"),
+            blind=blind,
             wanted=lambda: self.phase != "gone",
+            unreachable=self._unreachable,
         )
+        network, me = self.device.network, self.device.id_tag
+        self._status = network.subscribe(me, self.robot, STATUS, self._on_status)
+        self.device.clock.call_after(self._lost_after, self._unanswered)
+
+    @property
+    def _lost_after(self) -> float:
+        """Without a word for so long the link counts as lost [s]."""
+        return max(LOST_AFTER, self.device.timeout)
+
+    def _unanswered(self) -> None:
+        """Time has passed since the robot was asked for its camera."""
+        if self.phase != "gone" and not self._has_answered:
+            self._alert(f"{self.label}: {self._silence()}")
+
+    def _on_status(self, data: bytes) -> None:
+        """The robot is there; with its tick one may drive it in sight, without a picture."""
+        message = self.device.read(data, self.robot) if self.phase != "gone" else None
+        if message is not None and isinstance(message.body, m.RobotStatus):
+            self._heard, self._tick = self.device.clock.now, message.body.tick
+
+    @property
+    def _seen_tick(self) -> int | None:
+        """The robot's newest tick that is known here [ms]."""
+        shown = -math.inf if self.frame is None else self.frame.observation.tick
+        newest = max(shown, self._tick)
+        return None if newest == -math.inf else int(newest)
+
+    def _unreachable(self) -> None:
+        """The robot has not answered after all attempts; it may be asked again."""
+        if self.phase != "gone":
+            self._alert(f"{self.label}: {self._silence()} after {self.device.attempts} attempts")
+
+    def _silence(self) -> str:
+        """That nothing was answered, in words, with the address that was tried."""
+        where = f" at {self._address}" if self._address else ""
+        return f"link lost: no answer{where}"
 
     def _on_frame(self, shown: CameraFrame | bytes) -> None:
         frame = shown if isinstance(shown, CameraFrame) else CameraFrame.unpack(shown)
@@ -182,15 +230,25 @@ class HeldRobot:
         log.taken_up = now
         self.device.recorder.drive_ordered(log)
 
-        def refused(why: str) -> None:
-            self.end("gave up")
+        self._starting = said
+
+        def refused(why: str, outcome: str = "gave up") -> None:
+            self._starting = None
+            self.end(outcome)
             said(False, f"{self.label}: {why}")
 
         def lost() -> None:
-            self.end("lost link")
-            said(False, f"{self.label} does not answer")
+            if self._starting is said:  # else it has ended, and that is told
+                self._unreachable()
+                silence = f"{self._silence()} after {self.device.attempts} attempts"
+                refused(silence, "lost link")
+
+        def waits(why: str) -> None:
+            self._alert(f"{self.label} does not start yet: {why}")
 
         def begun() -> None:
+            self._alert("")
+            self._starting = None
             self._begin(log)
             said(True, f"{self.label} is driven")
 
@@ -203,6 +261,7 @@ class HeldRobot:
             begun=begun,
             refused=refused,
             lost=lost,
+            waits=waits,
         )
 
     def _begin(self, log: DriveLog) -> None:
@@ -223,7 +282,7 @@ class HeldRobot:
             timeout=setup.timeout,
             attempts=setup.attempts,
             window=setup.window,
-            seen_tick=lambda: None if self.frame is None else self.frame.observation.tick,
+            seen_tick=lambda: self._seen_tick,
             on_lost=self._lost,
             on_refused=self._refused,
             heeds=setup.heeds,
@@ -231,7 +290,7 @@ class HeldRobot:
         self._sender.start()
         if device.clock.now - self._wished.time < STILL_WANTED:
             self.want(self._wished.number, self._wished.speed, self._wished.turn)
-        device.clock.every(1.0, lambda: self._look_at_picture(log), start=device.clock.now + 1.0)
+        device.clock.every(1.0, lambda: self._listen(log), start=device.clock.now + 1.0)
 
     def want(self, number: int, speed: float, turn: float) -> None:
         """What the person wants from now on, as shares of what the robot can do."""
@@ -283,12 +342,12 @@ class HeldRobot:
         self.end("emergency")
         steps.ask_emergency(self.device, self.robot, self.session, said)
 
-    def _look_at_picture(self, log: DriveLog) -> bool:
-        """No picture for too long: the link is lost, whatever the pattern."""
+    def _listen(self, log: DriveLog) -> bool:
+        """No picture and no status for too long: the link is lost, whatever the pattern."""
         goes_on = self.log is log and self.phase == "driving"
-        newest = max(self.arrived, log.started or 0.0)
-        if goes_on and self.device.clock.now - newest > max(BLIND_AFTER, self.device.timeout):
-            self._lost("no picture")
+        silent = self.device.clock.now - max(self.arrived, self._heard, log.started or 0.0)
+        if goes_on and silent > self._lost_after:
+            self._lost(f"nothing was heard for {silent:.0f} s")
         return goes_on
 
     def _lost(self, why: str) -> None:
@@ -302,7 +361,10 @@ class HeldRobot:
         self._alert(f"{self.label}: {why}")
 
     def end(self, outcome: str) -> None:
-        """A drive is over, however it ended."""
+        """A drive is over, however it ended, or its start."""
+        said, self._starting = self._starting, None
+        if said is not None:
+            said(False, f"{self.label} was not started: {outcome}")
         if self._sender is not None:
             self._sender.stop()
             self._sender = None

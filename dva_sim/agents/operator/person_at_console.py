@@ -266,7 +266,8 @@ class PersonAgent:
 
     def _alert(self, what: str) -> None:
         self.alert = what
-        self.device.tell(what, "link")
+        if what:
+            self.device.tell(what, "link")
 
     def _let_go(self, held: HeldRobot) -> None:
         if self.robots.get(held.robot) is held:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.operator.handheld import Said
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
@@ -28,6 +28,7 @@ def watch(
     seen: Callable[[Subscription], object],
     blind: Callable[[str], object],
     wanted: Callable[[], bool],
+    unreachable: Callable[[], object] = do_nothing,
 ) -> None:
     """Ask a robot where its camera is, and watch it.
 
@@ -40,6 +41,7 @@ def watch(
         seen: Told once it is watched.
         blind: Told the URL, if there is nothing to see there.
         wanted: Whether it still is.
+        unreachable: Told that the robot does not answer.
     """
 
     def answered(reply: m.Reply) -> None:
@@ -52,7 +54,7 @@ def watch(
         else:
             seen(device.network.subscribe(device.id_tag, robot, found, on_frame))
 
-    device.ask(robot, m.GetSensorInfo(), answered, session=session)
+    device.ask(robot, m.GetSensorInfo(), answered, unreachable, session)
 
 
 def start(
@@ -65,6 +67,7 @@ def start(
     begun: Callable[[], object],
     refused: Callable[[str], object],
     lost: Callable[[], object],
+    waits: Callable[[str], object] = lambda _: None,
     tries: int = 1,
 ) -> None:
     """Ask a robot to begin, again and again while it may not know of the permission yet.
@@ -78,6 +81,7 @@ def start(
         begun: Told that the robot agrees.
         refused: Told why it does not.
         lost: Told that it does not answer.
+        waits: Told why it does not yet, each time before it is asked again.
         tries: Which one this is.
     """
     if not wanted():
@@ -93,6 +97,7 @@ def start(
             begun=begun,
             refused=refused,
             lost=lost,
+            waits=waits,
             tries=tries + 1,
         )
 
@@ -102,6 +107,7 @@ def start(
         if reply.code == m.OK:
             begun()
         elif tries < START_TRIES and reply.code in NOT_YET:
+            waits(reply.text)
             device.clock.call_after(START_AGAIN, again)
         else:
             refused(reply.text)

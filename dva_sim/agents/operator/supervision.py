@@ -14,7 +14,7 @@ from typing import ClassVar
 from dva_sim.agents.observation import IN_VIEW, CameraFrame, Observation
 from dva_sim.agents.operator.attention import DriverSeat
 from dva_sim.agents.operator.inspection import Looking
-from dva_sim.kernel.recorder import DriveLog, Shown
+from dva_sim.kernel.recorder import DriveLog, make_shown
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
@@ -99,7 +99,7 @@ class Work:
             return
         now = self._clock.now
         self._last_frame = now
-        self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))
+        self.log.frames.append(make_shown(frame.captured, now, frame.observation.tick))
         self._see(frame.observation)
 
     def link_lost(self, why: str = "no answer and no picture") -> None:

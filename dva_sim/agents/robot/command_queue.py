@@ -21,6 +21,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.config import Config
+from dva_sim.kernel.makers import maker
 from dva_sim.network.messaging import Answer, Request
 from dva_sim.network.zmtp import Flow
 from dva_sim.protocol.codec import decode
@@ -74,8 +75,12 @@ class Letter(NamedTuple):
         return PUBLISHED if self.request is None else self.request.peer
 
 
+_make_letter = maker(Letter)
+
+
 StandingOf = Callable[[Letter], Standing]
 Line = deque[Letter]
+LineOf = tuple[Hashable, bool]  # whose, and whether it is of commands
 
 
 class FairQueue:
@@ -91,7 +96,7 @@ class FairQueue:
 
     def __init__(self, limit: int, standing: StandingOf) -> None:
         self._limit, self._standing, self._length = limit, standing, 0
-        self._lines: OrderedDict[tuple[Hashable, bool], Line] = OrderedDict()
+        self._lines: OrderedDict[LineOf, Line] = OrderedDict()
 
     def __len__(self) -> int:
         return self._length
@@ -100,7 +105,7 @@ class FairQueue:
         """How many are the holder's, or are not."""
         return sum(map(len, self._beside(holders).values()))
 
-    def _beside(self, holders: bool) -> dict[tuple[Hashable, bool], Line]:
+    def _beside(self, holders: bool) -> dict[LineOf, Line]:
         return {k: v for k, v in self._lines.items() if (self._standing(v[0]) == 0) is holders}
 
     def has(self, standing: Standing) -> bool:
@@ -136,22 +141,26 @@ class FairQueue:
     def _rank(self, line: Line) -> tuple[Standing, int]:
         return self._standing(line[0]), len(line)
 
-    def pop(self, standing: Standing) -> Letter | None:
-        """The next one of a standing; its line then waits until all others have had their turn.
+    def next_lines(self) -> dict[Standing, LineOf]:
+        """The line whose turn it is, of each standing that waits.
 
         The holder's control comes before its commands. With strangers that would let some keep
         others out.
         """
-        lines = [key for key, line in self._lines.items() if self._standing(line[0]) is standing]
-        if not lines:
-            return None
-        key = lines[0]
-        if standing is Standing.HOLDER and len(lines) > 1:
-            key = min(lines, key=lambda one: one[1])
+        lines: dict[Standing, LineOf] = {}
+        for key, line in self._lines.items():
+            standing = self._standing(line[0])
+            known = lines.setdefault(standing, key)
+            if standing is Standing.HOLDER and key[1] < known[1]:
+                lines[standing] = key
+        return lines
+
+    def pop(self, key: LineOf) -> Letter:
+        """The next one of a line, which then waits until all others have had their turn."""
         self._lines.move_to_end(key)
         return self._take(key)
 
-    def _take(self, key: tuple[Hashable, bool], newest: bool = False) -> Letter:
+    def _take(self, key: LineOf, newest: bool = False) -> Letter:
         line = self._lines[key]
         letter = line.pop() if newest else line.popleft()
         if not line:
@@ -245,7 +254,7 @@ class CommandQueue:
             urgent, moves = isinstance(message.body, Emergency), isinstance(message.body, SetTeleOp)
         else:
             urgent, moves = looks_urgent and _is_emergency(data), b"<SetTeleOp>" in data
-        self._put(Letter(data, self._clock.now, request, message, moves), urgent)
+        self._put(_make_letter(data, self._clock.now, request, message, moves), urgent)
 
     def _has_room(self, peer: Hashable) -> bool:
         """For one more emergency; those that wait will stop the robot as well."""
@@ -256,8 +265,10 @@ class CommandQueue:
         """A command has arrived that nobody waits to be answered; who has read it, says so."""
         if self.latest_wins:
             self.superseded += self.forget_published()
-        self._put(Letter(data, self._clock.now, None, message))
-        if self.flow is not None and self._waiting.count(holders=True) >= self._limit:
+        self._put(_make_letter(data, self._clock.now, None, message, True))
+        waiting, limit = self._waiting, self._limit
+        is_full = len(waiting) >= limit and waiting.count(holders=True) >= limit
+        if is_full and self.flow is not None:
             self._paused = True
             self.flow.pause()
 
@@ -272,7 +283,9 @@ class CommandQueue:
             gone = self._waiting.put(letter)
             if gone is not None:
                 self._turn_away(gone)
-        self.longest = max(self.longest, len(self._emergencies if urgent else self._waiting))
+        length = len(self._emergencies if urgent else self._waiting)
+        if length > self.longest:
+            self.longest = length
         if not self._busy:
             self._work()
 
@@ -306,16 +319,14 @@ class CommandQueue:
         """The holder's after each of another; the DVA and strangers by turns."""
         if not self._waiting:
             return None
-        others, holder = self._turns, Standing.HOLDER
+        lines, others, holder = self._waiting.next_lines(), self._turns, Standing.HOLDER
         for one in (*others, holder) if self._last is holder else (holder, *others):
-            if one is Standing.STRANGER and self._strangers_rest():
+            if one not in lines or (one is Standing.STRANGER and self._strangers_rest()):
                 continue
-            letter = self._waiting.pop(one)
-            if letter is not None:
-                self._last = one
-                if one is not holder:
-                    self._turns = [*(other for other in others if other is not one), one]
-                return letter
+            self._last = one
+            if one is not holder:
+                self._turns = [*(other for other in others if other is not one), one]
+            return self._waiting.pop(lines[one])
         return None
 
     def _strangers_rest(self) -> bool:

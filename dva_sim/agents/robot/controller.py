@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from dva_sim.kernel.makers import maker
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import is_absurd
 
@@ -36,6 +37,9 @@ class TimedSetPoint(NamedTuple):
     until: float
 
 
+_make_set_point = maker(TimedSetPoint)
+
+
 STAND = TimedSetPoint(0.0, 0.0, 0.0)
 NO_MISSION = m.MissionStatus(0, "none", 0, "")
 Mission = m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
@@ -55,6 +59,9 @@ class Decision(NamedTuple):
     text: str = ""
     set_point: TimedSetPoint | None = None
     content: m.SensorInfo | m.MissionStatus | m.SessionFloor | None = None
+
+
+_make_decision = maker(Decision)
 
 
 @dataclass(frozen=True)
@@ -112,6 +119,9 @@ class Doubts:
             stopped: Who was driving until then, and does not any longer.
             word: How much was said in the DVA's name so far.
         """
+        if isinstance(message.body, m.SetTeleOp):
+            self.unasked = None
+            return
         who, before = None, self._stranger
         match message.body:
             case m.PermissionGrant() if decision.code == m.BAD_SESSION or stopped:
@@ -143,6 +153,7 @@ class RobotController:
         future_ticks: Commands with one that the robot's clock has not reached.
         absurd_sessions: What came in the DVA's name with a session that no DVA has come to.
         doubts: Who the DVA has to be asked about.
+        by_hand: Who drives it by hand, at the robot itself; None: nobody does.
     """
 
     id_tag: str
@@ -166,6 +177,7 @@ class RobotController:
     future_ticks: int = 0
     absurd_sessions: int = 0
     doubts: Doubts = field(default_factory=lambda: Doubts())
+    by_hand: str | None = None
     _before: int = 0  # the highest session before the grant that holds
     _word: int = 0  # how much the DVA, or who claims to be it, has said
 
@@ -233,11 +245,67 @@ class RobotController:
         )
 
     def expire(self, now: float) -> bool:
-        """End a teleoperation whose operator has long said nothing; True if it did."""
-        if self.mode is Mode.TELEOPERATION and now - self.last_valid > LEASE_S:
+        """End a drive, by messages or by hand, of whom nothing was heard for long; True if so."""
+        driven = self.mode is Mode.TELEOPERATION or self.by_hand is not None
+        if driven and now - self.last_valid > LEASE_S:
             self._idle("")
             return True
         return False
+
+    def hang(self) -> None:
+        """Its computer hangs, and starts anew idle: an order that was under way is given up."""
+        self._idle("its computer hung")
+
+    # --- by hand, at the robot itself ---------------------------------------------------
+
+    def take_by_hand(self, who: str, now: float, moving: bool) -> Decision:
+        """Somebody at the robot is going to drive it, without a message and without a session.
+
+        Only a robot that is idle and that nobody holds can be taken so; from then on it is busy
+        for everybody else, until it is let go, an emergency comes, or nothing is heard for long.
+
+        Args:
+            who: Stays on this side of the network.
+            now: Time [s].
+            moving: Whether the robot's wheels still turn.
+        """
+        if self.by_hand == who:
+            return Decision(m.OK, "is in hand already")
+        if self.grant is not None:
+            return Decision(m.BUSY, f"held by {self.grant.holder}")
+        refusal = self._begin(math.inf, moving)
+        if refusal is not None:
+            return refusal
+        self.by_hand, self.last_valid = who, now
+        return Decision(m.OK, set_point=STAND)
+
+    def drive_by_hand(self, who: str, speed: float, turn_rate: float, now: float) -> Decision:
+        """A set point of whom the robot is in the hands of; in force until the watchdog.
+
+        Args:
+            who: As it took the robot.
+            speed: [m/s]; there is no reverse.
+            turn_rate: [rad/s]
+            now: Time [s].
+        """
+        if self.by_hand is None or self.by_hand != who:
+            return Decision(m.WRONG_MODE, "it is not in this hand: take manual control first")
+        if not (math.isfinite(turn_rate) and 0.0 <= speed < math.inf):
+            return Decision(m.BAD_MESSAGE, "no speed ahead and turn rate")
+        self.last_valid = now
+        point = TimedSetPoint(speed, turn_rate, now + self.limits.watchdog)
+        return Decision(m.OK, set_point=point)
+
+    def press_emergency(self, now: float) -> Decision:
+        """The button at the robot itself: as an emergency that somebody sends."""
+        return self._emergency(now)
+
+    def let_go(self, who: str) -> Decision:
+        """The hand that drove gives the robot up; another one's word changes nothing."""
+        if self.by_hand is None or self.by_hand != who:
+            return Decision(m.WRONG_MODE, "it is not in this hand")
+        self._idle("")
+        return Decision(m.OK, set_point=STAND)
 
     def mission_stands(self, state: str, left: int, reason: str) -> bool:
         """The robot says how its mission goes on; True if that is news.
@@ -260,7 +328,7 @@ class RobotController:
         if self.mode is Mode.MISSION and status.mission_state not in ENDS:
             left = status.waypoints_left
             self.mission_status = m.MissionStatus(status.mission_id, "failed", left, why)
-        self.mode, self.owner, self.mission = Mode.IDLE, None, None
+        self.mode, self.owner, self.mission, self.by_hand = Mode.IDLE, None, None, None
 
     def _emergency(self, now: float) -> Decision:
         """Stop and stand idle; whatever was received before this moment moves nothing (S3)."""
@@ -289,7 +357,7 @@ class RobotController:
         self.grant = grant
         self.last_order_id = self.last_set_id = 0
         self._word += 1
-        if self.owner is None:
+        if self.owner is None:  # also where it is in somebody's hand, who goes on
             return Decision(m.OK)
         self._idle("revoked")
         return Decision(m.OK, set_point=STAND)
@@ -363,7 +431,8 @@ class RobotController:
     @property
     def free(self) -> bool:
         """Whether it stands idle, and nobody holds it: then it can be sent somewhere."""
-        return self.mode is Mode.IDLE and self.owner is None and self.grant is None
+        idle = self.mode is Mode.IDLE and self.by_hand is None
+        return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
         """A task is on offer, or was won. An award moves nothing: an operator has to drive."""
@@ -374,6 +443,8 @@ class RobotController:
         return Decision(m.OK)
 
     def _holder(self) -> str:
+        if self.by_hand is not None:
+            return "somebody at the robot"
         return self.owner or (self.grant.holder if self.grant is not None else "nobody")
 
     def may_read(self, device: str) -> bool:
@@ -405,12 +476,14 @@ class RobotController:
         self.last_order_id = message.message_id
         return None
 
-    def _begin(self, message: m.Message, arrived: float, moving: bool) -> Decision | None:
+    def _begin(self, arrived: float, moving: bool) -> Decision | None:
         """Why no new activity may begin now, or None."""
         if arrived <= self.emergency_at:
             return Decision(m.STALE, "sent before the emergency")
         if self.mode is not Mode.IDLE:
             return Decision(m.BUSY, f"in mode {self.mode}")
+        if self.by_hand is not None:
+            return Decision(m.BUSY, "driven by hand, at the robot")
         if moving:
             return Decision(m.BUSY, "not at a standstill yet")
         return None
@@ -420,7 +493,7 @@ class RobotController:
         if refusal is not None:
             return refusal
         again = self.mode is Mode.TELEOPERATION and self.owner == message.source
-        refusal = None if again else self._begin(message, arrived, moving)
+        refusal = None if again else self._begin(arrived, moving)
         refusal = refusal or self._order(message)
         if refusal is not None:
             return refusal
@@ -448,11 +521,13 @@ class RobotController:
             return Decision(m.STALE, "no picture of that tick was taken yet")
         else:
             seen_at = body.seen_tick / 1000 - self.clock_offset
-            until = min(until, seen_at + self.limits.max_age)
+            oldest = seen_at + self.limits.max_age
+            until = until if until < oldest else oldest
         if until <= now:
             return Decision(m.STALE, "too old to obey")
         self.last_valid = now
-        return Decision(m.OK, set_point=TimedSetPoint(body.speed, body.turn_rate, until))
+        set_point = _make_set_point(body.speed, body.turn_rate, until)
+        return _make_decision(m.OK, "", set_point, None)
 
     def _stop(self, message: m.Message) -> Decision:
         refusal = self._refusal(message, "teleoperation") or self._order(message)
@@ -465,7 +540,7 @@ class RobotController:
 
     def _mission(self, message: m.Message, body: Mission, arrived: float, moving: bool) -> Decision:
         refusal = self._refusal(message, "missions")
-        refusal = refusal or self._begin(message, arrived, moving) or self._order(message)
+        refusal = refusal or self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
         self.mode, self.owner, self.mission = Mode.MISSION, message.source, body

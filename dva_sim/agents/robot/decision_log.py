@@ -15,6 +15,9 @@ from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
 LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
+TAKEN_BY_HAND, LET_GO, PRESSED = "taken by hand", "let go", "emergency pressed"
+HANGS = "hangs"
+HAND = "hand"  # whose that was is no matter of a trace
 
 
 class DecisionLog:
@@ -50,7 +53,7 @@ class DecisionLog:
         self._write({"message": encode(message).decode(), **told, **_as_data(decision)})
 
     def happened(self, what: str, now: float) -> None:
-        """Time or the world changed the mode: `LEASE_ENDS` or `MISSION_ENDS`."""
+        """Time, the world or a hand at the robot changed what it does: one of the words above."""
         self._write({"happened": what, "now": now})
 
     def close(self) -> None:
@@ -140,6 +143,14 @@ def _again(
         controller.expire(now)
     elif happened == MISSION_ENDS:
         controller.mission_stands("done", 0, "")
+    elif happened == TAKEN_BY_HAND:
+        controller.take_by_hand(HAND, now, moving=False)
+    elif happened == LET_GO:
+        controller.let_go(HAND)
+    elif happened == PRESSED:
+        controller.press_emergency(now)
+    elif happened == HANGS:
+        controller.hang()
     else:
         raise ValueError(f"{happened!r} does not happen to a robot")
     return None

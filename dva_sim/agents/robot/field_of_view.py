@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from dva_sim.agents.observation import CLEAR, SEEN_THROUGH, Point, SeenHazard, no_smoke
 from dva_sim.agents.route_following import wrap
+from dva_sim.kernel.makers import maker
 
 
 class HazardSpot(NamedTuple):
@@ -27,6 +28,9 @@ class HazardSpot(NamedTuple):
     y: float
     radius: float
     shines: bool = False
+
+
+make_spot = maker(HazardSpot)
 
 
 NEAR = 0.5  # smoke so far before the camera stands between it and everything [m]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
-from dva_sim.agents.observation import FRAME, CameraFrame, Observation
+from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (
@@ -21,14 +21,14 @@ from dva_sim.agents.robot.controller import (
     RobotController,
     TimedSetPoint,
 )
-from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, DecisionLog
+from dva_sim.agents.robot.decision_log import HANGS, LEASE_ENDS, MISSION_ENDS, DecisionLog
 from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
 from dva_sim.agents.robot.manoeuvres import Sensed
 from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
 from dva_sim.agents.route_following import Reach
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import Accepted, DriveLog
+from dva_sim.kernel.recorder import DriveLog, make_accepted
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
@@ -221,6 +221,8 @@ class RobotAgent:
         filmed: Told of each frame that it takes, with its id.
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
+        blind: Whether it takes no pictures: another one.
+        sensors: What it measures, by name; each may be given another port.
     """
 
     def __init__(
@@ -243,6 +245,7 @@ class RobotAgent:
         self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
+        self.blind = False
         self._fared, self._held_since = m.OK, 0.0
         self._told: tuple[str | None, int] = (
             None,
@@ -259,7 +262,8 @@ class RobotAgent:
             self._is_driven,
             self._turn_away,
         )
-        self._sensing = SensorSubscriptions(device, setup.sensors, controller.tick)
+        self.sensors = dict(setup.sensors)
+        self._sensing = SensorSubscriptions(device, self.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
         self._pattern = setup.pattern
         self._commands: Subscription | None = None
@@ -282,11 +286,11 @@ class RobotAgent:
         now = self.device.clock.now
         self._world.advance_to(now)
         pose = self.body.pose()
-        view, at = self._setup.view, (pose.x, pose.y, pose.heading)
-        hazards, visibility = view.look(*at, self._setup.hazards(now)), view.visibility(*at)
+        view = self._setup.view
+        hazards, visibility = view.look(*pose, self._setup.hazards(now)), view.visibility(*pose)
         speed, turn_rate = self.body.speed, self.body.turn_rate
         tick = self.controller.tick(now)
-        return Observation(tick, *at, speed, turn_rate, hazards, visibility)
+        return make_observation(tick, *pose, speed, turn_rate, hazards, visibility)
 
     def expect(self, pattern: Pattern) -> None:
         """From the next drive on, commands come by another pattern.
@@ -313,6 +317,28 @@ class RobotAgent:
     def holder(self) -> tuple[str | None, float]:
         """Who may act on it, by id, and for how long already [s]."""
         return self._holder, self.device.clock.now - self._held_since
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether its wheels turn now."""
+        self._world.advance_to(self.device.clock.now)
+        return abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
+
+    def hang(self) -> None:
+        """Its computer hangs: it hears and says nothing, and is idle when it starts anew.
+
+        The motors keep what they were told last until its watchdog stops them; a mission, which the
+        computer steers, stops at once.
+        """
+        if self.controller.mode is Mode.MISSION:
+            self.move(STAND)
+        if self.trace is not None:
+            self.trace.happened(HANGS, self.device.clock.now)
+        before = self.controller.mode
+        self.controller.hang()
+        self.device.silent = True
+        if self.controller.mode is not before:
+            self.mode_changed("")
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
@@ -384,10 +410,8 @@ class RobotAgent:
         return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
-        now = self.device.clock.now
-        self._world.advance_to(now)
+        now, moving = self.device.clock.now, self.is_moving
         before, mission = self.controller.mode, self.controller.mission_status
-        moving = abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
         decision = self.controller.handle(message, arrived, now, moving)
         if self.refuses is not None and isinstance(message.body, m.SetTeleOp):
             decision = Decision(self.refuses, "refuses all commands")
@@ -396,17 +420,18 @@ class RobotAgent:
         if self.controller.doubts.unasked is not None:
             self._ask_about(self.controller.doubts.unasked)
         if decision.set_point is not None:
-            self._move(decision.set_point)
-        if decision.code == m.OK:
+            self.move(decision.set_point)
+        is_command = isinstance(message.body, m.SetTeleOp)
+        if decision.code == m.OK and not is_command:
             decision = self._follow_up(message, decision)
         if decision.code != m.OK:
             self.refused += 1
             name = m.CODE_NAMES[decision.code]
             self.device.recorder.counters[f"robot refused: {name}"] += 1
-        elif isinstance(message.body, m.SetTeleOp):
+        elif is_command:
             self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
-            self._mode_changed(message.source)
+            self.mode_changed(message.source)
         if self.controller.mission_status is not mission:
             self._publish_mission()
         self._note_holder(message, decision.code)
@@ -481,7 +506,7 @@ class RobotAgent:
             self.picture_age = (self.controller.tick(now) - tick) / 1000
         number, recorder = message.message_id, self.device.recorder
         recorder.on_accepted(
-            Accepted(
+            make_accepted(
                 self.device.id_tag, message.source, message.session, number, tick, arrived, now
             )
         )
@@ -489,14 +514,16 @@ class RobotAgent:
         if drive is not None and set_point is not None:
             recorder.command_applied(drive, message.source, number, arrived, now, set_point.until)
 
-    def _move(self, set_point: TimedSetPoint) -> None:
+    def move(self, set_point: TimedSetPoint) -> None:
+        """Give the motors a set point that was decided on."""
         self.set_point = set_point
         if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
             self._guarded.take(set_point)
             return
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
 
-    def _mode_changed(self, source: str) -> None:
+    def mode_changed(self, source: str) -> None:
+        """What it does is another thing now, by the word of a source."""
         mode = self.controller.mode
         if not self.device.silent:
             self.device.tell(f"is now in mode {mode}", "mode")
@@ -517,9 +544,9 @@ class RobotAgent:
     def _take_frame(self) -> None:
         """Film for whoever watches; a frame is left out while the last one still waits."""
         network, me, size = self.device.network, self.device.id_tag, self._setup.frame_bytes
-        if self.device.silent or self._encoding or not network.ready(me, FRAME, size):
+        if self.device.silent or self.blind or self._encoding or not network.ready(me, FRAME, size):
             return
-        frame = CameraFrame(self.observe(), self.device.clock.now)
+        frame = make_frame(self.observe(), self.device.clock.now)
         if self.filmed is not None:
             self.filmed(me, frame)
         if self._setup.encode > 0.0:
@@ -540,7 +567,7 @@ class RobotAgent:
         if self.controller.expire(now):
             if self.trace is not None:
                 self.trace.happened(LEASE_ENDS, now)
-            self._mode_changed("")
+            self.mode_changed("")
         pose = self.body.pose()
         body = m.RobotStatus(
             self.controller.mode.value,
@@ -566,4 +593,4 @@ class RobotAgent:
             self.device.tell(f"mission {status.mission_state}{why}", "mode")
             if self.trace is not None:
                 self.trace.happened(MISSION_ENDS, self.device.clock.now)
-            self._mode_changed("")
+            self.mode_changed("")

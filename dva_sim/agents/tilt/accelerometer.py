@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cache
+from itertools import chain, repeat
 from math import cos, sin
 from typing import Annotated, Final
 
@@ -160,21 +161,28 @@ class Accelerometer:
 
     def _drawn(self, rng: np.random.Generator, noise: float, block: int) -> Iterator[list[float]]:
         """Noise and drift of each sample [m/s^2]."""
-        drift = np.zeros(3)
-        while True:
-            luck = rng.normal(size=(block, 6))
-            steps = luck[:, 3:] * self._drift
-            steps[0] += drift  # added up one after the other, so that a block changes no number
-            walk = np.cumsum(steps, axis=0)
-            drift = walk[-1]
-            yield from (walk + luck[:, :3] * noise).tolist()
+
+        def blocks() -> Iterator[list[list[float]]]:
+            drift = np.zeros(3)
+            while True:
+                luck = rng.normal(size=(block, 6))
+                steps = luck[:, 3:] * self._drift
+                steps[0] += drift  # added up one after the other, so that a block changes no number
+                walk = np.cumsum(steps, axis=0)
+                drift = walk[-1]
+                yield (walk + luck[:, :3] * noise).tolist()
+
+        return chain.from_iterable(blocks())
 
 
 def _lateness(rng: np.random.Generator, spread: float, most: float, block: int) -> Iterator[float]:
     """How late each sample is [s]; cut off so that none overtakes another, in ticks of a clock."""
-    while True:
-        late = np.clip(rng.normal(0.0, spread, block), -most, most)
-        yield from (np.round(late / TICK) * TICK).tolist()
+
+    def late() -> list[float]:
+        cut = np.clip(rng.normal(0.0, spread, block), -most, most)
+        return (np.round(cut / TICK) * TICK).tolist()  # type: ignore[no-any-return]
+
+    return chain.from_iterable(late() for _ in repeat(None))
 
 
 def _cut(value: float, most: float) -> float:

@@ -17,6 +17,7 @@ from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration, Readin
 from dva_sim.agents.tilt.filters import BATCH, Filter, load_guarded_filter
 from dva_sim.agents.tilt.mappings import load_guarded_mapping
 from dva_sim.agents.tilt.profile import PhoneProfile
+from dva_sim.kernel.makers import maker
 
 TIE: Final = 1e-9  # moments nearer than this are the same [s]
 _TICK: Final = 1e-6  # who looks by a clock that rounds may come so much too soon [s]
@@ -49,6 +50,9 @@ class TiltCommand(NamedTuple):
     turn_rate: float
     sample_age: float
     captured: float
+
+
+_make_command = maker(TiltCommand)
 
 
 class Trail:
@@ -111,6 +115,7 @@ class TiltApp:
             sample to the next: 0 if samples are what was asked.
 
     Attributes:
+        keeps_alive: Whether the newest value is sent at every chance, changed or not.
         shown: The command on the display: level, turn [deg/s].
         samples: How many were in the batches of this drive.
         values: How many batches there were.
@@ -123,6 +128,7 @@ class TiltApp:
         self, profile: PhoneProfile, reference: Triple, period: float, decay: float = 0.0
     ) -> None:
         self._profile, self._period, self._decay = profile, period, decay
+        self._ideal, self.keeps_alive = profile.ideal, profile.send == "keep_alive"
         self._app = calibrated(profile, reference)
         filters = load_guarded_filter(profile.filter, profile.filter_options)
         self._make_filter: Callable[[], Filter] = partial(filters, period)
@@ -168,7 +174,7 @@ class TiltApp:
         """When the app next considers sending [s]: its period, or when a batch is complete."""
         if self.keeps_alive:
             return now + 1.0 / rate_hz
-        if self._batch is None or self._profile.ideal:
+        if self._batch is None or self._ideal:
             return now + min(self._app.max_delay, BATCH * self._period)
         self._advance(now)
         complete = self._next_sample + (self._batch - self._fresh - 1) * self._period
@@ -177,7 +183,7 @@ class TiltApp:
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""
         self._advance(now)
-        if not self._profile.ideal and self._batch is None:
+        if not self._ideal and self._batch is None:
             if not self._watches:
                 self.shown = self._mapping.command(*self._filter.value(), 0.0)
             self._captured = self._trail.captured()
@@ -188,12 +194,8 @@ class TiltApp:
             return None
         self._last_key = key
         age = now - self._stems_from
-        return TiltCommand(level * SPEED_PER_LEVEL, math.radians(turn), age, self._captured)
-
-    @property
-    def keeps_alive(self) -> bool:
-        """Whether the newest value is sent at every chance, changed or not."""
-        return self._profile.send == "keep_alive"
+        speed = level * SPEED_PER_LEVEL
+        return _make_command(speed, math.radians(turn), age, self._captured)
 
     @property
     def failures(self) -> int:

@@ -59,4 +59,5 @@ class Calibration:
 
 
 def _share(part: float, whole: float) -> float:
-    return min(max(part / whole, -1.0), 1.0)
+    share = part / whole
+    return -1.0 if share < -1.0 else 1.0 if share > 1.0 else share

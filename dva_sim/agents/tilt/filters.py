@@ -157,7 +157,7 @@ class MovingMedian(Filter):
     @property
     def age(self) -> float:
         """See `Filter`."""
-        return 0.5 * max(len(self._speed) - 1, 0)
+        return 0.5 * (len(self._speed) - 1) if self._speed else 0.0
 
 
 class OnePole(Filter):
@@ -212,8 +212,8 @@ class NoFilter(Filter):
 def median(values: Iterable[float]) -> float:
     """Of a short list: `sorted` is many times faster than `numpy.median` here."""
     ordered = sorted(values)
-    middle = len(ordered) // 2
-    if len(ordered) % 2:
+    middle, is_odd = divmod(len(ordered), 2)
+    if is_odd:
         return ordered[middle]
     return 0.5 * (ordered[middle - 1] + ordered[middle])
 

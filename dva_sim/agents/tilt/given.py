@@ -49,14 +49,14 @@ class GivenTilt(TiltApp):
 
     def look(self, now: float) -> TiltCommand | None:
         """See `TiltApp`; of an ideal phone, what is wanted."""
-        if self._profile.ideal:
+        if self._ideal:
             self.shown = self._wanted
             self._stems_from, self._captured = now, self._trail.asked
         return super().look(now)
 
     def _advance(self, now: float) -> None:
         """The samples that were due by now."""
-        while not self._profile.ideal and (at := self._next_sample) <= now + TIE:
+        while not self._ideal and (at := self._next_sample) <= now + TIE:
             if self._watches:
                 self._tilt = self._tilted()
             self.sample(at, self._tilt)

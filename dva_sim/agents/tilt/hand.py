@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import Final
 
 import numpy as np
@@ -57,9 +58,8 @@ class Hand:
     ) -> None:
         self._lag, self._noise, self._tremor = lag, motor_noise, tremor
         self._max_tilt, self._max_speed = max_tilt, max_speed
-        self._luck = rows(rng, 6, block)
-        a, b, c, d, self._off_pitch, self._off_roll = next(self._luck)
-        self._shake_pitch, self._shake_roll = complex(a, b), complex(c, d)
+        self._luck = _luck(rng, block)
+        self._shake_pitch, self._shake_roll, self._off_pitch, self._off_roll = next(self._luck)
         self._pitch = self._roll = 0.0
         self._tuned: dict[float, tuple[float, float, float, complex, float]] = {}
 
@@ -70,12 +70,13 @@ class Hand:
     def step(self, pitch: float, roll: float, dt: float) -> tuple[float, float]:
         """Where the phone is after `dt` [s] of aiming at `pitch` and `roll` [rad]."""
         keep, new, most, swing, drive = self._tuned.get(dt) or self._tune(dt)
-        a, b, c, d, e, f = next(self._luck)
-        if self._noise:
-            self._off_pitch = off = self._off_pitch * keep + e * new
-            pitch += pitch * self._noise * off
-            self._off_roll = off = self._off_roll * keep + f * new
-            roll += roll * self._noise * off
+        one, other, off_pitch, off_roll = next(self._luck)
+        noise = self._noise
+        if noise:
+            self._off_pitch = off = self._off_pitch * keep + off_pitch * new
+            pitch += pitch * noise * off
+            self._off_roll = off = self._off_roll * keep + off_roll * new
+            roll += roll * noise * off
         far = self._max_tilt
         pitch = -far if pitch < -far else far if pitch > far else pitch
         roll = -far if roll < -far else far if roll > far else roll
@@ -83,8 +84,8 @@ class Hand:
         self._pitch += -most if way < -most else most if way > most else way
         way = (roll - self._roll) * (1.0 - keep)
         self._roll += -most if way < -most else most if way > most else way
-        self._shake_pitch = one = self._shake_pitch * swing + complex(a, b) * drive
-        self._shake_roll = other = self._shake_roll * swing + complex(c, d) * drive
+        self._shake_pitch = one = self._shake_pitch * swing + one * drive
+        self._shake_roll = other = self._shake_roll * swing + other * drive
         return self._pitch + self._tremor * one.real, self._roll + self._tremor * other.real
 
     def _tune(self, dt: float) -> tuple[float, float, float, complex, float]:
@@ -100,7 +101,15 @@ class Hand:
         return tuned
 
 
-def rows(rng: np.random.Generator, width: int, block: int) -> Iterator[list[float]]:
-    """Rows of standard normal numbers without end; the same ones whatever the block."""
-    while True:
-        yield from rng.normal(size=(block, width)).tolist()
+def _luck(rng: np.random.Generator, block: int) -> Iterator[tuple[complex, complex, float, float]]:
+    """What drives the tremor of pitch and roll, and how far each is aimed wrong; without end.
+
+    All are standard normal, and the same ones whatever the block.
+    """
+
+    def drawn() -> Iterator[tuple[complex, complex, float, float]]:
+        numbers = rng.normal(size=(block, 6))
+        tremor = numbers[:, :4].copy().view(complex)
+        return zip(*tremor.T.tolist(), *numbers[:, 4:].T.tolist(), strict=True)
+
+    return chain.from_iterable(drawn() for _ in repeat(None))

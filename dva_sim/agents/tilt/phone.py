@@ -138,7 +138,7 @@ class Phone(TiltApp):
 
     def look(self, now: float) -> TiltCommand | None:
         """See `TiltApp`; of an ideal phone, what is wanted."""
-        if self._profile.ideal:
+        if self._ideal:
             self.shown = limited(*self._wanted)
             self._stems_from, self._captured = now, self._trail.asked
         return super().look(now)
@@ -152,10 +152,11 @@ class Phone(TiltApp):
     def _advance(self, now: float) -> None:
         """All samples and values that were due."""
         end = now + TIE
-        if (self._sample_at > end and self._due > end) or self._profile.ideal:
+        if (self._sample_at > end and self._due > end) or self._ideal:
             return
         while True:
-            self._sample_until(min(end, self._due + TIE))
+            due = self._due + TIE
+            self._sample_until(due if due < end else end)
             if self._fresh == self._batch:
                 self._take_value(self._sampled_at)
             elif self._due <= end:

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dva_sim.console.web.access import Entrance, Tokens, rules
+from dva_sim.console.web.access import Entrance, Role, Tokens, rules
 from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
+from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import NoCertificate
@@ -48,7 +49,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--phones-port", type=int, help="https for phones; 0 for any; else none")
     parser.add_argument("--certificates", type=Path, help="folder of those for phones")
     parser.add_argument("--name", action="append", default=[], help="another name of this machine")
-    parser.add_argument("--no-token", action="store_true", help="everybody may drive")
+    parser.add_argument("--report", type=Path, help="a study's report that may be shown")
+    parser.add_argument("--audit", type=Path, help="file of the audit log")
+    parser.add_argument("--no-token", action="store_true", help="everybody may do everything")
     return parser
 
 
@@ -75,10 +78,11 @@ async def run(options: argparse.Namespace) -> None:
         await cameras.open(options.pictures_fd)
     telling = asyncio.ensure_future(cameras.keep_telling())
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
-    files, over = StaticFiles(), _after(closing)
-    serves = [serve(make_server(make_app(access, hub, cameras, files, door)), sock, over)]
+    files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
+    app = make_app(access, hub, cameras, files, door, audit, options.report)
+    serves = [serve(make_server(app), sock, over)]
     if phones:
-        app = make_app(phones.access, hub, cameras, files, door)
+        app = make_app(phones.access, hub, cameras, files, door, audit)
         serves.append(serve(make_server(app, phones.certificate), phones.sock, over))
     await asyncio.gather(*serves)
     telling.cancel()
@@ -118,10 +122,12 @@ def _after(task: asyncio.Task[None]) -> asyncio.Event:
 def serving(access: Entrance, host: str, port: int) -> dict[str, object]:
     """What the simulation is told first: where this console is, and its secrets."""
     base = address_of(own_address(host) if access.any_address else host.strip("[]"), port)
-    drive, look = (
-        f"{base}?token={t}" if t else base for t in (access.tokens.drive, access.tokens.look)
-    )
-    return {"do": "serving", "port": port, "base": base, "drive": drive, "look": look}
+    asked = access.tokens.are_asked
+    addresses = {
+        role.name.lower(): f"{base}?token={access.tokens.of(role)}" if asked else base
+        for role in (Role.LOOK, Role.DRIVE, Role.DISPATCH, Role.SUPERVISE)
+    }
+    return {"do": "serving", "port": port, "base": base, **addresses}
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import re
 import secrets
 import socket
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from http.cookies import CookieError, SimpleCookie
 
@@ -26,13 +26,16 @@ _HOST = re.compile(
 class Role(IntEnum):
     """What a client may do; each may do what those before it may.
 
-    A phone drives its own robot, or is a guard's; whoever may drive changes the link, too.
+    A phone drives its own robot, or is a guard's; whoever may drive changes the link, too. Who
+    dispatches sends others, and who supervises takes robots from their holders.
     """
 
     NOBODY = 0
     LOOK = 1
     PHONE = 2
     DRIVE = 3
+    DISPATCH = 4
+    SUPERVISE = 5
 
     @property
     def acts(self) -> bool:
@@ -42,22 +45,26 @@ class Role(IntEnum):
 
 @dataclass(frozen=True)
 class Tokens:
-    """The secrets of the roles; none of them where everybody may drive.
+    """The secrets of the roles; none of them where everybody may do everything.
 
     Attributes:
         look: Opens pages and pictures.
         drive: Lets robots move, too.
         phone: For phones: what a phone may, and no more.
+        dispatch: Sends people and robots to events, too.
+        supervise: Takes robots from their holders, too: everything.
     """
 
     look: str = ""
     drive: str = ""
     phone: str = ""
+    dispatch: str = ""
+    supervise: str = ""
 
     @classmethod
     def drawn(cls) -> Tokens:
         """New ones, of 192 random bits each."""
-        return cls(*(secrets.token_urlsafe(24) for _ in range(3)))
+        return cls(*(secrets.token_urlsafe(24) for _ in fields(cls)))
 
     @property
     def are_asked(self) -> bool:
@@ -67,18 +74,18 @@ class Tokens:
     def role_of(self, shown: str) -> Role:
         """The role of a token; all comparisons take the same time, whatever was shown."""
         if not self.are_asked:
-            return Role.DRIVE
+            return Role.SUPERVISE
         given = shown.encode("utf-8", "replace")
         fits = [
             role
-            for role in (Role.DRIVE, Role.PHONE, Role.LOOK)
+            for role in (Role.SUPERVISE, Role.DISPATCH, Role.DRIVE, Role.PHONE, Role.LOOK)
             if hmac.compare_digest(given, self.of(role).encode()) and given
         ]
         return fits[0] if fits else Role.NOBODY
 
     def of(self, role: Role) -> str:
         """The token of a role."""
-        return {Role.DRIVE: self.drive, Role.PHONE: self.phone}.get(role, self.look)
+        return str(getattr(self, role.name.lower(), self.look))
 
 
 @dataclass(frozen=True)
@@ -150,7 +157,7 @@ class Entrance:
     def role(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Role:
         """The best role of what is shown: a token in the address, in a header, in the cookie."""
         if not self.tokens.are_asked:
-            return Role.DRIVE
+            return Role.SUPERVISE
         kind, _, bearer = headers.get("authorization", "").partition(" ")
         shown = [query.get("token", ""), self._in_cookie(headers.get("cookie", ""))]
         shown.append(bearer.strip() if kind.lower() in ("bearer", "token") else "")

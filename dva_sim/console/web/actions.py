@@ -69,6 +69,12 @@ _REGISTER = {
     "label": _LABEL,
     "type": one_of("Robot", "Remote Control", "Teleoperation"),
 }
+_FAKE = {
+    "label": _LABEL,
+    "type": one_of("Robot", "Guard", "TeleOp", "Remote Control"),
+    "address": text(0, 64),
+    "id_tag": text(0, 17),
+}
 _PERMISSION = {"device": word, "level": one_of("teleoperation", "missions", "both")}
 _CALIBRATE = {
     "reference_mps2": maybe(_AXES),
@@ -94,7 +100,46 @@ _REPORT = {
     "severity": one_of("low", "medium", "high", "critical"),
     **_PLACE,
 }
+_EVENT = {"event": whole(1, 10**9)}
+_SEEN = {"decisions": maybe(whole(0, 10**9))}  # of the event, as the page knows it
+_REASON = text(0, 256)
+_ALARM = {"alarm": text(1, 200)}
+_SENT = _EVENT | {"device": _LABEL}
+_SHIFT = 8 * 3600  # no alarm is shelved for longer [s]
+_NEEDED_EVENT = ("event",)
+# What a control room asks for: by the messages of a device of its own, or of this console.
+CONTROL_ROOM: Known = {
+    "room_join": ({"name": text(0, 64)}, ("name",)),
+    "event_raise": (_REPORT, tuple(_REPORT)),
+    "event_acknowledge": (_EVENT, _NEEDED_EVENT),
+    "event_assign": (
+        _SENT | _SEEN | {"task": one_of("confirm", "contain", "stand_by"), "reason": _REASON},
+        ("event", "device"),
+    ),
+    "event_take_off": (_SENT | _SEEN | {"reason": _REASON}, ("event", "device")),
+    "event_false_alarm": (_EVENT | _SEEN | {"reason": text(1, 256)}, ("event", "reason")),
+    "event_escalate": (_EVENT | _SEEN | {"reason": _REASON}, _NEEDED_EVENT),
+    "event_note": (_EVENT | {"text": text(1, 256)}, ("event", "text")),
+    "event_proposal": (_EVENT, _NEEDED_EVENT),
+    "dispatch_mode": (
+        {"mode": one_of("automatic", "ask_first"), "reason": _REASON},
+        ("mode",),
+    ),
+    "mission": ({"robot": robot, **_EVENT}, ("robot", "event")),
+    "take_over": ({"robot": robot, "reason": text(1, 256)}, ("robot", "reason")),
+    "alarm_acknowledge": (_ALARM, ("alarm",)),
+    "alarm_shelve": (_ALARM | {"for_s": number(1, _SHIFT)}, ("alarm", "for_s")),
+    "alarm_unshelve": (_ALARM, ("alarm",)),
+}
 _SAYINGS = ("departed", "arrived", "confirmed", "refuted", "contained", "help")
+
+_FAULT = {
+    "robot": robot,
+    "what": one_of("processing", "replies", "freeze", "camera", "sensor"),
+    "on": flag,
+    "seconds": number(0, 3),
+    "sensor": word,
+}
 
 # What may be asked: its arguments, and those of them that have to be there.
 ACTIONS: Known = {
@@ -106,37 +151,61 @@ ACTIONS: Known = {
     "link": (_LINK, ()),
     "pattern": ({"robot": robot, "name": word}, ("robot", "name")),
     "pace": ({"factor": number(0.01, 1000), "paused": flag}, ()),
+    "seek": ({"t_ms": whole(0, 10**10)}, ("t_ms",)),
+    "open_recording": ({"name": text(1, 255)}, ("name",)),
     "confirm": ({}, ()),
     "refute": ({}, ()),
     "decline": ({}, ()),
     "tour": ({}, ()),
+    "manual_take": ({"robot": robot}, ("robot",)),
+    "manual_release": ({}, ()),
+    "robot_register": ({"robot": robot, "dva": text(3, 80)}, ("robot", "dva")),
+    "robot_listen": ({"robot": robot}, ("robot",)),
+    "robot_off": ({"robot": robot}, ("robot",)),
+    "fault": (_FAULT, ("robot", "what", "on")),
     "phone_register": (_REGISTER, tuple(_REGISTER)),
     "phone_devices": ({}, ()),
     "phone_permission": (_PERMISSION, tuple(_PERMISSION)),
     "phone_calibrate": (_CALIBRATE, tuple(key for key in _CALIBRATE if key not in _OPTIONAL)),
+    "server_start": ({"port": whole(1, 65_534)}, ("port",)),
+    "server_stop": ({}, ()),
+    "revoke": ({"device": word}, ("device",)),
+    "fake_add": (_FAKE, ("label", "type")),
+    "fake_remove": ({"device": word}, ("device",)),
     "guard_join": ({"guard": _LABEL}, ("guard",)),
     "guard_leave": ({}, ()),
     "guard_answer": ({"accept": flag, "reason": text(0, 200)}, ("accept", "reason")),
     "guard_say": ({"what": one_of(*_SAYINGS)}, ("what",)),
     "guard_place": (_PLACE, tuple(_PLACE)),
     "guard_report": (_REPORT, tuple(_REPORT)),
+    **CONTROL_ROOM,
+}
+_INPUT = {
+    "n": whole(0, 2**53),
+    "speed": number(0, 1),
+    "turn": number(-1, 1),
+    "held": flag,
 }
 # Those that have no answer.
 SILENT: Known = {
-    "input": (
-        {
-            "n": whole(0, 2**53),
-            "speed": number(0, 1),
-            "turn": number(-1, 1),
-            "held": flag,
-        },
-        ("n", "speed", "turn", "held"),
-    ),
+    "input": (_INPUT, tuple(_INPUT)),
+    "manual": (_INPUT, tuple(_INPUT)),
     "samples": (_SAMPLES, tuple(_SAMPLES)),
     "gone": ({}, ()),
 }
-# A phone changes nothing for others, but that it stops a robot.
-NOT_BY_PHONE = ("take", "link", "pattern", "pace", "tour")
+# The least role that may ask for it; whoever acts at all may ask for the others. A phone changes
+# nothing for others, but that it stops a robot.
+NEEDS = {
+    **dict.fromkeys(
+        ("take", "link", "pattern", "pace", "tour", "seek", "open_recording"), Role.DRIVE
+    ),
+    **dict.fromkeys(("server_start", "server_stop", "fake_add", "fake_remove"), Role.DRIVE),
+    **dict.fromkeys(("manual_take", "manual", "fault"), Role.DRIVE),
+    **dict.fromkeys(("robot_register", "robot_listen", "robot_off"), Role.DRIVE),
+    **dict.fromkeys(CONTROL_ROOM, Role.DISPATCH),
+    **dict.fromkeys(("room_join", "event_raise", "event_proposal", "mission"), Role.DRIVE),
+    **dict.fromkeys(("dispatch_mode", "take_over", "revoke"), Role.SUPERVISE),
+}
 
 
 def check_role(role: Role, name: Any) -> None:
@@ -147,8 +216,18 @@ def check_role(role: Role, name: Any) -> None:
     """
     if not role.acts:
         raise BadMessage("this address may only look")
-    if role is Role.PHONE and name in NOT_BY_PHONE:
-        raise BadMessage(f"a phone's address may not {name}; the address for driving may")
+    least = NEEDS.get(name, Role.PHONE) if isinstance(name, str) else Role.PHONE
+    if role < least:
+        own = "a phone's address" if role is Role.PHONE else "this address"
+        raise BadMessage(f"{own} may not {plain(name)}; an address {_FOR[least]} may")
+
+
+_FOR = {Role.DRIVE: "for driving", Role.DISPATCH: "for dispatch", Role.SUPERVISE: "to supervise"}
+
+
+def plain(name: str) -> str:
+    """The name of an action, for people."""
+    return name.replace("_", " ")
 
 
 def asked_of(name: Any, given: Any, labels: Labels, silent: bool = False) -> dict[str, Any]:

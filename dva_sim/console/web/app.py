@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from starlette.applications import Starlette
@@ -19,9 +20,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from dva_sim.console.web.access import Asked, Entrance, Role
+from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
+from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.web.streaming import PictureStream
@@ -224,7 +228,7 @@ def _for(least: Role, endpoint: Any) -> Any:
     return guarded
 
 
-_ONLY = {Role.PHONE: "drive by phone"}
+_ONLY = {Role.PHONE: "drive by phone", Role.DRIVE: "drive", Role.DISPATCH: "dispatch"}
 
 
 def make_app(
@@ -233,6 +237,8 @@ def make_app(
     cameras: CameraStreams,
     files: StaticFiles,
     door: PhoneDoor | None = None,
+    audit: AuditPages | None = None,
+    report: Path | None = None,
 ) -> ASGIApp:
     """The whole application.
 
@@ -242,8 +248,13 @@ def make_app(
         cameras: Pictures.
         files: Of the pages.
         door: Where phones come in, if they do.
+        audit: Who did what, if that is kept.
+        report: A study's report that is shown as it is.
     """
+    told = StudyReport(report)
     pages, rest, phones = Pages(access, hub, cameras, files), Rest(hub), PhonePages(door, files)
+    log = audit or AuditPages(None)
+    logs = LogRequests(hub)
 
     async def see(ws: WebSocket) -> None:
         await hub.see(ws, ws.scope[ROLE])
@@ -259,11 +270,20 @@ def make_app(
         Route("/api/phones.svg", _for(Role.DRIVE, phones.code)),
         Route("/static/{name:path}", pages.file),
         Route(OPEN, pages.health),
+        Route("/report", told.page),
         Route("/camera/{label:path}.mjpg", pages.stream),
         Route("/camera/{label:path}.jpg", pages.still),
         Route("/api/state", rest.state),
         Route("/api/site", rest.site),
         Route("/api/story", rest.story),
+        Route("/api/audit", log.rows),
+        Route("/api/audit/check", log.check),
+        Route("/api/audit/measures", log.measures),
+        Route("/api/audit.csv", log.as_csv),
+        Route("/api/audit.json", log.as_json),
+        Route("/api/logs/{name}", _for(Role.LOOK, logs.lines)),
+        Route("/api/logs/{name}/export", _for(Role.DRIVE, logs.export)),
+        Route("/api/logs/{name}/{number:int}", _for(Role.DRIVE, logs.entry)),
         Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
         Route("/api/emergency", _for(Role.PHONE, rest.emergency), methods=["POST"]),
         WebSocketRoute("/ws/state", see),

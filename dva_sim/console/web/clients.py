@@ -7,6 +7,8 @@ import secrets
 from collections import deque
 from collections.abc import Iterable
 
+from starlette.websockets import WebSocket
+
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.feed import OWN_KEPT, PageFeed
 from dva_sim.console.web.state import RunState
@@ -60,11 +62,14 @@ class Client:
         watches: Robots whose pictures it says it looks at.
         driver: Its driving socket, if it has one.
         is_here: Whether its state socket is open.
+        page: What the page calls itself until it is loaded anew; empty: nothing.
+        ws: Its state socket, while that is open.
     """
 
-    def __init__(self, name: str, role: Role, state: RunState) -> None:
-        self.name, self.role = name, role
-        self.feed = PageFeed(state, name)
+    def __init__(self, name: str, role: Role, state: RunState, page: str = "") -> None:
+        self.name, self.role, self.page = name, role, page
+        self.ws: WebSocket | None = None
+        self.feed = PageFeed(state, name, role >= Role.DRIVE)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
         self.driver: Driver | None = None
@@ -91,18 +96,20 @@ class Clients:
         """Whether nobody more is let in."""
         return len(self.here()) >= MOST_CLIENTS
 
-    def join(self, role: Role, name: str = "") -> Client:
+    def join(self, role: Role, name: str = "", page: str = "") -> Client:
         """Let a page in, under its old name if it was here a moment ago and is not any more.
 
         A copy of a page that is open has the same name, and gets another: they would drive the
-        same robots.
+        same robots. The very page that is open may come again, when it has lost its connection
+        before we know of that.
         """
         known = self._all.get(name)
-        if known is not None and known.role is role and not known.is_here:
-            known.is_here, known.feed = True, PageFeed(self._state, known.name)
+        if known is not None and known.role is role and _may_come_again(known, page):
+            known.is_here, known.page = True, page
+            known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
             return known
         self._count += 1
-        client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state)
+        client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state, page)
         self._all[client.name] = client
         return client
 
@@ -113,7 +120,7 @@ class Clients:
 
     def leave(self, client: Client) -> None:
         """Its state socket is closed; its name is kept a while."""
-        client.is_here, client.watches = False, frozenset()
+        client.is_here, client.ws, client.watches = False, None, frozenset()
 
     def forget(self, client: Client) -> bool:
         """Forget a page that has not come back: whether it had not."""
@@ -126,7 +133,21 @@ class Clients:
         """Robots whose pictures somebody says to look at."""
         return (robot for client in self.here() for robot in client.watches)
 
+    def looked(self) -> tuple[dict[str, bool], list[str]]:
+        """Logs that pages look at, each with whether publications are wanted, and tables."""
+        logs: dict[str, bool] = {}
+        tables: set[str] = set()
+        for looks in (client.feed.looks for client in self.here()):
+            for name, wanted in looks.wanted.items():
+                logs[name] = logs.get(name, False) or wanted.publications
+            tables |= looks.tables
+        return logs, sorted(tables)
+
     def wake(self) -> None:
         """Something is new."""
         for client in self._all.values():
             client.wake.set()
+
+
+def _may_come_again(known: Client, page: str) -> bool:
+    return not known.is_here or (bool(page) and page == known.page)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections import deque
 
+from dva_sim.console.web.logs import TABLES, Looks
 from dva_sim.console.web.state import LATEST, RunState, Versioned, body_of
 
 OWN_KEPT = 64  # lines for one page alone that may wait
 
 Sources = tuple[str, ...]
-SOURCES: Sources = ("seat", "guard", "d", *LATEST, "story", "others")
+SOURCES: Sources = ("seat", "guard", "windows", "d", *LATEST, "story", "others", "log", *TABLES)
 
 
 class PageFeed:
@@ -23,10 +24,18 @@ class PageFeed:
     Args:
         state: Of the run.
         seat: Of this page; its lines come in full.
+        acts: Whether the page may drive.
+
+    Attributes:
+        looks: Which logs and tables it looks at.
+        watches: Robots at which it looks.
     """
 
-    def __init__(self, state: RunState, seat: str) -> None:
+    def __init__(self, state: RunState, seat: str, acts: bool = True) -> None:
         self._state, self._seat = state, seat
+        self.looks = Looks(state.logs, acts)
+        self.watches: frozenset[int] = frozenset()
+        self._have_windows: dict[int, int] = {}
         self._own: deque[str] = deque()
         self._count, self._turn = 0, 0
         self._wants_snapshot = True
@@ -72,6 +81,7 @@ class PageFeed:
         self._have = {kind: known.version for kind, known in state.latest.items()}
         self._have_places, self._have_story = state.place_version, state.told
         self._have_seats = {seat: known.version for seat, known in state.seats_short.items()}
+        self._have_windows.clear()
         for own in ("seat", "guard"):
             self._have.pop(own, None)
         return state.snapshot()
@@ -83,11 +93,31 @@ class PageFeed:
             return self._told()
         if source == "others":
             return self._others()
+        if source == "windows":
+            return self._window()
+        if source == "log":
+            line = self.looks.next()
+            return None if line is None else body_of(line)
+        if source in TABLES:
+            looked = source in self.looks.tables
+            return self._newer(source, self._state.tables.get(source)) if looked else None
         if source == "seat":
             return self._newer("seat", self._state.seats.get(self._seat))
         if source == "guard":
             return self._newer("guard", self._state.guards.get(self._seat))
         return self._newer(source, self._state.latest.get(source))
+
+    def _window(self) -> str | None:
+        """What is new of a robot that the page looks at; of another one it knows nothing."""
+        have = self._have_windows = {
+            i: v for i, v in self._have_windows.items() if i in self.watches
+        }
+        for index in self.watches:
+            known = self._state.windows.get(index)
+            if known is not None and known.version > have.get(index, 0):
+                have[index] = known.version
+                return known.body
+        return None
 
     def _newer(self, kind: str, known: Versioned | None) -> str | None:
         if known is None or known.version <= self._have.get(kind, 0):

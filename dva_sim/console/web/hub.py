@@ -60,7 +60,13 @@ class Hub:
         if self.clients.is_full():
             await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
             return
-        client = self.clients.join(role, ws.query_params.get("client", ""))
+        if await self._is_over(ws):
+            return
+        name, page = (ws.query_params.get(key, "")[:64] for key in ("client", "page"))
+        client = self.clients.join(role, name, page)
+        if client.ws is not None:  # the page has lost that one, and we did not know
+            wire_of(client.ws).drop(STUCK, "the page has come again")
+        client.ws = ws
         client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
 
         def hear(text: str) -> None:
@@ -71,7 +77,8 @@ class Hub:
             bucket = Bucket(LOOKS_RATE, LOOKS_BURST)
             await self._serve(ws, client.wake, client.feed.next, hear, bucket)
         finally:
-            self._leave(client)
+            if client.ws is ws:
+                self._leave(client)
 
     def _hear_looker(self, client: Client, text: str) -> None:
         said = read(text)
@@ -83,14 +90,24 @@ class Hub:
             client.feed.resync()
         elif what == "watch":
             client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
+            client.feed.watches = client.watches
             self.watching()
+        elif what == "look" and client.role is not Role.PHONE:
+            client.feed.looks.look(said.get("logs", {}), said.get("tables", []))
+            self._tell_looks()
         else:
-            raise BadMessage("no such message; there are: ping, resync, watch")
+            raise BadMessage("no such message; there are: ping, resync, watch, look")
         client.wake.set()
+
+    def _tell_looks(self) -> None:
+        """The simulation tells what somebody looks at, and no more."""
+        logs, tables = self.clients.looked()
+        self.simulation.send({"do": "look", "logs": logs, "tables": tables})
 
     def _leave(self, client: Client) -> None:
         """A page is gone: its robots stop, and after a while others may have them."""
         self.clients.leave(client)
+        self._tell_looks()
         self.watching()
         if client.role.acts:
             self.simulation.send({"client": client.name, "do": "gone"})
@@ -115,6 +132,8 @@ class Hub:
         if not role.acts or client is None or client.role is not role:
             why = "may only look" if role is Role.LOOK else "no page of that name is open"
             await ws.send_denial_response(PlainTextResponse(why, 403))
+            return
+        if await self._is_over(ws):
             return
         self._replace(client)
         driver = client.driver = Driver()
@@ -154,7 +173,7 @@ class Hub:
                 return
             if client.role is Role.PHONE and "robots" not in said:
                 asked.pop("robots", None)  # an emergency is for its own robot
-            asked["id"] = id_of(key)
+            asked |= {"id": id_of(key), "role": client.role.name.lower()}
             self.simulation.ask(asked, lambda line: driver.answer(encode(line)))
         except BadMessage as error:
             line = {"k": "done", "id": key if isinstance(key, str) else None, "ok": False}
@@ -162,11 +181,20 @@ class Hub:
 
     # --- both ----------------------------------------------------------------------------
 
+    async def _is_over(self, ws: WebSocket) -> bool:
+        """Whether the world has ended: who comes back then does not find it open once more."""
+        if self.simulation.ended.is_set():
+            await ws.send_denial_response(PlainTextResponse(self.simulation.why, 503))
+            return True
+        return False
+
     async def _serve(
         self, ws: WebSocket, wake: asyncio.Event, following: Next, hear: Hear, bucket: Bucket
     ) -> None:
         """Send and receive until one of both ends; nothing of it is left behind."""
         self._open.add(ws)
+        if self.simulation.ended.is_set():  # while it was being accepted
+            wire_of(ws).drop(LEAVING, self.simulation.why)
         tasks = [
             asyncio.ensure_future(self._send(ws, wake, following)),
             asyncio.ensure_future(self._receive(ws, hear, bucket)),

@@ -16,8 +16,9 @@ Asked = dict[str, Any]
 class OutgoingLines:
     """Lines to the simulation that have not been written yet.
 
-    Of inputs and of watched robots only the newest waits, for each client. Of a phone's samples
-    all count, in their order; if too many wait, the oldest are lost, which their numbers tell.
+    Of inputs, of watched robots and of what is looked at only the newest waits, for each client.
+    Of a phone's samples all count, in their order; if too many wait, the oldest are lost, which
+    their numbers tell.
 
     Attributes:
         refused: How many actions found no room.
@@ -33,7 +34,7 @@ class OutgoingLines:
     def put(self, asked: Asked) -> bool:
         """Add a line: whether there was room."""
         kind, client = asked["do"], asked.get("client", "")
-        if kind in ("input", "watch"):
+        if kind in ("input", "watch", "look"):
             self._newest[client, kind] = asked
             return True
         if kind == "samples":

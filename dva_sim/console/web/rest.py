@@ -92,8 +92,8 @@ class Rest:
     async def site(self, request: Request) -> Response:
         """`GET /api/site`: the plan, which does not change."""
         scene = self._simulation.state.scene
-        if scene is None:
-            return problem(503, "the simulation has not begun")
+        if scene is None or "site" not in scene:
+            return problem(503, "nothing has begun")
         response = JSONResponse(scene["site"])
         tag = f'"{hashlib.sha256(response.body).hexdigest()[:32]}"'
         headers = {"ETag": tag, "Cache-Control": "no-cache"}
@@ -124,6 +124,7 @@ class Rest:
             if problem_of := _not_by(request, name):
                 return problem_of
             asked = asked_of(name, said.get("arguments", {}), self._simulation.labels)
+            asked["role"] = request.scope[ROLE].name.lower()
             return await self._do(asked, said)
         except BadMessage as error:
             return problem(400, str(error))
@@ -136,7 +137,8 @@ class Rest:
             if not self._is_here(said.get("client")):
                 said.pop("client", None)  # whose socket has just broken may still stop a robot
             given = {"robots": said.get("robots", "all")}
-            return await self._do(asked_of("emergency", given, self._simulation.labels), said)
+            asked = asked_of("emergency", given, self._simulation.labels)
+            return await self._do(asked | {"role": request.scope[ROLE].name.lower()}, said)
         except BadMessage as error:
             return problem(400, str(error))
 

@@ -13,14 +13,29 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from dva_sim.console.web.actions import CONTROL_ROOM
 from dva_sim.console.web.checks import Labels
 from dva_sim.console.web.outbox import Asked
 from dva_sim.console.web.pipes import Lines, PipeEnd
 from dva_sim.console.web.state import RunState
 
 PATIENCE = 5.0  # for an answer [s]
-LONG = 60.0  # for one that the DVA gives, or does not give after all attempts [s]
-BY_THE_DVA = ("phone_register", "phone_devices", "phone_permission")
+LONG = 60.0  # for one that a robot or the DVA gives, or does not give after all attempts [s]
+OVER_THE_LINK = (
+    "take",
+    "start",
+    "stop",
+    "confirm",
+    "refute",
+    "robot_register",
+    "phone_register",
+    "phone_devices",
+    "phone_permission",
+    "fake_add",
+    "guard_say",
+    "guard_report",
+    *CONTROL_ROOM,
+)
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
 MOST_PENDING = 256  # questions without an answer
@@ -116,8 +131,11 @@ class Simulation:
         return self._pipe.send(asked)
 
     def ask(self, asked: Asked, told: Told) -> None:
-        """Ask for something; `told` gets the answer, which may be that there is no room."""
+        """Ask for something; `told` gets the answer: there may be no room, or nobody there."""
         key = asked["id"]
+        if self.ended.is_set():
+            told({"k": "done", "id": key, "ok": False, "text": self.why})
+            return
         waiting = self._pending.get(key)
         if waiting is not None and len(waiting) < 4:
             waiting.append(told)
@@ -127,7 +145,7 @@ class Simulation:
             told({"k": "done", "id": key, "ok": False, "text": "too much is asked at once"})
             return
         self._pending[key] = [told]
-        patience = LONG if asked["do"] in BY_THE_DVA else PATIENCE
+        patience = LONG if asked["do"] in OVER_THE_LINK else PATIENCE
         asyncio.get_running_loop().call_later(patience, self._give_up, key, told, patience)
 
     def _give_up(self, key: str, told: Told, patience: float) -> None:

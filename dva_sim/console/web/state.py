@@ -10,11 +10,17 @@ import json
 from collections import deque
 from typing import Any, NamedTuple
 
+from dva_sim.console.web.logs import TABLES, KeptLogs
+
 Line = dict[str, Any]
 
 STORY_KEPT = 1000  # lines
 STORY_SHOWN = 200  # of them in a snapshot
-LATEST = ("rows", "hazards", "events", "pictures")  # kinds of which only the newest counts
+# Kinds of which only the newest counts.
+LATEST = (
+    *("rows", "hazards", "events", "control", "alarms", "audit", "pictures"),
+    *("told", "shelf"),
+)
 SHORT = ("seat", "phase", "order", "label")  # what others may know of a seat
 MOST_SEATS = 256  # of which anything is remembered
 
@@ -47,6 +53,9 @@ class RunState:
         places: Where everybody is, by index: a row of `pos`.
         seats: What each seat's holder knows, and what others may.
         guards: What each page of a guard knows.
+        windows: What the windows of a robot show, by its index.
+        tables: The newest line of each kind that only some pages look at.
+        logs: What devices were asked, and answered.
     """
 
     def __init__(self) -> None:
@@ -65,6 +74,9 @@ class RunState:
         self.seats: dict[str, Versioned] = {}
         self.seats_short: dict[str, Versioned] = {}
         self.guards: dict[str, Versioned] = {}
+        self.windows: dict[int, Versioned] = {}
+        self.tables: dict[str, Versioned] = {}
+        self.logs = KeptLogs()
         self._deltas: dict[int, str] = {}
         self._snapshot: tuple[int, str] = -1, ""
 
@@ -82,9 +94,16 @@ class RunState:
             self._take_seat(line)
         elif kind == "guard":
             self._take_guard(line)
+        elif kind == "robot":
+            self.windows[line["i"]] = Versioned(self.version, body_of(line))
         elif kind == "story":
             self.told += 1
             self.story.append(line)
+        elif kind == "log":
+            self.logs.take(line)
+        elif kind in TABLES:
+            self.tables[kind] = Versioned(self.version, body_of(line))
+            self.logs.meet({str(one["id"]): one["label"] for one in line["devices"]})
         elif kind in LATEST:
             self.lines[kind] = line
             self.latest[kind] = Versioned(self.version, body_of(line))
@@ -95,6 +114,7 @@ class RunState:
     def _take_scene(self, line: Line) -> None:
         self.scene = {key: value for key, value in line.items() if key not in ("k", "t")}
         self.scene_text, self.scene_version = encode(self.scene), self.version
+        self.logs.meet({str(thing["id"]): thing["label"] for thing in line.get("things", ())})
 
     def _take_places(self, line: Line) -> None:
         here = {row[0]: row for row in line["p"]}

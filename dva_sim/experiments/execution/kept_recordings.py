@@ -127,7 +127,7 @@ def chosen(study: Study, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
         return [runs[0] for runs in in_cells]
     measure = study.answer.measure
     return [
-        max(runs, key=lambda job: _badness(measure, rows[position_of(job)])) for runs in in_cells
+        max(runs, key=lambda job: badness(measure, rows[position_of(job)])) for runs in in_cells
     ]
 
 
@@ -150,7 +150,7 @@ def rows_of(results: Results) -> dict[RunPosition, Row]:
     return {(row["part"], row["cell"], row["person"], row["trial"]): row for row in rows}
 
 
-def _badness(measure: str, row: Row) -> float:
+def badness(measure: str, row: Row) -> float:
     """How bad a run is; what never came is worst."""
     value = row.get(measure)
     if value is None or math.isnan(value):

@@ -55,7 +55,8 @@ class ConstantRate(Serialiser):
 
     def backlog_bytes(self, now: float) -> float:
         """See `Serialiser`."""
-        return max(0.0, self._free_at - now) / self._seconds_per_byte
+        free_at = self._free_at
+        return (free_at - now) / self._seconds_per_byte if free_at > now else 0.0
 
     def last_departure(self) -> float:
         """See `Serialiser`."""

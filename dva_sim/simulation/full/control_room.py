@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.agents.control_room.dispatcher import ScriptedDispatcher
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.attention import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.drive import Teleoperation
@@ -23,6 +25,7 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
+from dva_sim.core.roles import Roles
 from dva_sim.core.sensing import Sensing, SensorAlarm
 from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
@@ -32,7 +35,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, Stage, middle_of
+from dva_sim.simulation.full.stage import DVA, Stage, control_rooms_of, middle_of
 from dva_sim.simulation.scenario import (
     Scenario,
     command_timeout_s,
@@ -91,6 +94,9 @@ def make_desk(stage: Stage, permissions: Permissions) -> Dva:
         patrols=_patrols(stage),
         sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
         supervisors=_supervisors(stage),
+        roles=Roles(control_rooms_of(stage.scenario)),
+        ask_first=dispatch.mode == "ask_first",
+        policy_name=dispatch.policy.rpartition(":")[2],
     )
 
 
@@ -202,6 +208,19 @@ def _patrols(stage: Stage) -> Patrols:
                 raise ConfigError(f"patrols: no robot fits at x {x:g} m, y {y:g} m")
         beats[patrol.robot] = tuple(m.Position(*to_latlon(x, y)) for x, y in places)
     return Patrols(beats)
+
+
+def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
+    """The person who dispatches by a script, at the first control room, if there is one."""
+    profile = stage.scenario.dispatch.person
+    if profile is None:
+        return None
+    device = stage.device("control-room", 1)
+    luck = stage.streams.fresh
+    room = ControlRoomAgent(device)
+    person = ScriptedDispatcher(room, profile, lambda what: luck(f"{device.label}/{what}"))
+    room.start()
+    return person
 
 
 def add_operator(

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
 from functools import partial
 
-from dva_sim.agents.device import HEARTBEAT, STATUS, AgentDevice
+from dva_sim.agents.device import AUDIT, EVENT, HEARTBEAT, STATUS, AgentDevice
 from dva_sim.agents.robot.sensors import sensor_topic
+from dva_sim.core.audit import MOST_KEPT, Fact
 from dva_sim.core.dva import Dva
 from dva_sim.core.events import Event, State
-from dva_sim.core.registry import DETECTOR, GUARD, ROBOT
+from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, ROBOT
 from dva_sim.core.sessions import Send
 from dva_sim.core.store import Store
 from dva_sim.network.messaging import Subscription
@@ -30,6 +32,8 @@ class DvaAgent:
         beats: Heartbeats heard, by device.
         leave_after: Who is silent is listened to for so much longer [s].
         events: Every event there ever was, by number, where `keep_events`.
+        facts: What was decided; the last of it, unless `keep_events`.
+        on_fact: Is told of each fact as it is taken from the desk.
     """
 
     def __init__(
@@ -37,6 +41,9 @@ class DvaAgent:
     ) -> None:
         self.device, self.desk = device, desk
         self.events: dict[int, Event] = {}
+        self.facts: deque[Fact] = deque(maxlen=None if keep_events else MOST_KEPT)
+        self.on_fact: Callable[[Fact], object] = self.facts.append
+        self._asks = desk.dispatcher.questions.asks
         self._memory, self._keep_events = memory, keep_events
         self._told: dict[int, State] = {}
         self._policy_failures = 0
@@ -60,6 +67,15 @@ class DvaAgent:
     def close(self) -> None:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""
         self._carry_out(self.desk.close())
+
+    def silence(self, silent: bool) -> None:
+        """Say and decide nothing for a while, though the devices are still heard; or go on."""
+        self.device.silent = silent
+
+    def dismiss(self, device: str) -> None:
+        """Forget a device at once, as if it had been silent for long."""
+        self._carry_out(self.desk.dismiss(device, self.device.clock.now))
+        self._attend()
 
     def revoke(self, robot: str, takes: str | None, holder_told: bool) -> None:
         """End the permission for a robot while it is in use, as a scenario wants.
@@ -135,13 +151,17 @@ class DvaAgent:
 
     def _on_published(self, source: str, data: bytes) -> None:
         message = self.device.read(data, source)
-        if message is not None:
+        if message is not None and self.device.silent:
+            self.desk.registry.heard(source, self.device.clock.now)
+        elif message is not None:
             self.beats[source] += isinstance(message.body, m.Heartbeat)
             sends = self.desk.note(message, self.device.clock.now)
             if sends or isinstance(message.body, m.SensorValue):
                 self._carry_out(sends)
 
     def _tick(self) -> None:
+        if self.device.silent:
+            return
         self._carry_out(self.desk.tick(self.device.clock.now))
         self._attend()
 
@@ -183,6 +203,22 @@ class DvaAgent:
             if self._keep_events:
                 self.events[event.number] = event
             self._tell(event)
+        self._tell_control_rooms(changed)
+
+    def _tell_control_rooms(self, changed: Iterable[Event]) -> None:
+        """Publish what is new, if anybody is there who listens for it; facts are kept anyway."""
+        desk, now, facts = self.desk, self.device.clock.now, self.desk.trail.take()
+        for fact in facts:
+            self.on_fact(fact)
+        if not any(desk.registry.of_type(CONTROL_ROOM)):
+            return
+        for event in changed:
+            self.device.publish(EVENT, desk.control_rooms.event_status(event, now))
+        for fact in facts:
+            self.device.publish(AUDIT, fact.record())
+        if self._asks != desk.dispatcher.questions.asks:
+            self._asks = desk.dispatcher.questions.asks
+            self.device.publish(EVENT, desk.control_rooms.status(now))
 
     def _count_failures(self) -> None:
         """Count what a policy got wrong, and tell of the first time."""

@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, TypeVar, cast
 
 from dva_sim.core.dva import Dva, Reaction
+from dva_sim.core.roles import ControlRoomRole
 from dva_sim.core.sessions import Permissions, Send
 from dva_sim.core.store import Store
 from dva_sim.kernel.errors import ConfigError
@@ -50,6 +51,7 @@ class TracedDva:
         self._bits: list[int] = []
         self._numbers: OrderedDict[Send, int] = OrderedDict()
         self._given = 0
+        self._roles = dict(desk.roles.known)
         permissions = desk.sessions.permissions
         draw = permissions.draw
         permissions.draw = lambda: self._kept(draw())
@@ -108,6 +110,11 @@ class TracedDva:
         """After a recall."""
         return self._decided({"do": "go on"}, self._desk.go_on)
 
+    def dismiss(self, device: str, now: float) -> list[Send]:
+        """Somebody is to be there no more."""
+        told = {"do": "dismiss", "device": device, "now": now}
+        return self._decided(told, lambda: self._desk.dismiss(device, now))
+
     def close(self) -> list[Send]:
         """The end."""
         return self._decided({"do": "close"}, self._desk.close)
@@ -126,6 +133,7 @@ class TracedDva:
 
     def _decided(self, told: dict[str, Any], decide: Callable[[], T]) -> T:
         self._bits = []
+        told |= self._new_roles()
         decision = decide()
         _, sends = _parts(decision)
         for send in sends:
@@ -137,6 +145,14 @@ class TracedDva:
         drawn = {"bits": self._bits} if self._bits else {}
         self._sink(json.dumps(told | drawn | {"decided": _in_words(decision)}))
         return decision
+
+    def _new_roles(self) -> dict[str, Any]:
+        """What control rooms may do, if somebody was appointed since the last line."""
+        known = self._desk.roles.known
+        if known == self._roles:
+            return {}
+        self._roles = dict(known)
+        return {"roles": dict(known)}
 
 
 def _nowhere(_: str) -> None:
@@ -224,6 +240,9 @@ class _Again:
     def decide(self, entry: dict[str, Any]) -> list[str]:
         """Let it happen once more; what is decided now."""
         self._bits = deque(entry.get("bits", ()))
+        if "roles" in entry:
+            roles = {room: ControlRoomRole(role) for room, role in entry["roles"].items()}
+            self._desk.roles.known = roles
         if entry["do"] == "recall":
             self._recall(entry["now"])
             return []
@@ -244,6 +263,8 @@ class _Again:
                 return desk.tick(entry["now"])
             case "go on":
                 return desk.go_on()
+            case "dismiss":
+                return desk.dismiss(entry["device"], entry["now"])
             case "close":
                 return desk.close()
         raise ValueError(f"{entry['do']!r} does not happen to a DVA")

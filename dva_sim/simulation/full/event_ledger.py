@@ -18,7 +18,7 @@ PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twic
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
-OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>"
+OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>", b"<FalseAlarm>"
 _ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"
 """What it wants to hear that reaches the DVA, and what it wants to read that the DVA sends."""
 Broken = tuple[str, str]
@@ -84,6 +84,7 @@ class EventLedger:
         self._place_of, self._at_event = place_of, at_event
         self._asked: dict[tuple[str, int], m.EventReport] = {}
         self._orders: dict[tuple[str, int], int] = {}
+        self._called_false: dict[tuple[str, int], int] = {}
         self._words: dict[int, Word] = {}
         self._felt: dict[str, float] = {}
         self._seen: dict[int, Seen] = {}
@@ -102,6 +103,9 @@ class EventLedger:
             case m.EventReport(event_id=None, finding="detected") as report:
                 self._asked[source, message.message_id] = report
                 _keep_newest(self._asked)
+            case m.FalseAlarm(event_id=number):
+                self._called_false[source, message.message_id] = number
+                _keep_newest(self._called_false)
             case m.EventReport(event_id=int(number), finding=finding):
                 self._finds(self._word(number), source, number, finding)
             case m.OrderProgress(event_id=number, state=state):
@@ -116,7 +120,8 @@ class EventLedger:
     def waits_for(self, source: str, data: bytes) -> bool:
         """Whether what is sent is worth reading: an order, or an answer that is waited for."""
         if source == self._dva:
-            return any(what in data for what in _ORDERED) or _answers(self._asked, data)
+            asked = self._asked or self._called_false
+            return any(what in data for what in _ORDERED) or _answers(asked, data)
         return _answers(self._orders, data)
 
     def told(self, source: str, message: m.Message | None) -> Iterator[Broken]:
@@ -170,7 +175,10 @@ class EventLedger:
         return place is not None and apart(place, event.position) <= self._at_event
 
     def _answered(self, reporter: str, reply: m.Reply) -> Iterator[Broken]:
-        """The DVA has taken a report: then there is an event."""
+        """The DVA has taken a report: then there is an event. Or a person's word: it is none."""
+        none = self._called_false.pop((reporter, reply.answers), None)
+        if none is not None and reply.code == m.OK:
+            self._word(none).found.add("refuted")
         report = self._asked.pop((reporter, reply.answers), None)
         if report is None or reply.code != m.OK:
             return

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dva_sim.agents.robot.field_of_view import HazardSpot
+from dva_sim.agents.robot.field_of_view import HazardSpot, make_spot
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.full.stage import Stage
@@ -63,12 +63,11 @@ class RunHazard:
         """Whether it has begun and is real; whether it is over by `now` [s], the field knows."""
         return now >= self.start and not self.false_alarm
 
-    def spot(self, now: float) -> HazardSpot | None:
-        """What a camera may see of it at `now` [s]."""
-        if not self.is_there(now):
-            return None
-        x, y = self.hazard.position
-        return HazardSpot(self.kind, x, y, self.hazard.radius(now), self.hazard.shines)
+    def spot(self, now: float) -> HazardSpot:
+        """What a camera may see of it at `now` [s], when it has begun."""
+        hazard = self.hazard
+        x, y = hazard.position
+        return make_spot(self.kind, x, y, hazard.radius(now), hazard.shines)
 
 
 def draw_incidents(
@@ -162,10 +161,8 @@ class RunHazards:
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
         self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
-        self._real = [n for n, i in enumerate(self.incidents) if not i.false_alarm]
-        self.surroundings = Surroundings(
-            stage.site, [self.incidents[number].hazard for number in self._real]
-        )
+        self._real = {n: i for n, i in enumerate(self.incidents) if not i.false_alarm}
+        self.surroundings = Surroundings(stage.site, [i.hazard for i in self._real.values()])
         self.contained: dict[int, float] = {}
 
     def dangers(self, now: float) -> list[Danger]:
@@ -174,7 +171,7 @@ class RunHazards:
 
     def spots(self, now: float) -> list[HazardSpot]:
         """What can be seen of the hazards."""
-        return [spot for i in self._going_on(now) if (spot := i.spot(now)) is not None]
+        return [incident.spot(now) for incident in self._going_on(now)]
 
     def contain(self, kind: str, x: float, y: float) -> None:
         """Somebody has dealt with what is at a place [m]: from now on it harms nobody."""
@@ -184,7 +181,7 @@ class RunHazards:
             there = incident.is_there(now) and number not in self.contained
             if incident.kind == kind and near and there:
                 self.contained[number] = now
-                self.surroundings.contain(self._real.index(number), now)
+                self.surroundings.contain([*self._real].index(number), now)
 
     def is_there(self, kind: str, x: float, y: float) -> bool:
         """Whether something of a kind really is near a place [m]."""
@@ -201,8 +198,5 @@ class RunHazards:
 
     def _going_on(self, now: float) -> list[RunHazard]:
         """What has begun, is real, and was not dealt with yet."""
-        return [
-            incident
-            for number, incident in enumerate(self.incidents)
-            if incident.is_there(now) and now < self.contained.get(number, math.inf)
-        ]
+        over = self.contained.get
+        return [i for n, i in self._real.items() if i.start <= now < over(n, math.inf)]

@@ -10,7 +10,7 @@ from dva_sim.agents.people.bystander import DOWN
 from dva_sim.core.events import Event
 from dva_sim.kernel.measure import Measure, names_of, text
 from dva_sim.kernel.recorder import DriveLog
-from dva_sim.simulation.full import Recording, loop_delay, workload
+from dva_sim.simulation.full import Recording, dispatch_measures, loop_delay, workload
 from dva_sim.simulation.full.loop_delay import NAN, Row, command_ages, delay_budget, driven
 from dva_sim.simulation.scenario import Scenario
 
@@ -138,6 +138,7 @@ RUN_COLUMNS = (
         "broken safety rules found, of S1 to S7; docs/invariants.md says how they are checked",
     ),
     Measure("simulated_s", "virtual time simulated"),
+    *dispatch_measures.RUN_COLUMNS,
 )
 """What a row of `run_row` may hold; what is a number, a study may ask for."""
 _STEPS = {
@@ -166,6 +167,7 @@ EVENT_COLUMNS = (
     Measure("watched_s", "detection until nobody looks any more: the end of the run"),
     Measure("missed", "whether it was refuted although it was there"),
     Measure("false_confirmation", "whether it was confirmed although nothing was there"),
+    *dispatch_measures.EVENT_COLUMNS,
 )
 PEOPLE_COLUMNS = (
     text("person_name", "guard or bystander"),
@@ -193,6 +195,7 @@ def measures_of(scenario: Scenario) -> tuple[str, ...]:
     there = {_OF_DRIVES: scenario.robot.count, workload.COLUMNS: scenario.operator.count}
     there[_OF_DISTURBANCES] = scenario.disturbance.kind != "none"
     there |= {_OF_PEOPLE: bystanders + guards, _OF_BYSTANDERS: bystanders}
+    there[dispatch_measures.RUN_COLUMNS] = scenario.dispatch.person is not None
     gone = {column for columns, count in there.items() if not count for column in columns}
     return names_of(column for column in RUN_COLUMNS if column not in gone)
 
@@ -207,13 +210,15 @@ def run_row(recording: Recording) -> Row:
         _event_measures(recording) | _people_measures(recording) | workload.run_measures(recording)
     )
     row |= _disturbance_measures(recording)
-    counted = {"replans": "replans", "messages": "messages", "traffic_bytes": "bytes"}
-    for name, counter in (counted | {"refused": "refused"}).items():
-        row[name] = recording.recorder.counters[counter]
+    recorder = recording.recorder
+    row |= {"replans": recorder.counters["replans"], "messages": recorder.messages}
+    row |= {"traffic_bytes": recorder.bytes, "refused": recorder.counters["refused"]}
     row["plugin_failures"] = plugin_failures(recording)
     row["violations"] = sum(recording.recorder.violations.values())
     row["simulated_s"] = recording.duration
     row["network_depth"] = recording.depth
+    if recording.people_decide:
+        row |= dispatch_measures.run_measures(recording)
     return row
 
 
@@ -425,6 +430,8 @@ def _event_row(recording: Recording, number: int) -> Row:
         and workload.was_there(recording, event.number, row["t_closed_s"])
     )
     row["false_confirmation"] = incident.false_alarm and row["t_confirmed_s"] < math.inf
+    if recording.people_decide:
+        row |= dispatch_measures.event_measures(event, recording)
     return row
 
 

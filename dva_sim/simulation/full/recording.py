@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.core.sensing import REACH
 from dva_sim.kernel.recorder import Recorder
@@ -72,6 +73,8 @@ class Playback:
         contained: When incidents were dealt with [s], by their place in `incidents`.
         endings: What became of each incident, in the order of `incidents`; empty if that is not
             known, as of a recording that was cut short.
+        events: The events as the DVA knew them in the end.
+        facts: What was decided, by whom and why, in order.
     """
 
     scenario: Scenario
@@ -85,6 +88,14 @@ class Playback:
     duration: float
     contained: dict[int, float] = field(default_factory=dict)
     endings: list[Ending] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    facts: list[Fact] = field(default_factory=list)
+
+    @property
+    def people_decide(self) -> bool:
+        """Whether somebody takes part at a control room."""
+        person = self.scenario.dispatch.person is not None
+        return person or any(fact.role is not None for fact in self.facts)
 
     def robot_named(self, label: str) -> str | None:
         """The id of a robot, if there is one of that name."""
@@ -96,7 +107,6 @@ class Recording(Playback):
     """All that is left of one run, to be measured.
 
     Attributes:
-        events: The events as the DVA knew them.
         robots: The robots by id, as they ended.
         people: What became of the people on foot.
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
@@ -104,7 +114,6 @@ class Recording(Playback):
         persons: Numbers of the operators whose places people took.
     """
 
-    events: list[Event]
     robots: dict[str, RobotAgent]
     links: dict[str, tuple[Link, Link]]
     people: list[PersonLog] = field(default_factory=list)

@@ -27,7 +27,12 @@ from dva_sim.network.link import (
 from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.messaging import Transport
 from dva_sim.network.virtual_network import VirtualNetwork
-from dva_sim.simulation.full.control_room import add_dva, add_operator, at_event_m
+from dva_sim.simulation.full.control_room import (
+    add_dispatcher,
+    add_dva,
+    add_operator,
+    at_event_m,
+)
 from dva_sim.simulation.full.disturbance import Disturbance
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
@@ -161,6 +166,7 @@ class Run:
         for number in range(1, count + 1):
             if number not in self.persons:
                 add_operator(self.stage, number, self.field.truth)
+        self.dispatcher = add_dispatcher(self.stage)
         self.field.schedule_incidents()
         self.audit = SafetyAudit(
             self.recorder,
@@ -233,6 +239,7 @@ class Run:
             people=self._people(),
             depth=self._connector.deepest,
             persons=self.persons,
+            facts=list(self.dva.facts),
         )
 
     def _people(self) -> list[PersonLog]:

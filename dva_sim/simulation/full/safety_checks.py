@@ -2,7 +2,8 @@
 
 It listens on the network, so it knows which permissions the DVA really gave, when a robot was told
 that one is over, and when an emergency reached it. It sees the bodies move, and it is told of every
-command that a robot accepted, whoever sent it. `CHECKED` says which rules it holds that against.
+command that a robot accepted, whoever sent it, and of every hand that drove one at the robot
+itself. `CHECKED` says which rules it holds that against.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import EventBook
-from dva_sim.kernel.recorder import Accepted, Recorder
+from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
@@ -34,10 +35,12 @@ MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of e
 
 CHECKED: Final = {
     "S1": "a robot is asked to move, and moves, by a started drive's newest command that arrived "
-    "within the watchdog, behind it a picture within the age limit, or by a mission that holds; "
+    "within the watchdog, behind it a picture within the age limit, by a mission that holds, or by "
+    "the hand that has taken it, within the watchdog; "
     "slack: a tick of the motors, and until it can have braked",
     "S2": "no command acts by a session that is over, no robot changes hands while it moves "
-    f"({MOVING:g} m/s); slack: until it has confirmed the end, {OBEYS_WITHIN:g} s and ten messages",
+    f"({MOVING:g} m/s), none is driven by hand that somebody holds, nor by messages that is driven "
+    "by hand; slack: until it has confirmed the end, {OBEYS_WITHIN:g} s and ten messages",
     "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
     "S4": f"speed and turn rate stay within the motors' limits; slack: {SLACK - 1:.0%}, and "
     f"{MOVING:g} m/s backwards",
@@ -55,9 +58,8 @@ CHECKED_IN_SHORT: Final = (
 )
 
 Broken = tuple[str, str]
-_COMMAND = re.compile(  # as everybody here writes them, but any other would do no harm
-    rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>.*<SetTeleOp>", re.DOTALL
-)
+# As everybody here writes them, but any other would do no harm.
+_NUMBER_AND_SOURCE = re.compile(rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -67,6 +69,11 @@ class Held(NamedTuple):
     holder: str
     level: str
     sensors: tuple[str, ...]
+
+    @property
+    def drives(self) -> bool:
+        """Whether it is for more than reading sensors."""
+        return self.level != "sensors"
 
     def allows(self, level: str) -> bool:
         """Whether it is for `teleoperation`, or for `missions`."""
@@ -109,6 +116,8 @@ class Witness:
         offset: What is to be added to its own clock to have the time.
         last_mission: When it was last on a mission that it may be on.
         looked: When it was last looked at.
+        told: Sessions that it has agreed to.
+        hand: Who has taken it by hand, and has not let it go since.
     """
 
     obeys_within: float
@@ -126,6 +135,8 @@ class Witness:
     offset: float | None = None
     last_mission: float = 0.0
     looked: float = 0.0
+    told: set[int] = field(default_factory=set)
+    hand: str | None = None
 
     def given(self, session: int, held: Held) -> None:
         """The DVA gives a permission, or says that one holds."""
@@ -133,6 +144,7 @@ class Witness:
         if len(self.sessions) > MOST_KEPT:
             forgotten, _ = self.sessions.popitem(last=False)
             self.over.pop(forgotten, None)
+            self.told.discard(forgotten)
 
     def permits(self, source: str, session: int | None, level: str, now: float) -> Broken | None:
         """Why a device must not act, or None."""
@@ -142,6 +154,11 @@ class Witness:
         if now > self.over.get(session or 0, now):
             return "S2", f"obeys {source}, whose session was over"
         return None
+
+    def holder(self) -> str | None:
+        """Who holds it by a session that it has agreed to, and whose end it has not heard."""
+        held = (s for s in self.sessions if s in self.told and s not in self.over)
+        return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
 
     def may_be_on_a_mission(self, now: float) -> bool:
         """Whether it was sent on one, nobody has called it back, and the session holds."""
@@ -182,6 +199,9 @@ class SafetyAudit:
         place_of: Where a device really is, by its id; None: it has no place.
         at_event: From how far somebody may see what was reported somewhere [m].
         tick: Of the motors [s].
+
+    Attributes:
+        deaf: Robots whose computer was made to hang: what reaches them now, they do not hear.
     """
 
     def __init__(
@@ -198,11 +218,13 @@ class SafetyAudit:
         at_event: float,
         tick: float,
     ) -> None:
-        self._recorder, self._limits, self._robots = recorder, limits, robots
+        self._recorder, self._robots = recorder, robots
+        self._watchdog, self._max_age = limits.watchdog_s, limits.max_age_s
         self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
         self._ledger, self._tick = EventLedger(book, rules, dva, place_of, at_event), tick
         self._witnesses: dict[str, Witness] = {}
-        recorder.on_accepted = self.accepted
+        self.deaf: set[str] = set()
+        recorder.on_accepted, recorder.on_hand = self.accepted, self.by_hand
 
     def expect(self, processing: float) -> None:
         """From now on a message takes a robot's computer so long on average [s]."""
@@ -224,14 +246,14 @@ class SafetyAudit:
         if isinstance(data, CameraFrame):
             if source in self._robots and (witness := self.witness(source)).offset is None:
                 witness.offset = data.captured - data.observation.tick / 1000
-        elif to in self._robots:
+        elif to in self._robots and to not in self.deaf:
             self._reaches_robot(now, source, to, data)
         elif to == self._dva and any(what in data for what in OF_EVENTS):
             self._ledger.hears(source, _read(data), now)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness = self.witness(robot)
-        command = _COMMAND.search(data)
+        command = _NUMBER_AND_SOURCE.search(data) if b"<SetTeleOp>" in data else None
         if command is not None:
             witness.arrivals.setdefault((command[2].decode(), int(command[1])), now)
             if len(witness.arrivals) > MOST_KEPT:
@@ -279,6 +301,7 @@ class SafetyAudit:
             witness = self.witness(robot)
             witness.given(content.session, Held(content.device, content.level, content.sensors))
             witness.over.pop(content.session, None)
+            witness.told.add(content.session)
 
     def _answered(
         self, witness: Witness, robot: RobotAgent, asked: Unanswered, code: int, now: float
@@ -291,6 +314,7 @@ class SafetyAudit:
             case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
             case m.PermissionGrant() if asked.source == self._dva and code == m.OK:
+                witness.told.add(body.session)
                 self._replaced(witness, body, now)
         if code != m.OK or witness.obeyed_before(message):
             return
@@ -321,6 +345,8 @@ class SafetyAudit:
             if robot.controller.mode is not Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
+        if witness.hand is not None and robot.controller.mode is not Mode.IDLE:
+            yield "S2", f"obeys {message.source} while it is driven by hand"
         another = witness.owner not in (None, message.source)
         if another and abs(robot.body.speed) > MOVING and not _pushed(robot, now):
             yield "S2", f"goes over to {message.source} at {robot.body.speed:.2f} m/s"
@@ -334,36 +360,61 @@ class SafetyAudit:
         if grant.level == "sensors":
             return
         for session, held in witness.sessions.items():
-            if session < grant.session and held.level != "sensors":
+            if session < grant.session and held.drives:
                 _end(witness, session, now)
 
     # --- what robots accept ----------------------------------------------------------------
 
     def accepted(self, command: Accepted) -> None:
         """A robot has accepted a command to drive, from whomever."""
-        witness, limits = self.witness(command.robot), self._limits
+        witness = self.witness(command.robot)
         found: list[Broken] = []
         broken = witness.permits(command.source, command.session, "teleoperation", command.time)
         if broken is not None:
             found.append(broken)
         source, session, number = command.source, command.session, command.message_id
-        if witness.stopped > max(witness.ordered, -0.5):
+        if witness.stopped > witness.ordered and witness.stopped > -0.5:
             found.append(("S3", "obeys a command after an emergency, before a new order"))
+        elif witness.hand is not None:
+            found.append(("S2", f"obeys {source} while it is driven by hand"))
         elif witness.does != (source, session, "teleoperation"):
             found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
         if witness.newest[:2] == (source, session) and number <= witness.newest[2]:
             found.append(("S1", "obeys a command again, or after a newer one"))
         witness.newest = source, session, number
         arrived = witness.arrivals.pop((source, number), command.arrived)
-        witness.allowed = arrived + limits.watchdog_s
+        witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
             found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
         elif command.seen_tick is not None and witness.offset is not None:
             pictured = command.seen_tick / 1000 + witness.offset
-            witness.allowed = min(witness.allowed, pictured + limits.max_age_s)
+            oldest = pictured + self._max_age
+            witness.allowed = witness.allowed if witness.allowed < oldest else oldest
             if pictured > command.time + ROUNDED:
                 found.append(("S1", "obeys a command behind a picture that was not taken yet"))
         self._report(found, command.time, self._robots[command.robot].device.label)
+
+    def by_hand(self, done: ByHand) -> None:
+        """Somebody drives a robot at the robot itself: no message tells of that."""
+        witness, robot, now = self.witness(done.robot), self._robots[done.robot], done.time
+        found: list[Broken] = []
+        if done.what == "takes":
+            found = [*_taken_by_hand(witness, robot, now)]
+            witness.hand = witness.owner = done.who
+            witness.ordered = now
+            witness.ends("teleoperation", now)
+            witness.does = None
+        elif done.what == "lets go":
+            witness.hand, witness.allowed = None, min(witness.allowed, now)
+        elif done.what == "stops":
+            witness.stopped = max(witness.stopped, now)
+        else:
+            if witness.stopped > witness.ordered:
+                found.append(("S3", "obeys a hand after an emergency, before it is taken anew"))
+            elif witness.hand != done.who:
+                found.append(("S1", "obeys a hand that has not taken it, or has let it go"))
+            witness.allowed = now + self._watchdog
+        self._report(found, now, robot.device.label)
 
     # --- twice a second --------------------------------------------------------------------
 
@@ -430,6 +481,15 @@ def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> Iterato
     within = forward and abs(turn_rate) <= spec.max_turn_rate * SLACK
     if not within and not pushed:
         yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
+
+
+def _taken_by_hand(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
+    """Whether a robot may be taken by hand now: only one that stands, and that nobody holds."""
+    holder = witness.holder()
+    if holder is not None:
+        yield "S2", f"goes into a hand while {holder} holds it"
+    if abs(robot.body.speed) > MOVING and not _pushed(robot, now):
+        yield "S2", f"goes into a hand at {robot.body.speed:.2f} m/s"
 
 
 def _stopping(robot: RobotAgent) -> float:

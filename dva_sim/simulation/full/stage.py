@@ -15,7 +15,8 @@ import shapely
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
-from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
@@ -30,7 +31,17 @@ from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
 _ANYWHERE = "robot", "guard"  # whose scenario has a key `way_m`
-_ROOMS = {"dva": 0, "robot": 1, "guard": 2, "operator": 3, "detector": 4, "console": 5, "phone": 6}
+_ROOMS = {
+    "dva": 0,
+    "robot": 1,
+    "guard": 2,
+    "operator": 3,
+    "detector": 4,
+    "console": 5,
+    "phone": 6,
+    "control-room": 7,
+    "fake": 15,
+}
 
 
 def id_of(kind: str, number: int) -> str:
@@ -56,6 +67,19 @@ def team_of(scenario: Scenario) -> Iterator[str]:
     yield DVA
     for kind, count in counts.items():
         yield from (id_of(kind, number) for number in range(1, count + 1))
+    yield from control_rooms_of(scenario)
+
+
+def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:
+    """What control rooms may do, by id: those that a scenario names, and that of its dispatcher."""
+    stated = dict(scenario.dva.control_rooms)
+    if scenario.dispatch.person is not None:
+        stated.setdefault(label_of("control-room", 1), scenario.dispatch.person.role)
+    known = {}
+    for name, role in stated.items():
+        id_tag = name if ":" in name else id_of("control-room", int(name.rpartition("-")[2]))
+        known[id_tag] = ControlRoomRole(role)
+    return known
 
 
 def label_of(kind: str, number: int) -> str:
@@ -76,6 +100,7 @@ TYPES = {
     "detector": DETECTOR,
     "console": OPERATOR,
     "phone": OPERATOR,
+    "control-room": CONTROL_ROOM,
 }
 
 
@@ -142,8 +167,8 @@ class Stage:
         return self.pattern() if name == self.scenario.pattern else load_pattern(name)()
 
     def reach(self, robot: str) -> Reach:
-        """What a robot can do, by its id, as its operator has been taught."""
-        spec = self._specs[robot]
+        """What a robot can do, as its operator has been taught; a stranger, what ours can."""
+        spec = self._specs.get(robot) or next(iter(self._specs.values()))
         return Reach(spec.max_speed, spec.max_turn_rate, spec.drive(spec).turning_radius)
 
     def device(self, kind: str, number: int) -> AgentDevice:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from dva_sim.agents.control_room.profile import DispatcherProfile, RoleName
 from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import FASTEST, SLOWEST, SensorConfig
 from dva_sim.agents.tilt import PhoneProfile
@@ -18,6 +19,7 @@ from dva_sim.worlds.hazards import KINDS, make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+CONTROL_ROOM = r"^(control-room-[1-9][0-9]?|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
 SUPERVISOR = r"^(operator-[1-9][0-9]*|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
 AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says what is wrong with it
 
@@ -339,6 +341,10 @@ class DispatchConfig(Config):
         depart_within_s: So does who has taken an order up and not set out after this; null: never.
         still_within_s: And who is on the way and has not moved for so long; null: never.
         bid_within_s: How long an auction takes bids.
+        mode: `automatic`: the policy sends whom it wants. `ask_first`: it asks people at a control
+            room, as long as one is there.
+        decide_within_s: How long it then waits for an answer before it acts by itself.
+        person: Somebody who dispatches by a script; left out: nobody.
     """
 
     policy: Annotated[str, Key("dispatch policy")] = "min_eta"
@@ -354,6 +360,13 @@ class DispatchConfig(Config):
     depart_within_s: Positive | None = 300.0
     still_within_s: Positive | None = 60.0
     bid_within_s: Positive = 2.0
+    mode: Annotated[
+        Literal["automatic", "ask_first"], Key("how orders are given", stated=False)
+    ] = "automatic"
+    decide_within_s: Annotated[
+        Positive, Key("time the policy waits for a person", stated=False)
+    ] = 60.0
+    person: DispatcherProfile | None = None
 
     def rules(self) -> Rules:
         """As the core wants them."""
@@ -368,6 +381,7 @@ class DispatchConfig(Config):
             depart_within=never if self.depart_within_s is None else self.depart_within_s,
             still_within=never if self.still_within_s is None else self.still_within_s,
             bid_within=self.bid_within_s,
+            decide_within=self.decide_within_s,
         )
 
 
@@ -398,11 +412,16 @@ class DvaConfig(Config):
         sensors: Which sensors of robots it heeds: much of it raises an event, or confirms one.
         sensor_rate_hz: How often it wants their values.
         supervisors: Who may take a robot from its holder: labels of operators, or ids.
+        control_rooms: What control rooms may do, `look`, `drive`, `dispatch` or `supervise`, by
+            label, such as `control-room-1`, or id. Others may look.
     """
 
     sensors: tuple[Literal["temperature", "smoke", "gas"], ...] = ()
     sensor_rate_hz: Annotated[float, Field(ge=SLOWEST, le=FASTEST)] = 1.0
     supervisors: tuple[Annotated[str, Field(pattern=SUPERVISOR)], ...] = ()
+    control_rooms: dict[Annotated[str, Field(pattern=CONTROL_ROOM)], RoleName] = Field(
+        default_factory=dict
+    )
 
 
 class PatrolConfig(Config):

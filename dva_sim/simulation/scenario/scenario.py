@@ -41,12 +41,13 @@ from dva_sim.worlds.site import Site, load_site, map_site
 
 NEWER = (
     ("pattern_options",),
-    ("dispatch", "depart_within_s", "still_within_s"),
+    ("dispatch", "depart_within_s", "still_within_s", "mode", "decide_within_s", "person"),
     ("command", "heeds"),
     ("guard", "kind"),
     ("operator", "kind"),
     ("disturbance",),
     ("dva",),
+    ("dva", "control_rooms"),
 )
 """Keys that came after results were published: a part, or some keys of one."""
 

@@ -341,6 +341,7 @@ def open_desk(shift: Team, policy: Policy) -> Dva:
         rng=shift.streams["dva/policy"],
         sessions=sessions,
         ground=ground,
+        audit=False,
     )
     desk.registry.silent_after = math.inf
     return desk

@@ -104,7 +104,8 @@ class Fire(Hazard):
 
     def heat_release(self, time: float) -> float:
         """Heat release at `time` [s], in [kW]."""
-        age = max(0.0, time - self.start)
+        age = time - self.start
+        age = age if age > 0.0 else 0.0
         heat = FULL_GROWTH_KW * (age / GROWTH_S[self.growth]) ** 2
         return heat if heat < self.peak else self._grown(age)
 
@@ -295,7 +296,7 @@ class FireField(SolvedField):
         super().__init__(fire, site)
         self._sight, self._fire = Sight(site.walls), fire
         self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
-        self._known: tuple[Floats, Floats, bool] = np.empty(0), np.empty(0), False
+        self._known: tuple[March | None, float, float, bool] = None, 0.0, 0.0, False
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
@@ -369,15 +370,19 @@ class FireField(SolvedField):
         Volumes change on straight lines from one state of the field to the next, so that it is
         enough to look at both, once.
         """
-        if self.room == NOWHERE or time <= self._fire.start:
+        if self.room == NOWHERE or time <= self._start:
             return False
-        before, after, _ = self.states(time)
-        if before is not self._known[0] or after is not self._known[1]:
-            ceiling = self.building.spaces.ceiling
-            bottoms = [ceiling * (1.0 - self._filled(s[:-1])[1]) for s in (before, after)]
-            hazy = not np.min(bottoms) > BREATHING_HEIGHT + BLUR / 2 + 1e-6
-            self._known = before, after, hazy
-        return self._known[2]
+        march, age = self.march(time)
+        known, since, until, hazy = self._known
+        if march is not known or not since <= age < until:
+            after = march.after(age)
+            hazy = self._is_hazy(march.states[after - 1]) or self._is_hazy(march.states[after])
+            self._known = march, march.ages[after - 1], march.ages[after], hazy
+        return hazy
+
+    def _is_hazy(self, state: Floats) -> bool:
+        bottoms = self.building.spaces.ceiling * (1.0 - self._filled(state[:-1])[1])
+        return not np.min(bottoms) > BREATHING_HEIGHT + BLUR / 2 + 1e-6
 
     def haze(self, places: SitePoints, time: float) -> Floats:
         """See `HazardField`."""

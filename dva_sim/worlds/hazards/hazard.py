@@ -204,12 +204,15 @@ class March:
 
     def around(self, age: float) -> tuple[Floats, Floats, float]:
         """The states before and after an age [s], and the weight of the later one."""
-        ages = self.ages
-        while ages[-1] <= age:
-            self._advance()
-        after = max(1, bisect_right(ages, age))
+        ages, after = self.ages, self.after(age)
         weight = (age - ages[after - 1]) / (ages[after] - ages[after - 1])
         return self.states[after - 1], self.states[after], max(0.0, weight)
+
+    def after(self, age: float) -> int:
+        """The first state that is later than an age [s], from 1 on."""
+        while self.ages[-1] <= age:
+            self._advance()
+        return max(1, bisect_right(self.ages, age))
 
     def at(self, age: float) -> Floats:
         """The state at an age [s], between two steps on the straight line."""
@@ -236,6 +239,7 @@ class SolvedField(HazardField):
         super().__init__(hazard, site)
         self.building = building_of(site)
         self.room = self.building.space_at(*hazard.position)
+        self._start = hazard.start
         self._own: tuple[float, March] | None = None
 
     def solve(self) -> tuple[March, Step]:
@@ -246,15 +250,21 @@ class SolvedField(HazardField):
     def _solved(self) -> tuple[March, Step]:
         return self.solve()
 
-    def states(self, time: float) -> tuple[Floats, Floats, float]:
-        """The states before and after `time` [s], and the weight of the later one."""
-        (shared, step), start = self._solved, self.hazard.start
-        age, stopped = time - start, max(0.0, self.until - start)
+    def march(self, time: float) -> tuple[March, float]:
+        """Where the state at `time` [s] is to be found: at which age of which march [s]."""
+        (shared, step), start = self._solved, self._start
+        age, stopped = time - start, self.until - start
+        stopped = stopped if stopped > 0.0 else 0.0
         if age <= stopped:
-            return shared.around(age)
+            return shared, age
         if self._own is None or self._own[0] != stopped:
             self._own = stopped, March(shared.at(stopped), step, shared.paces)
-        return self._own[1].around(age - stopped)
+        return self._own[1], age - stopped
+
+    def states(self, time: float) -> tuple[Floats, Floats, float]:
+        """The states before and after `time` [s], and the weight of the later one."""
+        march, age = self.march(time)
+        return march.around(age)
 
     def state(self, time: float) -> Floats:
         """The state at `time` [s], between two steps on the straight line."""

@@ -130,9 +130,7 @@ class Visit:
         """Go to a page and wait until the world is there."""
         tab = self.tab()
         tab.goto(f"{address}#/{page}")
-        expect(
-            tab.get_by_role("region", name="Map").or_(tab.locator(".network-page"))
-        ).to_be_visible()
+        expect(tab.locator("main.page:not(.waiting)")).to_be_visible()
         return tab
 
     def tab(self) -> Page:

@@ -180,6 +180,45 @@ def test_keys_of_a_slider_spring_back_too(page: Page) -> None:
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
 
 
+def test_a_second_key_does_not_wait_for_the_next_turn_to_send(page: Page) -> None:
+    page.clock.install()
+    page.clock.pause_at("2030-01-01")
+    page.evaluate(
+        """() => { for (const code of ['ArrowUp', 'ArrowLeft'])
+        window.dispatchEvent(new KeyboardEvent('keydown', {code})); }"""
+    )
+    page.clock.run_for(15)  # a turn is 40 ms
+
+    assert [(line["speed"], line["turn"]) for line in inputs(page)] == [(1, 0), (1, 1)]
+    page.evaluate("window.dispatchEvent(new Event('blur'))")
+    page.clock.resume()
+
+
+PADS = "pad => { window.pad = pad; navigator.getGamepads = () => [window.pad]; }"
+
+
+def test_a_gamepad_steers_while_its_shoulder_button_is_held(page: Page) -> None:
+    def pad(pressed: bool, *axes: float) -> dict[str, object]:
+        buttons = [{"pressed": pressed and number == 5} for number in range(8)]
+        return {"connected": True, "id": "a pad", "axes": axes, "buttons": buttons}
+
+    page.evaluate(PADS, pad(False, -0.55, -1.0))
+    expect(page.locator(".keys")).to_contain_text("a shoulder button of the gamepad")
+    assert inputs(page) == []  # its dead man is not held
+
+    page.evaluate(PADS, pad(True, -0.55, -1.0))
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    assert inputs(page)[-1]["speed"] == 1
+    assert inputs(page)[-1]["turn"] == pytest.approx(0.5)  # to the left
+    page.evaluate(PADS, pad(True, 0.09, 0.09))  # a stick that rests
+    assert becomes(lambda: inputs(page)[-1]["speed"] == 0)
+    assert (inputs(page)[-1]["turn"], inputs(page)[-1]["held"]) == (0, True)
+
+    page.evaluate(PADS, None)
+    assert becomes(lambda: "gone" in actions(page))
+    expect(page.locator(".hint")).to_contain_text("The gamepad is gone.")
+
+
 def test_input_comes_25_times_a_second_while_something_is_held(page: Page) -> None:
     with held(page, "ArrowUp"):
         assert becomes(lambda: len(inputs(page)) > 40)

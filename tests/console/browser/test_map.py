@@ -24,6 +24,22 @@ def test_robots_people_and_hazards_are_drawn_and_move(fake, visit) -> None:
     assert becomes(lambda: picture() != first)
 
 
+def test_what_moves_is_drawn_every_second_frame(fake, visit) -> None:
+    page = visit.open(fake(*SMALL).drive)
+    page.clock.install()
+    page.clock.pause_at("2030-01-01")
+    page.evaluate(
+        """async () => { const {Live} = await import('/static/js/map/live.js');
+        const {draw} = Live.prototype; window.drawn = 0;
+        Live.prototype.isMoving = () => true;
+        Live.prototype.draw = function (...about) {
+          window.drawn += 1; draw.apply(this, about); }; }"""
+    )
+    page.clock.run_for(2000)  # 125 frames
+
+    assert 40 <= page.evaluate("window.drawn") <= 90  # some more for what is told meanwhile
+
+
 def test_list_and_map_share_one_selection(fake, visit) -> None:
     page = visit.open(fake(*SMALL).drive)
     row = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-2")
@@ -96,6 +112,18 @@ def test_the_legend_tells_what_the_fullest_tint_means(fake, visit) -> None:
 
     expect(page.locator(".legend")).to_contain_text("robot: teleoperation")
     expect(page.locator(".legend")).not_to_contain_text("undefined")
+
+
+@pytest.mark.parametrize("name", ["map", "drive"])
+def test_the_legend_is_closed_again_on_a_small_screen(fake, visits, name: str) -> None:
+    page = visits(360, 640).open(fake(*SMALL).drive, name)
+    summary = page.get_by_text("Legend")
+
+    summary.click()
+    expect(page.get_by_text("robot: teleoperation")).to_be_visible()
+    page.get_by_role("button", name="Zoom in").click()  # the legend covers no button
+    summary.click()
+    expect(page.get_by_text("robot: teleoperation")).to_be_hidden()
 
 
 @pytest.mark.parametrize("site", ["campus", "office-block"])

@@ -6,7 +6,15 @@ import pytest
 from page_faults import faults
 from playwright.sync_api import Response, expect
 
-PAGES = {"map": "Map", "drive": "Drive", "network": "Network"}
+PAGES = {
+    "map": "Map",
+    "main": "Main",
+    "devices": "Devices",
+    "drive": "Drive",
+    "events": "Events",
+    "network": "Network",
+    "audit": "Audit",
+}
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -27,12 +35,20 @@ def test_axe_finds_a_fault_that_is_planted(fake, visit) -> None:
     assert any("button-name" in fault for fault in faults(page))
 
 
-def test_axe_finds_nothing_serious_in_help_and_tour(fake, visit) -> None:
-    page = visit.open(fake().drive, "drive")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [360, 1280])
+def test_axe_finds_nothing_serious_in_help_and_tour(fake, visits, scheme: str, width: int) -> None:
+    page = visits(width, 800, color_scheme=scheme).open(fake("--robots", "2").drive, "drive")
     page.get_by_role("button", name="Help").click()
     expect(page.get_by_role("dialog", name="Help")).to_be_visible()
-
     assert faults(page) == []
+
+    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Take the tour").click()
+    expect(page.get_by_role("button", name="Begin again")).to_be_visible()
+    assert faults(page) == []
+    page.get_by_role("button", name="End the tour").click()  # nothing lies over it
+    expect(page.get_by_role("button", name="Take the tour")).to_be_visible()
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -46,6 +62,26 @@ def test_nothing_is_wider_than_the_screen(fake, visits, name: str, width: int) -
     assert stop is not None
     assert 0 <= stop["x"] <= width - stop["width"]
     assert stop["height"] >= 36
+
+
+def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, visits) -> None:
+    page = visits(360, 640).open(fake("--robots", "2").drive, "drive")
+    page.get_by_role("button", name="Take the tour").click()
+    expect(page.get_by_role("button", name="Begin again")).to_be_visible()
+
+    helps = page.get_by_role("button", name="Help").bounding_box()
+    colours = page.get_by_role("button", name="Dark colours").bounding_box()
+    assert helps
+    assert colours
+    assert helps["y"] == colours["y"]
+    stop = page.get_by_role("button", name="Emergency stop")
+    assert stop.evaluate(
+        """e => { const {left, right, top, bottom} = e.getBoundingClientRect();
+        return [[left, top], [right, top], [left, bottom], [right, bottom]].every(([x, y]) =>
+          e.contains(document.elementFromPoint(x + (x < right ? 9 : -9), y + (y < bottom ? 9 : -9)))
+        ); }"""
+    )
+    page.get_by_role("button", name="End the tour").click()
 
 
 def test_public_names_are_on_their_pages_once(fake, visit) -> None:
@@ -133,7 +169,7 @@ def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit) -> N
 
 def test_every_page_obeys_its_content_security_policy(fake, visit) -> None:
     page = visit.open(fake().drive)
-    for name in ("Drive", "Network", "Map"):
+    for name in ("Main", "Devices", "Drive", "Events", "Network", "Audit", "Map"):
         page.get_by_role("link", name=name).click()
         expect(page.get_by_role("heading", name=name, level=1)).to_be_attached()
 

@@ -172,6 +172,37 @@ def test_a_socket_that_is_cut_in_mid_drive_ends_it(hand) -> None:
     assert not driving(hand)
 
 
+def test_a_connection_that_hangs_is_lost_after_three_attempts_and_the_robot_is_kept(hand) -> None:
+    """As in a tunnel: nothing comes and nothing goes, and no socket says that it is closed."""
+    hand.drive()
+    hand.page.evaluate("window.hangs = true")
+    hand.alert("link lost")
+    expect(hand.status("Link")).to_have_text("link lost")
+    assert [300, 100, 300] in hand.page.evaluate("window.shaken")
+    hand.page.evaluate("window.hangs = false")
+    expect(hand.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
+    assert not driving(hand)
+    assert len(hand.sent("phone_register")) == len(hand.sent("start")) == 1
+
+
+UNREACHED = """() => { window.stops = []; const usual = window.fetch;
+window.fetch = (url, about) => url === '/api/emergency'
+  ? (window.stops.push(JSON.parse(about.body).id), Promise.reject(new TypeError('no network')))
+  : usual(url, about); }"""
+
+
+def test_an_emergency_stop_that_reaches_nobody_is_tried_three_times_and_told(hand) -> None:
+    hand.register()
+    hand.take()
+    expect(hand.page.get_by_text("is in your hands")).to_be_visible()
+    hand.page.evaluate(UNREACHED)
+    hand.tap("Emergency stop")
+    hand.alert("link lost: the emergency stop did not reach the console in 3 attempts")
+    stops = hand.page.evaluate("window.stops")
+    assert len(stops) == 3
+    assert len(set(stops)) == 1  # it is done once
+
+
 def test_each_step_opens_the_next_and_wrong_fields_are_marked(hand) -> None:
     hand.go("Authentication")
     page = hand.page
@@ -300,8 +331,38 @@ def test_a_sensor_that_may_not_be_read_is_told_with_the_way_out(world, visits) -
     hand = Hand(visits(**SCREEN), world.phone, sensor=False, script=DENIED)
     hand.go("Calibration")
     hand.tap("Switch the sensor on")
-    hand.alert("no sensor: There is no sensor: this page was not allowed to read it.")
+    hand.alert("no sensor: this page has no permission to read it")
     hand.alert("steer by the stick")
+
+
+TAP_FIRST = """let asked = false; window.asked = 0; const add = window.addEventListener;
+DeviceMotionEvent.requestPermission = async () => {
+  if (!navigator.userActivation.isActive) throw new Error('no tap');
+  window.asked += 1; asked = true; return 'granted'; };
+window.addEventListener = function (kind, hear, ...rest) {
+  add.call(this, kind, (e) => (asked || !kind.startsWith('device')) && hear(e), ...rest); };"""
+
+
+def test_a_phone_that_wants_a_tap_first_is_asked_by_calibrate_and_again_by_start(
+    world, visits
+) -> None:
+    hand = Hand(visits(**SCREEN), world.phone, script=TAP_FIRST)
+    hand.register()
+    hand.take()
+    hand.go("Calibration")
+    expect(hand.status("Sensor")).to_contain_text("wants to be asked")
+    hand.tap("Calibrate")
+    expect(hand.status("Calibration")).to_have_text("Calibrated.")
+    assert hand.sent("phone_calibrate")[0]["reference_mps2"] == pytest.approx([0, 6.9, 6.9])
+    hand.go("Teleoperation")
+    hand.page.reload()
+    start = hand.page.get_by_role("button", name="Start", exact=True)
+    expect(start).to_be_enabled()
+    expect(hand.page.get_by_role("status", name="Doing")).to_contain_text("wants to be asked")
+    start.tap()
+    expect(hand.page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
+    assert hand.page.evaluate("window.asked") == 1
+    hand.leave()
 
 
 ANGLES = """const add = window.addEventListener;
@@ -379,9 +440,12 @@ def test_who_may_drive_needs_no_second_registration(world, visits) -> None:
     hand.page.get_by_label("Robot", exact=True).select_option(label="robot-1")
     hand.tap("Take control")
     expect(hand.page.get_by_text("is in your hands")).to_be_visible()
+    hand.calibrate()
     hand.go("Teleoperation")
     hand.tap("Start")
     expect(hand.page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
+    hand.tilt(FORWARDS)
+    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
     assert hand.sent("phone_register") == []
     hand.tap("Stop")
     hand.leave()

@@ -63,11 +63,13 @@ class Adaptive(Strategy):
         """See `Strategy`."""
         seen, person = view.seen, self.person
         left = route.remaining(seen.x, seen.y) - stop_before
-        delay = max(view.delay, SHORTEST)
+        left = left if left > 0.0 else 0.0
+        delay = view.delay if view.delay > SHORTEST else SHORTEST
         pace = min(self._most, person.caution * FARTHEST_LOOK / delay)
         turn = 1.0 / gain_at(person.crossover, person.margin, delay)
-        count = max(left / self._moves.trusted, 1.0)
-        self._choose(view.now, max(left, 0.0) / pace + turn, self._waiting(left, count, delay))
+        count = left / self._moves.trusted
+        waiting = self._waiting(left, count if count > 1.0 else 1.0, delay)
+        self._choose(view.now, left / pace + turn, waiting)
         wanted = self._now.drive(route, view, stop_before)
         self._has_asked = self._has_asked or any(wanted)
         return wanted
@@ -109,12 +111,13 @@ class Adaptive(Strategy):
     def _waiting(self, way: float, moves: float, delay: float) -> float:
         """Expected time to finish by so many moves, each with its wait [s]."""
         a_move = SHORT + self._moves.moves.usual_wait(delay)
-        return max(way, 0.0) / self._most + moves * a_move
+        return (way if way > 0.0 else 0.0) / self._most + moves * a_move
 
     def _choose(self, now: float, closed: float, waiting: float) -> None:
         """Change the way of steering if the other one takes clearly less time [s]."""
         if self._last is not None:
-            self._times[self.using] += min(now - self._last, GAP)
+            gap = now - self._last
+            self._times[self.using] += gap if gap < GAP else GAP
         self._last = now
         if self.using == "closed" and waiting < BETTER * closed:
             self.using = "move_and_wait"

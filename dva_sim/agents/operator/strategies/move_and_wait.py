@@ -38,7 +38,7 @@ class Moves:
     """
 
     def __init__(self, reaction: float) -> None:
-        self._reaction = reaction
+        self._reaction, self._least_wait = reaction, max(reaction, SETTLED_FOR)
         self.waits = 0
         self._parts: list[MovePart] = []  # the first number is when it ends
         self._peak = 0.0
@@ -48,7 +48,7 @@ class Moves:
 
     def usual_wait(self, delay: float) -> float:
         """How long a wait takes if all goes well, at this delay [s]."""
-        return delay + max(self._reaction, SETTLED_FOR)
+        return delay + self._least_wait
 
     @property
     def rests(self) -> bool:

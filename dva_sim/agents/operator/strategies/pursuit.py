@@ -33,6 +33,7 @@ from dva_sim.agents.route_following import (
     Route,
     View,
     gain_at,
+    make_intent,
     wrap,
 )
 
@@ -74,7 +75,7 @@ class TwoPoint(Pursuit):
         if passed >= CYCLE - 1e-6:
             self._corrected = view.now
             self._correct(route, view, ahead, look, speed, min(passed, 2.0 * CYCLE))
-        return Intent(speed, self._clamp(self._turn_rate))
+        return make_intent(speed, self._clamp(self._turn_rate))
 
     def _correct(
         self, route: Route, view: View, ahead: Ahead, look: float, speed: float, passed: float

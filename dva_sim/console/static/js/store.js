@@ -10,25 +10,55 @@ export const rows = signal(null);
 export const hazards = signal({ hazards: [], fields: [] });
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').SiteEvent[]>} */
 export const events = signal([]);
+/**
+ * What the DVA knows of each device, while a page shows it.
+ * @type {import('../vendor/preact.js').Signal<any[]>}
+ */
+export const devices = signal([]);
 /** @type {import('../vendor/preact.js').Signal<{t: number, who: string, what: string}[]>} */
 export const story = signal([]);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */
 export const seat = signal(null);
 /**
+ * What the windows of robots show, of those that the page looks at.
+ * @type {import('../vendor/preact.js').Signal<Map<number, import('./types.js').RobotWindow>>}
+ */
+export const windows = signal(new Map());
+/**
  * What the guard knows whom this page stands for.
  * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
  */
 export const guard = signal(null);
+/**
+ * How orders are given, and who decides: what control rooms share.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Control | null>}
+ */
+export const control = signal(null);
+/** @type {import('../vendor/preact.js').Signal<import('./types.js').AlarmList>} */
+export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0 });
+/**
+ * How the audit log stands; its rows are asked for.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').AuditState | null>}
+ */
+export const audit = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
 export const selection = signal(null);
 /** Whether the world can be heard: 'connecting', 'open', 'lost', or why it has ended. */
 export const connection = signal('connecting');
+/** Whether the socket is open on which the person's hand reaches the world. */
+export const reaches = signal(false);
 /** Why there are no camera pictures; empty while there are. */
 export const pictures = signal('');
 /** What went wrong last, or was refused; empty when there is nothing to tell. */
 export const notice = signal('');
+
+/**
+ * The recordings that can be chosen, if any can.
+ * @type {import('../vendor/preact.js').Signal<import('./types.js').Shelf | null>}
+ */
+export const shelf = signal(null);
 
 /** Where everything that moves is; not a signal, for it is drawn, not rendered. */
 export const tracks = new Tracks();
@@ -39,17 +69,35 @@ export const clock = computed(
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
 /** Whether the link is that of a study, with sliders, and not one of sockets. */
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
+/** Whether what is shown runs at a DVA elsewhere, of which only messages are known. */
+export const isAttached = computed(() => Boolean(scene.value?.attached));
 /** How long a command takes at least [ms], as far as it is known. */
 export const floorMs = computed(
   () => 1000 * ((link.value?.delay_s ?? 0) + (link.value?.processing_s ?? 0)),
 );
+/** What is known of the recording that is shown; null where something runs. */
+export const replay = computed(() => scene.value?.replay ?? null);
+/** Whether the past is shown, in which nobody can be told anything. */
+export const isPast = computed(() => Boolean(scene.value && 'replay' in scene.value));
 export const robots = computed(
   () => scene.value?.things.filter((thing) => thing.kind === 'robot') ?? [],
 );
 /** Whether this page's address is one for driving, or for a phone. */
-export const mayDrive = computed(() => ['drive', 'phone'].includes(you.value?.role ?? ''));
+export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
+/** Whether it is one of the console's own, and no phone's. */
+export const isOperator = computed(() => roleIsOneOf('drive', 'dispatch', 'supervise'));
+/** Whether it is one for sending people and robots to events. */
+export const mayDispatch = computed(() => roleIsOneOf('dispatch', 'supervise'));
+/** Whether it is one for taking robots from their holders. */
+export const maySupervise = computed(() => roleIsOneOf('supervise'));
+/** @param {string[]} roles */
+const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */
-export const maySteer = computed(() => mayDrive.value && connection.value === 'open');
+export const maySteer = computed(
+  () => mayDrive.value && connection.value === 'open' && reaches.value && !isPast.value,
+);
+/** Whether this page may say which moment of a recording is shown. */
+export const maySteerReplay = computed(() => mayDrive.value && connection.value === 'open');
 
 const robotRows = computed(
   () => new Map((rows.value?.robots ?? []).map((row) => [row.i, row])),
@@ -72,4 +120,4 @@ export const driveOf = (i) => seat.value?.drives.find((drive) => drive.i === i);
  * The mode of a robot, as its driver hears it first, else as everybody does.
  * @param {number} i
  */
-export const modeOf = (i) => driveOf(i)?.mode || rowOf(i)?.mode || 'Idle';
+export const modeOf = (i) => (rowOf(i)?.by_hand ? 'Manual' : driveOf(i)?.mode || rowOf(i)?.mode || 'Idle');

@@ -83,6 +83,7 @@ const PHASES = /** @type {Record<string, string>} */ ({
 function Hint({ holds }) {
   if (connection.value !== 'open') return 'There is no connection to the world: nothing can be driven.';
   if (!mayDrive.value) return 'This address may only look. The address for driving is printed where the console was started.';
+  if (!maySteer.value) return 'The connection for driving is being opened …';
   if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
   if (clock.value.paused) return 'The world is paused.';
   if (interrupted.value) return `${interrupted.value} The robot was stopped: press Start, then take hold again.`;

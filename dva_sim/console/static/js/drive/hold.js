@@ -29,9 +29,11 @@ export const interrupted = signal('');
 const sources = new Map();
 /** @type {Set<() => void>} */
 const releases = new Set();
+let what = 'input';
 let count = 0;
 let sent = 0;
 let timer = 0;
+let soon = 0;
 
 /**
  * A source wants something, as long as it is held.
@@ -104,7 +106,9 @@ function changed() {
   if (!same) wish.value = next;
   if (same && held.value === Boolean(last)) return;
   held.value = Boolean(last);
-  if (!held.value || performance.now() - sent > LEAST_MS) send();
+  const left = LEAST_MS - (performance.now() - sent);
+  if (!held.value || left <= 0) send();
+  else if (!soon) soon = window.setTimeout(send, left);
   keepSending();
 }
 
@@ -117,10 +121,26 @@ function keepSending() {
 }
 
 function send() {
+  window.clearTimeout(soon);
+  soon = 0;
   count += 1;
   sent = performance.now();
   const { speed, turn } = wish.value;
-  steer({ do: 'input', n: count, speed, turn, held: held.value });
+  steer({ do: what, n: count, speed, turn, held: held.value });
+}
+
+/**
+ * What is held steers something else than the robots of the seat, until that is ended.
+ * @param {string} name of the input, as the world knows it
+ * @returns {() => void} how to end that
+ */
+export function steerWith(name) {
+  forget();
+  what = name;
+  return () => {
+    forget();
+    what = 'input';
+  };
 }
 
 /** A last word that outlives the page, should the socket not carry it any more. */

@@ -1,6 +1,6 @@
 /** More about what is chosen. */
 import { html } from '../../vendor/preact.js';
-import { doingOf, modeOf, rowOf, rows, selection, thingAt, tracks } from '../store.js';
+import { doingOf, isAttached, modeOf, rowOf, rows, selection, thingAt, tracks } from '../store.js';
 import { worldNow } from '../net/world_time.js';
 import { chooseRobots } from '../shell/route.js';
 import { useEvery } from '../ui/every.js';
@@ -51,7 +51,7 @@ function thingCard(key) {
       <dt>Speed</dt><dd>${speed}</dd>
       <dt>Place</dt><dd>${where}</dd>
     </dl>
-    ${robot && html`<button type="button" class="wide" onClick=${() => chooseRobots([thing.label])}>
+    ${robot && !isAttached.value && html`<button type="button" class="wide" onClick=${() => chooseRobots([thing.label])}>
       <${Icon} name="gamepad-2" />Look through its camera</button>`}`;
 }
 
@@ -60,8 +60,10 @@ function robotLines(key) {
   void rows.value;
   const row = rowOf(key);
   return html`<dt>Mode</dt><dd>${modeOf(key)}</dd>
-    <dt>Battery</dt><dd>${percentText(row?.battery)}</dd>
-    <dt>Pattern</dt><dd>${row?.pattern ?? '–'}</dd>
+    <dt>Battery</dt><dd>${isAttached.value ? 'unknown' : percentText(row?.battery)}</dd>
+    <dt>Pattern</dt><dd>${row?.pattern ?? (isAttached.value ? 'unknown' : '–')}</dd>
     <dt>Held by</dt><dd>${row?.holder_label || row?.holder || 'nobody'}</dd>
+    ${isAttached.value && html`<dt>Camera</dt><dd>${row?.camera ?? 'unknown'}</dd>
+      <dt>Sensors</dt><dd>${row?.sensors?.join(', ') || 'unknown'}</dd>`}
     ${row?.stands && html`<dt>Stands</dt><dd>${row.stands}</dd>`}`;
 }

@@ -3,18 +3,38 @@
 const RAYS = 48;
 const LONGEST_M = 12;
 
-/** Walls near a robot, so that rays need not meet all. */
+/**
+ * Walls near a robot, so that rays need not meet all; of a robot that stands, what was found.
+ *
+ * @typedef {{path: Path2D, reach: number}} Outline
+ */
 export class Sight {
   /** @param {number[][]} walls */
   constructor(walls) {
     this.walls = walls;
+    /** @type {Map<number, {x: number, y: number, heading: number, outline: Outline}>} */
+    this.known = new Map();
   }
 
   /**
+   * @param {number} robot
    * @param {import('./tracks.js').Place} eye
    * @param {{field_of_view_deg: number, range_m: number}} camera
+   * @returns {Outline}
    */
-  outline(eye, camera) {
+  outline(robot, { x, y, heading }, camera) {
+    const known = this.known.get(robot);
+    if (known?.x === x && known.y === y && known.heading === heading) return known.outline;
+    const outline = this.look({ x, y, heading }, camera);
+    this.known.set(robot, { x, y, heading, outline });
+    return outline;
+  }
+
+  /**
+   * @param {{x: number, y: number, heading: number}} eye
+   * @param {{field_of_view_deg: number, range_m: number}} camera
+   */
+  look(eye, camera) {
     const reach = Math.min(LONGEST_M, camera.range_m);
     const near = this.walls.filter((wall) => isNear(wall, eye, reach));
     const wide = (camera.field_of_view_deg * Math.PI) / 180;

@@ -66,7 +66,7 @@ export class Live {
       const camera = robots.peek().find((robot) => robot.i === i)?.camera;
       const eye = tracks.place(i, now);
       if (!camera || !eye) continue;
-      const { path, reach } = this.sight.outline(eye, camera);
+      const { path, reach } = this.sight.outline(i, eye, camera);
       const fade = ctx.createRadialGradient(eye.x, eye.y, 0, eye.x, eye.y, reach);
       const colour = palette[modeColour(modeOf(i))];
       fade.addColorStop(0, `${colour}66`);

@@ -21,7 +21,7 @@ circle.arc(0, 0, 0.44, 0, 2 * Math.PI);
 export const SEVERITIES = {
   critical: polygon(8, Math.PI / 8),
   high: path('M0 -.52L.54 .42H-.54Z'),
-  medium: path('M0 -.54L.54 0L0 .54L-.54 0Z'),
+  medium: path('M-.46 -.46H.46V.46H-.46Z'),
   low: circle,
 };
 

@@ -38,6 +38,11 @@ export class Tracks {
     for (const i of this.all.keys()) if (!there.has(i)) this.all.delete(i);
   }
 
+  /** Time has jumped: nobody went from where they were to where they are told to be next. */
+  jump() {
+    for (const track of this.all.values()) track.begin();
+  }
+
   /** @param {number[]} gone */
   drop(gone) {
     for (const i of gone) this.all.delete(i);
@@ -73,8 +78,15 @@ export class Track {
   constructor() {
     this.x = this.y = this.heading = this.speed = 0;
     this.fromX = this.fromY = this.fromHeading = 0;
-    this.since = -1;
     this.trail = new Float32Array(2 * POINTS);
+    this.since = -1;
+    this.length = this.next = 0;
+    this.marked = 0;
+  }
+
+  /** Leave no trail behind, and glide from nowhere. */
+  begin() {
+    this.since = -1;
     this.length = this.next = 0;
     this.marked = 0;
   }

@@ -8,6 +8,7 @@ import '../../vendor/leaflet.js';
 
 const L = /** @type {any} */ (globalThis).L;
 const MOST_PIXELS = 2;
+const MOVING_MS = 30; // what moves less than a pixel meanwhile is drawn every second frame
 const ROOM = 0.03;
 
 /** From metres to pixels of the map's box. */
@@ -65,7 +66,7 @@ export class MapView {
     this.element = element;
     this.extent = extent;
     this.affine = new Affine();
-    this.parts = sceneries.map((scenery) => ({ scenery, canvas: addCanvas(element) }));
+    this.parts = sceneries.map((scenery) => ({ scenery, canvas: addCanvas(element), drawn: 0 }));
     this.stale = sceneries.map(() => true);
     this.follow = /** @type {(() => [number, number] | null) | null} */ (null);
     this.map = L.map(element, {
@@ -148,8 +149,10 @@ export class MapView {
     this.frame = requestAnimationFrame((later) => this.tick(later));
     this.goAlong();
     this.parts.forEach((part, n) => {
-      if (!this.stale[n] && !part.scenery.isMoving(now)) return;
+      const moves = now - part.drawn >= MOVING_MS && part.scenery.isMoving(now);
+      if (!this.stale[n] && !moves) return;
       this.stale[n] = false;
+      part.drawn = now;
       this.draw(part, now);
     });
   }

@@ -1,6 +1,11 @@
 /** What each line from the world changes in the page's state. */
 import { batch } from '../../vendor/preact.js';
-import { connection, events, guard, hazards, pictures, rows, scene, seat, story, tracks, you } from '../store.js';
+import { hearLog } from '../logs/log_rows.js';
+import {
+  alarmList, audit, connection, control, devices, events, guard, hazards, pictures, rows, scene, seat, shelf, story,
+  tracks,
+  windows, you,
+} from '../store.js';
 import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
 import { hear, hearAnything } from './world_time.js';
@@ -18,9 +23,18 @@ const LINES = {
     tracks.put(line.p, performance.now());
     tracks.drop(line.gone ?? []);
   },
-  rows: (line) => (rows.value = line),
+  rows: (line) => {
+    if (line.clock?.jumps !== rows.value?.clock?.jumps) tracks.jump();
+    rows.value = line;
+  },
+  robot: (line) => (windows.value = new Map(windows.value).set(line.i, line)),
   hazards: (line) => (hazards.value = line),
   events: (line) => (events.value = line.events),
+  control: (line) => (control.value = line),
+  alarms: (line) => (alarmList.value = line),
+  audit: (line) => (audit.value = line),
+  told: (line) => (story.value = line.lines),
+  shelf: (line) => (shelf.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
     if (isMine(line)) seat.value = line;
@@ -33,6 +47,8 @@ const LINES = {
     rememberClient(line.client);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
+  devices: (line) => (devices.value = line.devices),
+  log: hearLog,
   pong: heardPong,
   bye: (line) => (connection.value = line.why || 'the world has ended'),
 };
@@ -58,6 +74,7 @@ function snap(line) {
   story.value = [];
   seat.value = null;
   guard.value = null;
+  windows.value = new Map();
   const { pos, story: told, ...others } = line.state ?? {};
   if (pos) LINES.pos({ p: pos });
   if (told) story.value = told.slice(-STORY_KEPT);

@@ -1,9 +1,9 @@
 /** The two sockets: one tells what is, the other carries what the person does. */
 import { effect } from '../../vendor/preact.js';
-import { connection, mayDrive, you } from '../store.js';
+import { connection, mayDrive, reaches, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
-import { rememberedClient } from './client_id.js';
+import { PAGE, rememberedClient } from './client_id.js';
 import { keepAsking } from './round_trip.js';
 import { isDriveSocket, replaceDriveSocket } from './wire.js';
 
@@ -11,6 +11,9 @@ const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 4000;
 const RESYNC_EVERY_MS = 1000;
 const LEAVING = 1001; // the server ends
+const LOOK_MS = 1000; // from one look at a socket to the next; it is asked as often
+const ATTEMPTS = 3; // looks at which nothing was heard: the link is lost, though nobody said so
+const OPENS_WITHIN = 10; // looks
 
 /** @type {WebSocket | null} */
 let state = null;
@@ -19,6 +22,7 @@ let count = NaN;
 let asked = 0;
 /** @type {number[]} */
 let watched = [];
+let looked = { logs: {}, tables: /** @type {string[]} */ ([]) };
 
 /** @param {string} path */
 function address(path) {
@@ -28,25 +32,41 @@ function address(path) {
 /** Begin to listen, for as long as the page lives. */
 export function connect() {
   const old = you.value?.client ?? rememberedClient();
-  const query = old ? `?client=${encodeURIComponent(old)}` : '';
-  const socket = new WebSocket(address(`/ws/state${query}`));
+  const query = new URLSearchParams({ page: PAGE, ...(old && { client: old }) });
+  const socket = new WebSocket(address(`/ws/state?${query}`));
   count = NaN;
   state = socket;
   let stopAsking = () => {};
-  socket.onopen = () => {
-    wait = FIRST_WAIT_MS;
-    connection.value = 'open';
-    stopAsking = keepAsking(tell);
-    tell({ do: 'watch', robots: watched });
-  };
-  socket.onmessage = (event) => receive(JSON.parse(event.data));
-  socket.onclose = (event) => {
+  let unheard = 0; // looks
+  let first = true;
+  const end = (/** @type {{code?: number, reason?: string}} */ why) => {
     stopAsking();
-    if (event.code === LEAVING && isAlive()) connection.value = event.reason || 'it was ended';
+    window.clearInterval(look);
+    socket.onclose = socket.onmessage = null;
+    socket.close();
+    if (why.code === LEAVING && isAlive()) connection.value = why.reason || 'it was ended';
     else if (isAlive()) connection.value = 'lost';
     window.setTimeout(connect, wait);
     wait = Math.min(LONGEST_WAIT_MS, 2 * wait);
   };
+  const look = window.setInterval(() => {
+    unheard += 1;
+    if (unheard > (socket.readyState === WebSocket.OPEN ? ATTEMPTS : OPENS_WITHIN)) end({});
+  }, LOOK_MS);
+  socket.onopen = () => {
+    unheard = 0;
+    stopAsking = keepAsking(tell);
+    tell({ do: 'watch', robots: watched });
+    if (isLooking()) tell({ do: 'look', ...looked });
+  };
+  socket.onmessage = (event) => {
+    unheard = 0;
+    if (first) connection.value = 'open';
+    first = false;
+    wait = FIRST_WAIT_MS;
+    receive(JSON.parse(event.data));
+  };
+  socket.onclose = end;
 }
 
 /** Whether nobody has said yet that the world has ended. */
@@ -83,10 +103,23 @@ export function watch(robots) {
   tell({ do: 'watch', robots });
 }
 
+/**
+ * Say which logs are looked at, each with its filter, and which tables.
+ * @param {Record<string, object>} logs
+ * @param {string[]} tables
+ */
+export function look(logs, tables) {
+  looked = { logs, tables };
+  tell({ do: 'look', ...looked });
+}
+
+const isLooking = () => looked.tables.length > 0 || Object.keys(looked.logs).length > 0;
+
 /** Open the socket for driving whenever this page may, under the name that it has got. */
 export function keepDriveSocket() {
   effect(() => {
     const client = mayDrive.value ? you.value?.client : null;
+    reaches.value = false;
     replaceDriveSocket(client ? open(client) : null);
   });
 }
@@ -94,6 +127,9 @@ export function keepDriveSocket() {
 /** @param {string} client */
 function open(client) {
   const socket = new WebSocket(address(`/ws/drive?client=${encodeURIComponent(client)}`));
+  socket.onopen = () => {
+    if (isDriveSocket(socket)) reaches.value = true;
+  };
   socket.onmessage = (event) => {
     const line = JSON.parse(event.data);
     if (line.k === 'done') settle(line);
@@ -101,6 +137,7 @@ function open(client) {
   };
   socket.onclose = () => {
     const unexpected = isDriveSocket(socket);
+    if (unexpected) reaches.value = false;
     socketLost(unexpected);
     if (unexpected) window.setTimeout(() => reopen(socket, client), LONGEST_WAIT_MS / 4);
   };

@@ -10,14 +10,16 @@ import { clock } from '../store.js';
 const PULL = 0.05;
 let offset = NaN;
 let pace = 1;
+let jumped = 0;
 let heard = -Infinity;
 let newest = 0;
 
 effect(() => {
-  const { factor, paused } = clock.value;
+  const { factor, paused, jumps = 0 } = clock.value;
   const next = paused ? 0 : factor;
-  if (next !== pace) {
+  if (next !== pace || jumps !== jumped) {
     pace = next;
+    jumped = jumps;
     offset = NaN;
   }
 });

@@ -78,7 +78,7 @@ function Alerts() {
   ];
   return html`<div class="alerts" role="alert">
     ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
-    ${notice.value &&
+    ${notice.value && !texts.includes(notice.value) &&
     html`<p class="warning">${notice.value}
       <button type="button" class="plain" aria-label="Dismiss" onClick=${() => (notice.value = '')}>
         <${Icon} name="x" /></button></p>`}

@@ -26,15 +26,17 @@ export function CalibrationScreen() {
     radius: wrongNumber(radius, 0.01, 10, 'm/s²'),
     delay: wrongNumber(delay, 20, 5000, 'ms'),
   };
-  const blind = tilts.value && state.value !== 'live';
+  const blind = tilts.value && state.value === 'looking';
   const calibrate = async () => {
     mark(true);
     tell('');
-    await ask();
     if (wrong.force || wrong.radius || wrong.delay) return;
+    await ask();
+    const held = tilts.peek() ? pose() : null;
+    if (tilts.peek() && !held) return tell('The sensor says nothing: nothing was calibrated.');
     const comma = (/** @type {string} */ text) => text.replace(',', '.').trim();
     const numbers = { force: comma(force), radius: comma(radius), delay: comma(delay) };
-    choose({ ...numbers, reference: tilts.peek() ? pose() : null, calibrated: true });
+    choose({ ...numbers, reference: held, calibrated: true });
     const done = await sendCalibration(true);
     if (!isKnown.peek()) tell('Kept on this phone; it counts once you have registered.');
     else if (done?.ok) tell(choices.peek().keep ? `${capital(done.text)}.` : 'Calibrated.');

@@ -12,7 +12,7 @@ import { engaged, interrupt, interrupted, watchInterruptions } from '../drive/ho
 import { choices } from './choices.js';
 import { keepAwake, vibrate } from './feel.js';
 import { screen } from './screens.js';
-import { isIos, lastHeard, state as sensor } from './sensor.js';
+import { ask as askSensor, isIos, lastHeard, state as sensor } from './sensor.js';
 
 const SILENT_MS = 300;
 const LOOK_MS = 50;
@@ -32,32 +32,31 @@ export const holds = computed(
 /** Whether who drives is known to the DVA: as a phone, or as the console's operator. */
 export const isKnown = computed(() => Boolean(phone.value?.registered) || holds.value);
 export const isDriving = computed(() => ['starting', 'driving'].includes(phase.value));
-/**
- * Whether the phone is steered by tilting it: without a sensor it is by the stick, and so is what the
- * console's operator drives, who is no phone.
- */
+/** Whether the phone is steered by tilting it: without a sensor it is by the stick. */
 export const tilts = computed(
-  () =>
-    choices.value.by === 'tilt' &&
-    ['live', 'looking', 'tap'].includes(sensor.value) &&
-    !(holds.value && !phone.value?.registered),
+  () => choices.value.by === 'tilt' && ['live', 'looking', 'tap'].includes(sensor.value),
 );
 
 /** The robot that is held, else the one that was chosen. */
 export const robot = computed(() => {
   const held = seat.value?.drives[0]?.i;
   const chosen = phone.value?.device ?? choices.value.device;
+  if (held === null) return { ...STRANGER, id: chosen, label: chosen };
   return robots.value.find((one) => (held === undefined ? one.id === chosen : one.i === held)) ?? null;
 });
+/** A device that the DVA knows, and that is no robot of this world: nobody draws what it sees. */
+const STRANGER = { i: -1, kind: 'robot', radius_m: 0, max_speed_mps: 0, max_turn_rate_radps: 0 };
 /** Why nothing can be stopped; empty if it can. */
 export const whyNoEmergency = computed(() => {
   if (!isKnown.value) return 'No robot yet: register first.';
-  return robot.value ? '' : 'No robot yet: choose one first.';
+  if (!robot.value) return 'No robot yet: choose one first.';
+  return robot.value.i < 0 ? 'This device is no robot of this world: nothing of it moves.' : '';
 });
 
 /** Begin, if a robot is in hand. */
 export async function start() {
   if (!holds.value || isDriving.value || asking.peek()) return;
+  await askSensor(); // if it wants to be, which has to be from a tap
   const why = whyNot();
   if (why) {
     notice.value = why;
@@ -74,6 +73,7 @@ export async function start() {
 /** Why a tilted phone cannot begin; empty if it can. */
 function whyNot() {
   if (!tilts.peek()) return '';
+  if (sensor.peek() === 'tap') return 'This phone wants to be asked for its motion sensor: press Start.';
   if (isSilent()) return 'There is no sensor that says anything: nothing was started. See Calibration.';
   const lifted = choices.peek().hold && !thumb.peek();
   return lifted ? 'Hold to drive is on: swipe up over the picture and keep your thumb there.' : '';

@@ -45,10 +45,13 @@ export function onSample(hear) {
   return () => hearers.delete(hear);
 }
 
-/** The mean of the last quarter of a second, which is how the phone is held. */
+/**
+ * How the phone is held: the mean of the last quarter of a second; null if it says nothing. Angles
+ * are told only when they change: the newest ones hold.
+ */
 export function pose() {
   const now = performance.now();
-  const some = recent.filter((sample) => now - sample.at < 250);
+  const some = recent.filter((sample, n) => now - sample.at < 250 || (!motion && n === recent.length - 1));
   if (!some.length) return null;
   return [0, 1, 2].map((n) => some.reduce((sum, { xyz }) => sum + xyz[n], 0) / some.length);
 }
@@ -77,7 +80,7 @@ function judge() {
   state.value = !answered && Motion?.requestPermission ? 'tap' : 'none';
 }
 
-/** Ask the phone, which has to be from a tap. */
+/** Ask the phone, which has to be from a tap, and wait a moment for what it then says. */
 export async function ask() {
   if (state.peek() !== 'tap' && state.peek() !== 'denied') return;
   try {
@@ -85,11 +88,21 @@ export async function ask() {
     const answers = await Promise.all(asked);
     state.value = answers.every((answer) => answer === 'granted') ? 'looking' : 'denied';
   } catch {
-    state.value = 'denied';
+    return; // it was no tap: the next one asks again
   }
-  window.setTimeout(() => {
-    if (state.peek() === 'looking') state.value = 'none';
-  }, WAIT_MS);
+  if (state.peek() === 'looking') await firstSample();
+  if (state.peek() === 'looking') state.value = 'none';
+}
+
+/** @returns {Promise<void>} */
+function firstSample() {
+  return new Promise((go) => {
+    const end = onSample(() => {
+      end();
+      go();
+    });
+    window.setTimeout(go, WAIT_MS);
+  });
 }
 
 /** @param {Sample} sample */
@@ -118,12 +131,12 @@ export function gravity(beta, gamma) {
 export const WORDS = /** @type {Record<string, string>} */ ({
   looking: 'Looking for the motion sensor …',
   live: 'The motion sensor works.',
-  tap: 'This phone wants to be asked for its motion sensor.',
+  tap: 'This phone wants to be asked for its motion sensor: Calibrate and Start do so.',
   denied:
-    'There is no sensor: this page was not allowed to read it. Allow motion and orientation for ' +
-    'this page in the settings of the browser and load it again, or steer by the stick.',
+    'this page has no permission to read it. Allow motion and orientation for this page in the ' +
+    'settings of the browser and load it again, or steer by the stick.',
   insecure:
-    'There is no sensor: browsers give it to pages over https alone. Open the address that begins ' +
-    'with https, or steer by the stick.',
-  none: 'There is no sensor that answers. Steer by the stick on the screen, by keys or by a gamepad.',
+    'browsers give it to pages over https alone. Open the address that begins with https, or steer ' +
+    'by the stick.',
+  none: 'none answers. Steer by the stick on the screen, by keys or by a gamepad.',
 });

@@ -1,16 +1,18 @@
 /** The robot's picture over the whole screen, and the robot in the hand. */
-import { html, useEffect, useMemo } from '../../vendor/preact.js';
+import { html, useEffect, useMemo, useState } from '../../vendor/preact.js';
 import { clock, maySteer, rowOf, rows, seat } from '../store.js';
 import { act } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { placeOf } from '../map/shown.js';
-import { CameraPicture } from '../drive/camera.js';
+import { CameraPicture, pictureAge } from '../drive/camera.js';
 import { driveByGamepad } from '../drive/gamepad.js';
 import { driveByKeys } from '../drive/keys.js';
 import { Stick } from '../drive/stick.js';
+import { useEvery } from '../ui/every.js';
 import { msText, plain } from '../ui/words.js';
 import { choices } from './choices.js';
 import { holds, isDriving, phase, phone, robot, sendCalibration, start, stop, thumb, tilts } from './drive.js';
+import { WORDS, state as sensor } from './sensor.js';
 import { swipes } from './swipe.js';
 
 /** The screen. */
@@ -19,7 +21,7 @@ export function TeleoperationScreen() {
   const held = holds.value;
   useEffect(() => {
     if (!one || !held) return undefined;
-    watch([one.i]);
+    if (one.i >= 0) watch([one.i]);
     sendCalibration();
     return () => watch([]);
   }, [one?.i, held]);
@@ -39,7 +41,7 @@ function Cockpit({ one }) {
   }, []);
   const busy = isDriving.value;
   return html`<div class="cockpit-phone">
-    <div class="surface" ...${handlers}><${CameraPicture} robot=${one} /></div>
+    <div class="surface" ...${handlers}>${one.i >= 0 && html`<${CameraPicture} robot=${one} />`}</div>
     <${Figures} one=${one} />
     <${Order} />
     <div class="below">
@@ -60,7 +62,7 @@ function Cockpit({ one }) {
  * @param {{one: import('../types.js').Thing}} props
  */
 function Figures({ one }) {
-  const drive = seat.value?.drives.find((each) => each.i === one.i);
+  const drive = seat.value?.drives.find((each) => (each.i ?? -1) === one.i);
   const [speed, turn] = drive?.command ?? [0, 0];
   const degrees = phone.value ? phone.value.radius_deg : Math.trunc((turn * 180) / Math.PI);
   const metres = phone.value ? phone.value.speed_mps : speed;
@@ -77,18 +79,31 @@ const PHASES = /** @type {Record<string, string>} */ ({
   stopping: 'Stopping …',
 });
 
+const TELLING_S = 3; // from then on it is said how long nothing has been heard
+
+/** What is waited for, and how long by now. @param {{what: string}} props */
+function Waiting({ what }) {
+  const [began] = useState(performance.now());
+  useEvery(1000);
+  const waited = Math.floor((performance.now() - began) / 1000);
+  return waited < TELLING_S ? what : `${what} No answer for ${waited} s.`;
+}
+
 /** What to do next, or why the robot stands. @param {{one: import('../types.js').Thing}} props */
 function Hint({ one }) {
   void rows.value;
   if (clock.value.paused) return 'The world is paused.';
   if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
-  if (PHASES[phase.value]) return PHASES[phase.value];
+  if (PHASES[phase.value]) return html`<${Waiting} key=${phase.value} what=${PHASES[phase.value]} />`;
   const how = tilts.value ? 'tilt to drive' : 'hold the stick, a key or the gamepad';
   if (phase.value !== 'driving') {
+    if (sensor.value === 'tap') return WORDS.tap;
     const warn = choices.value.calibrated ? '' : ' This phone is not calibrated: it will drive by nonsense.';
     return `Swipe up or press Start, then ${how}.${warn}`;
   }
   if (choices.value.hold && tilts.value && !thumb.value) return 'Hold your thumb on the picture and tilt.';
+  const blind = Math.floor(pictureAge(one.i) / 1000);
+  if (blind >= TELLING_S) return `No picture for ${blind} s: the link may be lost. The robot stops by itself.`;
   const why = rowOf(one.i)?.stands;
   return why ? `It stands: ${why}.` : 'Driving. Swipe down to stop.';
 }

@@ -1,10 +1,20 @@
 /** The shell: bar, rail, warnings, and the page that the address names. */
 import { html, render } from '../../vendor/preact.js';
-import { clock, connection, notice, scene } from '../store.js';
+import {
+  clock, connection, isAttached, isPast, notice, replay, rows, scene, shelf,
+} from '../store.js';
+import { AuditPage } from '../audit/audit_page.js';
+import { DevicesPage } from '../devices/devices_page.js';
 import { DrivePage } from '../drive/drive_page.js';
+import { EventsPage } from '../events/events_page.js';
 import { Help } from '../help/help.js';
 import { MapPage } from '../map/map_page.js';
 import { NetworkPage } from '../network/network_page.js';
+import { ReplayBar } from '../replay/replay_bar.js';
+import { ShelfPage } from '../replay/shelf_page.js';
+import { StoryPage } from '../replay/story_page.js';
+import { RequestsPage } from '../requests/requests_page.js';
+import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { Bar } from './bar.js';
@@ -13,13 +23,34 @@ import { addressOf, page } from './route.js';
 
 const PAGES = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
+  ['robots', 'Robots', 'bot'],
   ['drive', 'Drive', 'gamepad-2'],
+  ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
+  ['audit', 'Audit', 'shield-check'],
 ]);
+const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messages tell nothing
+// What sends something is not there in a recording.
+const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
+  ['map', 'Map', 'map'],
+  ['main', 'Main', 'list'],
+  ['robots', 'Robots', 'bot'],
+  ['story', 'Story', 'flag'],
+]);
+const SHELF = /** @type {[string, string, string]} */ (['recordings', 'Recordings', 'play']);
 const BODIES = /** @type {Record<string, any>} */ ({
   map: MapPage,
+  main: RequestsPage,
+  devices: DevicesPage,
+  robots: RobotsPage,
   drive: DrivePage,
+  events: EventsPage,
   network: NetworkPage,
+  audit: AuditPage,
+  story: StoryPage,
+  recordings: ShelfPage,
 });
 
 /** @param {HTMLElement} where */
@@ -29,10 +60,10 @@ export function showApp(where) {
 }
 
 function App() {
-  const Page = BODIES[page.value];
+  const Page = BODIES[shown()];
   return html`<a class="skip" href="#main" onClick=${skip}>Skip to content</a>
     <${Bar} /><${Rail} />
-    <div class="body"><${Warnings} /><${Tour} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
+    <div class="body"><${Warnings} /><${Tour} /><${ReplayBar} />${scene.value ? html`<${Page} />` : html`<${Waiting} />`}</div>
     <${Help} /><${PhoneCode} />`;
 }
 
@@ -42,13 +73,29 @@ function skip(event) {
   document.getElementById('main')?.focus();
 }
 
+/** The pages that there are to go to. */
+function pages() {
+  const some = scene.value?.pages;
+  if (some) return PAGES.filter(([name]) => some.includes(name));
+  if (isAttached.value) return PAGES.filter(([name]) => !NOT_ATTACHED.includes(name));
+  if (!isPast.value) return PAGES;
+  const past = replay.value ? OF_A_RECORDING : [];
+  return shelf.value ? [...past, SHELF] : past;
+}
+
+/** The page that the address names, or the first that there is. */
+function shown() {
+  const names = pages().map(([name]) => name);
+  return names.includes(page.value) ? page.value : (scene.value?.pages?.[0] ?? names[0] ?? SHELF[0]);
+}
+
 function Rail() {
   return html`<nav class="rail" aria-label="Pages">
-    ${PAGES.map(
+    ${pages().map(
       ([name, title, icon]) => html`<a href=${addressOf(name)}
-        aria-current=${page.value === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
+        aria-current=${shown() === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
     )}
-    <${PhoneButton} /><${TourButton} />
+    ${!isPast.value && !scene.value?.pages && html`<${PhoneButton} /><${TourButton} />`}
   </nav>`;
 }
 
@@ -73,6 +120,8 @@ function Warnings() {
     ${connection.value === 'lost' &&
     html`<p class="warning">The connection to the world is lost; what you see is old. Robots that
       you drove have been stopped. Trying again …</p>`}
+    ${rows.value?.server?.own === false && !rows.value.server.listens &&
+    html`<p class="warning">The DVA at ${rows.value.server.address} does not answer: what you see is old. Asking again …</p>`}
     ${ended && html`<p class="warning">The world has ended: ${connection.value}</p>`}
     ${notice.value &&
     html`<p class="warning">${notice.value} <button type="button" class="plain"

@@ -1,6 +1,8 @@
 /** What is always in sight: time, link, age of the data, alarms, who one is, emergency stop. */
 import { html } from '../../vendor/preact.js';
-import { clock, connection, isModelled, link, maySteer, you } from '../store.js';
+import {
+  clock, connection, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,
+} from '../store.js';
 import { act, emergencyStop } from '../net/actions.js';
 import { roundTrip } from '../net/round_trip.js';
 import { pageAge, worldNow } from '../net/world_time.js';
@@ -23,8 +25,8 @@ export function Bar() {
       aria-label=${dark.value ? 'Light colours' : 'Dark colours'}
       title=${dark.value ? 'Light colours' : 'Dark colours'}>
       <${Icon} name=${dark.value ? 'sun' : 'moon'} /></button>
-    <button type="button" class="emergency" onClick=${emergencyStop} title="Stops all robots at once (Shift+Esc)">
-      <${Icon} name="octagon-x" />Emergency stop</button>
+    ${!isPast.value && html`<button type="button" class="emergency" onClick=${emergencyStop}
+      title="Stops all robots at once (Shift+Esc)"><${Icon} name="octagon-x" />Emergency stop</button>`}
   </header>`;
 }
 
@@ -35,18 +37,24 @@ function Time() {
   return html`<span class="item time" title="Time of the world, and how fast it runs">
     <span class="figure">${clockText(worldNow())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
-    <button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
+    ${!isPast.value && html`<button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
       aria-label=${name} title=${isModelled.value ? name : 'Over real links time goes by as outside'}
       onClick=${() => act('pace', { paused: !paused })}>
-      <${Icon} name=${paused ? 'play' : 'pause'} /></button>
+      <${Icon} name=${paused ? 'play' : 'pause'} /></button>`}
   </span>`;
 }
 
 function Link() {
   const setting = link.value;
+  if (isPast.value) {
+    const text = replay.value ? `recording ${replay.value.name}` : 'no recording yet';
+    return html`<span class="item link" role="status" aria-label="Link"
+      title="What is shown is over: a recording is played">${text}</span>`;
+  }
   if (!isModelled.value) {
     return html`<span class="item link" role="status" aria-label="Link"
-      title="Sockets lie between the console and the robots, not a model">real</span>`;
+      title=${isAttached.value ? 'What is shown runs elsewhere; here is known what messages tell' : 'Sockets lie between the console and the robots, not a model'}>
+      ${isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
   }
   const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
   const trace = setting?.trace ? `, ${setting.trace}` : '';
@@ -64,12 +72,12 @@ function Age() {
   const error = roundTrip.value.error;
   const more = Number.isNaN(error) ? '' : `; to the server and back ${roundTrip.value.ms.toFixed(1)} ms, clocks ±${error.toFixed(1)} ms`;
   return html`<span class=${old ? 'item age old' : 'item age'} title=${`How old the newest word from the world is${more}`}>
-    data ${known ? `${secondsText(age)} old` : '–'}</span>`;
+    <span class="word">data </span>${known ? secondsText(age) : '–'}<span class="word">${known ? ' old' : ''}</span></span>`;
 }
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/map" title="Open events, by severity">
+  return html`<a class="item alarms" href="#/events" title="Open events, by severity">
     ${Object.entries(counts).map(
       ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
@@ -80,5 +88,5 @@ function Who() {
   const me = you.value;
   if (!me) return null;
   return html`<span class="item who" title=${`What your address allows; the world knows this page as ${me.client}`}>
-    ${me.role === 'drive' ? 'you may drive' : 'you may look'}</span>`;
+    you may ${me.role === 'phone' ? 'drive' : me.role}</span>`;
 }

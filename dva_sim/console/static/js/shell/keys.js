@@ -1,5 +1,6 @@
 /** Keys that act on every page. */
 import { emergencyStop } from '../net/actions.js';
+import { isPast } from '../store.js';
 import { openHelp } from '../help/help.js';
 
 const WRITING = 'input:not([type=range]), textarea, select';
@@ -9,7 +10,7 @@ export function listenForKeys() {
   window.addEventListener('keydown', (event) => {
     if (event.key === 'Escape' && event.shiftKey) {
       event.preventDefault();
-      if (!event.repeat) emergencyStop();
+      if (!event.repeat && !isPast.value) emergencyStop();
     }
     if (event.key === '?' && !isWriting(event.target)) openHelp();
   });

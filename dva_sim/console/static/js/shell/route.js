@@ -1,18 +1,34 @@
 /** Which page is shown, in the address: a reload or a sent link shows the same. */
 import { computed, signal } from '../../vendor/preact.js';
-import { robots } from '../store.js';
+import { robots, scene } from '../store.js';
 
-const PAGES = ['map', 'drive', 'network'];
+const PAGES = [
+  ...['map', 'main', 'devices', 'robots', 'drive', 'events', 'network', 'audit'],
+  ...['story', 'recordings'],
+];
 const MOST_AT_ONCE = 2;
 const hash = signal(location.hash);
 window.addEventListener('hashchange', () => (hash.value = location.hash));
 
 const parts = computed(() => {
   const [path, query = ''] = hash.value.replace(/^#\/?/, '').split('?');
-  return { path, query: new URLSearchParams(query) };
+  const [name, ...rest] = path.split('/');
+  return { path: name, detail: decoded(rest.join('/')), query: new URLSearchParams(query) };
 });
 
-export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : 'map'));
+/** What stands behind the name of the page, as in `#/robots/robot-1`; empty: nothing. */
+export const detail = computed(() => parts.value.detail);
+
+/** @param {string} text */
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
+export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : (scene.value?.pages?.[0] ?? 'map')));
 
 /** The robots that are looked at or driven: those of the address, else the first. */
 export const driven = computed(() => {

@@ -11,7 +11,7 @@ import { drives, go, holds, isAtItsStart, progress, robotOf, takeTour, titleOf, 
 
 const LOOK_MS = 100;
 const WORDS = ['Set up', 'Drive the first robot', 'Drive the second robot', 'Your numbers'];
-const RIGHT_ROUND = 2.5; // [rad]
+const HALF_ROUND = 2.5; // [rad]
 const AHEAD = 0.2; // [rad]
 
 /** The tour's button, where there are two robots for one. */
@@ -73,7 +73,7 @@ function Leg({ leg }) {
 function turnText(side, goal) {
   if (Math.abs(side) < AHEAD) return html`The ring ${goal} on the map lies straight ahead:`;
   const [key, where] = side > 0 ? ['←', 'to the left'] : ['→', 'to the right'];
-  const far = Math.abs(side) > RIGHT_ROUND ? 'right round' : where;
+  const far = Math.abs(side) > HALF_ROUND ? 'around' : where;
   return html`Hold <kbd>${key}</kbd> to turn ${far} until the ring ${goal} on the map lies ahead, then`;
 }
 

@@ -13,7 +13,7 @@ export function Icon({ name }) {
 const SHAPES = /** @type {Record<string, string>} */ ({
   critical: 'M8 1h8l7 7v8l-7 7H8l-7-7V8z',
   high: 'M12 2L23 21H1z',
-  medium: 'M12 1l11 11-11 11L1 12z',
+  medium: 'M3 3h18v18H3z',
   low: 'M12 3a9 9 0 1 0 .01 0z',
 });
 

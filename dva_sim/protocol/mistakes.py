@@ -1,4 +1,4 @@
-"""Messages: the codec judges, and only what it has refused is searched for the place.
+"""What is wrong with a message, and where: the codec judges, and only what it refuses is searched.
 
 What the value of an element should look like is said in words, read from the schema itself.
 """

@@ -6,7 +6,7 @@ import pytest
 
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.testing.messages import check_message, form_of
+from dva_sim.protocol.mistakes import check_message, form_of
 
 SAMPLES = Path(__file__).parents[2] / "protocol" / "samples"
 GOOD = (SAMPLES / "valid" / "set-teleop.xml").read_bytes()

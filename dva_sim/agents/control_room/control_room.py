@@ -1,0 +1,154 @@
+"""A control room: what it knows of the events, and what people there ask of the DVA.
+
+Everything goes by messages, as from anybody's console: whoever has the agent sends bodies of
+`protocol/control_room.py` by `ask`, and is told by callbacks of what the DVA publishes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from dva_sim.agents.device import AUDIT, EVENT, AgentDevice, do_nothing
+from dva_sim.protocol import messages as m
+
+REFRESH = 10.0  # from one look at the whole list to the next: what is published may be lost [s]
+MOST_CLOSED = 200  # events that are over and still known
+
+
+class ControlRoomAgent:
+    """One control room.
+
+    Args:
+        device: Its identity and ways to talk; of type `ControlRoom`.
+
+    Attributes:
+        events: How each event stood when it was last told of, by number.
+        told_at: When that was [s].
+        devices: Who is registered, by id, as of the last list.
+        dispatch: How orders are given, and the own role; None: not told yet.
+        orders: What it drives robots for, as it wanted, by event.
+        on_event: Told of each change of an event.
+        on_dispatch: Told when orders are given otherwise.
+        on_record: Told of each decision.
+        gives_up: Whether it gives a robot up that another asks for.
+        on_message: Told of what the DVA says to it: a session that is over, an order that is.
+    """
+
+    def __init__(self, device: AgentDevice) -> None:
+        self.device = device
+        self.events: dict[int, m.EventStatus] = {}
+        self.told_at: dict[int, float] = {}
+        self.devices: dict[str, m.Device] = {}
+        self.dispatch: m.DispatchStatus | None = None
+        self.orders: dict[int, m.Order] = {}
+        self.on_event: Callable[[m.EventStatus], object] = do_nothing
+        self.on_dispatch: Callable[[m.DispatchStatus], object] = do_nothing
+        self.on_record: Callable[[m.AuditRecord], object] = do_nothing
+        self.on_message: Callable[[m.Message], object] = do_nothing
+        self.gives_up: Callable[[m.HandoverRequest], bool] = lambda _: False
+
+    def start(self) -> None:
+        """Register, listen to the DVA, and ask it for the whole list now and then."""
+        device = self.device
+        device.serve(self._on_request)
+        for topic in (EVENT, AUDIT):
+            device.network.subscribe(device.id_tag, device.dva, topic, self._on_published)
+        device.register(self.refresh)
+        device.clock.every(REFRESH, self.refresh, start=device.clock.now + REFRESH)
+
+    def refresh(self) -> None:
+        """Ask for the whole list, who is there, and how orders are given."""
+        self.ask(m.GetDispatch())
+        self.ask(m.GetDeviceList())
+        self._ask_above(None)
+
+    def ask(
+        self,
+        body: m.Body,
+        then: Callable[[m.Reply], object] = do_nothing,
+        failed: Callable[[], object] = do_nothing,
+    ) -> None:
+        """Send something to the DVA; what the answer holds is known before `then` is called."""
+
+        def answered(reply: m.Reply) -> None:
+            self._take(reply.content)
+            then(reply)
+
+        self.device.ask(self.device.dva, body, answered, failed)
+
+    def _ask_above(self, number: int | None) -> None:
+        """The list comes in parts, by number."""
+
+        def more(reply: m.Reply) -> None:
+            if isinstance(reply.content, m.EventList) and reply.content.events:
+                self._ask_above(reply.content.events[-1].event_id)
+
+        self.ask(m.GetEventList(number), more)
+
+    # --- what comes in -------------------------------------------------------------------
+
+    def _on_published(self, data: bytes) -> None:
+        message = self.device.read(data, self.device.dva)
+        if message is not None:
+            self._take(message.body)
+
+    def _take(self, said: object) -> None:
+        match said:
+            case m.EventStatus():
+                self._note(said)
+            case m.EventList(events=events):
+                for status in events:
+                    self._note(status)
+            case m.DispatchStatus():
+                self._switched(said)
+            case m.DeviceList(devices=devices):
+                self.devices = {device.id_tag: device for device in devices}
+            case m.AuditRecord():
+                self.on_record(said)
+
+    def _note(self, status: m.EventStatus) -> None:
+        """How an event stands; answers may overtake what was published."""
+        number, known = status.event_id, self.events.get(status.event_id)
+        if known is not None and (status.age, status.decisions) < (known.age, known.decisions):
+            return
+        self.events[number], self.told_at[number] = status, self.device.clock.now
+        self._forget_the_oldest()
+        self.on_event(status)
+
+    def _forget_the_oldest(self) -> None:
+        if len(self.events) <= MOST_CLOSED:
+            return
+        closed = [n for n, status in self.events.items() if status.closed_for is not None]
+        for number in sorted(closed)[:-MOST_CLOSED]:
+            del self.events[number], self.told_at[number]
+
+    def _switched(self, status: m.DispatchStatus) -> None:
+        before = self.dispatch
+        role = status.role or (before.role if before else None)  # what is published names none
+        self.dispatch = m.DispatchStatus(
+            status.dispatch_mode, status.decide_within, status.switched, role
+        )
+        if before is None or before.dispatch_mode != status.dispatch_mode:
+            self.on_dispatch(self.dispatch)
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        """What the DVA says to a holder of robots: nothing that it has not asked for."""
+        body, answer = message.body, m.Reply(message.message_id, m.OK, "")
+        if message.source != self.device.dva:
+            text = "only the DVA says such things"
+            return m.Reply(message.message_id, m.NOT_PERMITTED, text)
+        match body:
+            case m.HandoverRequest():
+                if not self.gives_up(body):
+                    return m.Reply(message.message_id, m.BUSY, "it is in use")
+            case m.Order():
+                self.orders[body.event_id] = body
+            case m.OrderProgress():
+                self.orders.pop(body.event_id, None)
+            case m.PermissionRevocation():
+                pass
+            case _:
+                name = type(body).__name__
+                return m.Reply(message.message_id, m.NOT_SUPPORTED, f"no use for {name}")
+        self.on_message(message)
+        return answer

@@ -1,0 +1,57 @@
+"""How a scripted dispatcher works: how long it takes, and when it knows better."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dva_sim.agents.population import Trait
+from dva_sim.kernel.config import Config, Key
+from dva_sim.protocol.messages import EventKind
+
+RoleName = Literal["look", "drive", "dispatch", "supervise"]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Overrule(Config):
+    """When a person decides otherwise than the policy; what is left out may be anything.
+
+    Attributes:
+        kind: Of the event.
+        severity_from: Of the event, as reported, 0 to 1.
+        confidence_below: That there is something at all, 0 to 1.
+        advised: Whom the policy would send: a `robot` or a `guard`.
+        sends: The earliest there of this kind instead, if any can go; `nobody`: it is a false
+            alarm; `others`: it is escalated.
+        share: How often it does so where all this holds.
+    """
+
+    kind: EventKind | None = None
+    severity_from: Share = 0.0
+    confidence_below: Share | None = None
+    advised: Literal["robot", "guard"] | None = None
+    sends: Literal["robot", "guard", "nobody", "others"]
+    share: Share = 1.0
+
+
+class DispatcherProfile(Config):
+    """A person at a control room who acknowledges events and decides on them, one at a time.
+
+    The medians are assumed, and of the order of what call-takers need; see `experiments/README.md`.
+
+    Attributes:
+        role: What it may do: `look`, `drive`, `dispatch` or `supervise`.
+        acknowledge_s: From when it turns to an event until it has acknowledged it.
+        decide_s: From then, or from the DVA's question, until it has decided.
+        overrules: When it decides otherwise than the policy: the first that holds counts.
+    """
+
+    role: RoleName = "dispatch"
+    acknowledge_s: Annotated[Trait, Key(inner={"median": Key("time to acknowledge")})] = Trait(
+        median=8.0, spread=0.5
+    )
+    decide_s: Annotated[Trait, Key(inner={"median": Key("time to decide")})] = Trait(
+        median=12.0, spread=0.5
+    )
+    overrules: tuple[Overrule, ...] = ()

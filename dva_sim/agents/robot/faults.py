@@ -1,0 +1,116 @@
+"""What can be made to go wrong with a robot while it runs, and be put right again.
+
+Nothing of it is chance, and nothing of it is in the robot until somebody asks for it: a run without
+faults does what it did before. What is wrong is said in the robot's story, and so is its end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.network.messaging import Request
+
+SLOWEST = 3.0  # a message may be made to take a robot's computer so long [s]: PiBot's longest
+Lost = Callable[[str, bytes], object]
+
+
+class RobotFaults:
+    """The faults of one robot.
+
+    Args:
+        robot: Which.
+        lost: Told of each reply that is dropped: the robot, and the bytes.
+
+    Attributes:
+        processing_s: What each message takes its computer [s]; None: what it usually takes.
+        drops_replies: Whether whatever it answers is lost.
+        frozen: Whether its computer has hung up: it hears and says nothing.
+        camera_lost: Whether it takes no pictures.
+        stuck: Sensors that give their last values for ever.
+    """
+
+    def __init__(self, robot: RobotAgent, lost: Lost = lambda *_: None) -> None:
+        self._robot, self._lost = robot, lost
+        self.processing_s: float | None = None
+        self.drops_replies = self.frozen = self.camera_lost = False
+        self._sound = dict(robot.sensors)
+        self.stuck: set[str] = set()
+        self._usual = robot.inbox.service
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is wrong now."""
+        flags = self.drops_replies, self.frozen, self.camera_lost, self.stuck
+        return self.processing_s is not None or any(flags)
+
+    def slow_down(self, seconds: float | None) -> None:
+        """Let each message take the robot's computer so long; None: as before."""
+        inbox = self._robot.inbox
+        if self.processing_s is None:
+            self._usual = inbox.service
+        self.processing_s = seconds
+        inbox.service = self._usual if seconds is None else lambda: seconds
+        told = "as usual" if seconds is None else f"{seconds:g} s"
+        self._tell(f"fault: processing of a message takes {told}")
+
+    def usually(self, service: Callable[[], float]) -> None:
+        """From now on a message usually takes another time: what counts while nothing is wrong."""
+        self._usual = service
+        if self.processing_s is None:
+            self._robot.inbox.service = service
+
+    def drop_replies(self, on: bool) -> None:
+        """Let all replies be lost on their way, or none."""
+        if on is self.drops_replies:
+            return
+        self.drops_replies, robot = on, self._robot
+        service = self._lose_the_answer if on else robot.inbox.request
+        robot.device.network.serve(robot.device.id_tag, service)
+        self._tell("fault: its replies are dropped" if on else "its replies are dropped no more")
+
+    def _lose_the_answer(self, request: Request) -> None:
+        robot = self._robot.device.id_tag
+        lost = request._replace(answer=lambda reply: self._lost(robot, reply))
+        self._robot.inbox.request(lost)
+
+    def freeze(self, on: bool) -> None:
+        """Let its computer hang, or start anew: idle, in nobody's hand, with what was told last."""
+        if on is self.frozen:
+            return
+        self.frozen, robot = on, self._robot
+        if on:
+            self._tell("fault: its computer is frozen")
+            robot.hang()
+        else:
+            robot.device.silent = not robot.body.powered
+            self._tell("its computer has started anew")
+
+    def lose_camera(self, on: bool) -> None:
+        """Let it take no pictures, or take them again."""
+        if on is self.camera_lost:
+            return
+        self.camera_lost = self._robot.blind = on
+        self._tell("fault: its camera is lost" if on else "its camera is back")
+
+    def stick(self, sensor: str, on: bool) -> None:
+        """Let a sensor give its last values for ever, or measure again.
+
+        Raises:
+            KeyError: it has no such sensor.
+        """
+        port = self._sound[sensor]
+        if on is (sensor in self.stuck):
+            return
+        if on:
+            self.stuck.add(sensor)
+            last = port.read(self._robot.device.clock.now)
+            self._robot.sensors[sensor] = replace(port, read=lambda _: last)
+        else:
+            self.stuck.discard(sensor)
+            self._robot.sensors[sensor] = port
+        self._tell(f"{'fault: ' if on else ''}its {sensor} is {'stuck' if on else 'stuck no more'}")
+
+    def _tell(self, what: str) -> None:
+        self._robot.device.tell(what, "link")

@@ -1,0 +1,80 @@
+"""A hand at a robot itself: it drives without messages, within the same limits and watchdog."""
+
+from __future__ import annotations
+
+from dva_sim.agents.robot.controller import Decision, RobotController
+from dva_sim.agents.robot.decision_log import LET_GO, PRESSED, TAKEN_BY_HAND
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.kernel.recorder import ByHand
+from dva_sim.protocol import messages as m
+
+
+class ManualControl:
+    """Lets one hand at a time drive a robot; its controller decides.
+
+    Args:
+        robot: Which.
+    """
+
+    def __init__(self, robot: RobotAgent) -> None:
+        self._robot = robot
+
+    @property
+    def _controller(self) -> RobotController:
+        return self._robot.controller
+
+    def take(self, who: str) -> Decision:
+        """Somebody takes the robot in hand, if it is idle and nobody holds it."""
+        robot, now = self._robot, self._robot.device.clock.now
+        if robot.device.silent or not robot.body.powered:
+            return Decision(m.BUSY, "its computer does not answer")
+        before = self._controller.by_hand
+        decision = self._controller.take_by_hand(who, now, robot.is_moving)
+        if decision.code != m.OK or before == who:
+            return decision
+        self._done(who, "takes", decision, now)
+        if robot.trace is not None:
+            robot.trace.happened(TAKEN_BY_HAND, now)
+        robot.device.tell("is driven by hand from now on, at the robot itself", "mode")
+        return decision
+
+    def drive(self, who: str, speed: float, turn_rate: float) -> Decision:
+        """The hand wants a speed [m/s] and a turn rate [rad/s]."""
+        robot, now = self._robot, self._robot.device.clock.now
+        if robot.device.silent:
+            return Decision(m.BUSY, "its computer does not answer")
+        decision = self._controller.drive_by_hand(who, speed, turn_rate, now)
+        if decision.code == m.OK:
+            self._done(who, "drives", decision, now)
+        return decision
+
+    def let_go(self, who: str) -> Decision:
+        """The hand gives the robot up, which stops it."""
+        robot, now = self._robot, self._robot.device.clock.now
+        decision = self._controller.let_go(who)
+        if decision.code != m.OK:
+            return decision
+        self._done(who, "lets go", decision, now)
+        if robot.trace is not None:
+            robot.trace.happened(LET_GO, now)
+        robot.device.tell("is driven by hand no more", "mode")
+        return decision
+
+    def press_emergency(self) -> None:
+        """The button at the robot itself: it stands until somebody orders it anew."""
+        robot, now = self._robot, self._robot.device.clock.now
+        before = self._controller.mode
+        decision = self._controller.press_emergency(now)
+        self._done("", "stops", decision, now)
+        if robot.trace is not None:
+            robot.trace.happened(PRESSED, now)
+        robot.device.tell("is stopped by its own emergency button", "mode")
+        if self._controller.mode is not before:
+            robot.mode_changed("")
+
+    def _done(self, who: str, what: str, decision: Decision, now: float) -> None:
+        """What was decided moves the robot, and the safety audit is told."""
+        robot = self._robot
+        robot.device.recorder.on_hand(ByHand(robot.device.id_tag, who, what, now))
+        if decision.set_point is not None:
+            robot.move(decision.set_point)

@@ -1,0 +1,143 @@
+"""What in a run wants somebody to act, as alarms, and what people at pages do about them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.alarms import AlarmCondition, Alarms
+from dva_sim.console.refusal import Refused
+from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.simulation.full.run import Run
+
+Line = dict[str, Any]
+
+ESCALATED_FOR: Final = 60.0  # so long an escalation counts as lasting, time of the run [s]
+OUTDOORS: Final = "outdoors"
+
+
+class AlarmDesk:
+    """The alarms of a console.
+
+    Args:
+        run: In which.
+        clock: Real time [s]: what people can bear does not hang on the pace of a run.
+
+    Attributes:
+        alarms: What decides.
+    """
+
+    def __init__(self, run: Run, clock: Callable[[], float] | None = None) -> None:
+        self._run, self._clock = run, clock or (lambda: time.monotonic())
+        self.alarms = Alarms()
+        self._since: dict[str, int] = {}
+
+    def look(self, events: Sequence[Line], robots: Sequence[Line], now_ms: int) -> Line:
+        """Look at what pages are told, and tell the alarms."""
+        found = [*_of_events(events, now_ms), *self._lost(robots), *self._nobody(events)]
+        timed = [
+            one._replace(since_ms=one.since_ms or self._from(one.key, now_ms)) for one in found
+        ]
+        self._since = {one.key: one.since_ms for one in timed}
+        now = self._clock()
+        self.alarms.update(timed, now)
+        return {
+            "k": "alarms",
+            "t": now_ms,
+            "alarms": self.alarms.rows(now),
+            "shelved": self.alarms.shelved(now),
+            "flood": self.alarms.is_flood,
+            "rate": self.alarms.rate(now),
+            "left_out": self.alarms.left_out,
+        }
+
+    def _from(self, key: str, now_ms: int) -> int:
+        return self._since.get(key, now_ms)
+
+    def _lost(self, robots: Iterable[Line]) -> Iterator[AlarmCondition]:
+        """Robots that are driven and hear nothing."""
+        labels = self._run.stage.labels
+        numbers = {robot: n for n, robot in enumerate(self._run.field.robots)}
+        by_row = {n: labels[robot] for robot, n in numbers.items()}
+        for row in robots:
+            driven = row["mode"] == Mode.TELEOPERATION.value and row["watchdog_left_s"] == 0.0
+            if driven and "first command" not in row["stands"]:
+                label = by_row.get(row["i"], str(row["i"]))
+                text = f"{label} is lost in drive: its watchdog stopped it"
+                yield AlarmCondition(f"lost {label}", "robot lost", "high", "", text)
+
+    def _nobody(self, events: Iterable[Line]) -> Iterator[AlarmCondition]:
+        """Events wait, and nobody is free to go."""
+        desk = self._run.dva.desk
+        waits = sum(1 for event in events if event["state"] == "pending")
+        entries = desk.registry.entries.values()
+        free = any(
+            entry.device.device_type in (ROBOT, GUARD)
+            and not entry.silent
+            and entry.device.id_tag not in desk.orders.engaged
+            for entry in entries
+        )
+        if waits and not free:
+            text = f"nobody is left to send, and {waits} wait"
+            yield AlarmCondition("nobody", "nobody left to send", "high", "", text)
+
+    # --- what people do -----------------------------------------------------------------------
+
+    def members(self, key: Any) -> list[str]:
+        """The alarms that a row stands for.
+
+        Raises:
+            Refused: there is no such row any more.
+        """
+        found = self.alarms.members(str(key))
+        if not found:
+            raise Refused("that alarm is none any more")
+        return found
+
+    def by_event(self, keys: Iterable[str]) -> Mapping[str, int]:
+        """Those of the alarms that an open event is behind, which the DVA is to be told of."""
+        known = ((key, self.alarms.known[key]) for key in keys)
+        return {
+            key: alarm.condition.event
+            for key, alarm in known
+            if alarm.is_on and alarm.condition.event is not None and key.startswith("event ")
+        }
+
+    def acknowledge(self, key: str, by: str) -> None:
+        """Somebody has seen an alarm."""
+        self.alarms.acknowledge(key, by)
+
+    def shelve(self, keys: Iterable[str], seconds: float, by: str) -> None:
+        """Somebody cannot act on alarms now."""
+        for key in keys:
+            self.alarms.shelve(key, seconds, by, self._clock())
+
+    def unshelve(self, keys: Iterable[str]) -> None:
+        """They are back in the list."""
+        for key in keys:
+            self.alarms.unshelve(key, self._clock())
+
+
+def _of_events(events: Iterable[Line], now_ms: int) -> Iterator[AlarmCondition]:
+    """What is open, and what has just been escalated."""
+    for event in events:
+        number, kind = event["number"], event["kind"].replace("_", " ")
+        place = event["room"] or OUTDOORS
+        if not event["over"]:
+            seen = event.get("acknowledged")
+            yield AlarmCondition(
+                *(f"event {number}", kind, event["severity"], place),
+                text=f"{kind.capitalize()}, {place}",
+                since_ms=event["reported_ms"],
+                event=number,
+                seen_by=None if seen is None else seen["label"],
+            )
+        elif event["state"] == "escalated":
+            closed = event["since_ms"]
+            if now_ms - closed < 1000 * ESCALATED_FOR:
+                text = f"{kind.capitalize()}, {place}: escalated, others have to go"
+                yield AlarmCondition(
+                    *(f"escalated {number}", "escalation", "critical", place, text, closed, number)
+                )

@@ -1,0 +1,74 @@
+"""What people at an attached console decide on events: messages of its own control room.
+
+Whether that is allowed, the DVA says: it alone knows the role of each control room.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+
+class AttachedDecisions:
+    """Does what pages ask for about events.
+
+    Args:
+        system: To which the console is attached.
+    """
+
+    def __init__(self, system: AttachedSystem) -> None:
+        self._system = system
+        self.doers: Mapping[str, Callable[[Line, Said], object]] = {
+            "room_join": self._join,
+            "event_raise": self._raise,
+            **dict.fromkeys(DECISIONS, self._decide),
+        }
+
+    def _join(self, _: Line, said: Said) -> None:
+        """All who decide here share the console's own control room."""
+        if not self._system.answers:
+            raise Refused("the DVA does not answer")
+        said(True, f"you are {self._system.device.label}, and may {self._system.role}")
+
+    def _raise(self, line: Line, said: Said) -> None:
+        place = self._system.place_of(line["x_m"], line["y_m"])
+        self._ask(*report_of(line, place), said)
+
+    def _decide(self, line: Line, said: Said) -> None:
+        self._ask(*decision_of(line, self._device, self._seen), said)
+
+    def _ask(self, body: m.Body, done: str, said: Said) -> None:
+        robots = self._system.robots
+
+        def answered(reply: m.Reply) -> None:
+            ok = reply.code == m.OK
+            words = reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+            more = answer_of(reply, lambda device: device in robots()) if ok else {}
+            said(ok, done if ok else words, **more)
+
+        self._system.agent.ask(body, answered, partial(said, False, "the DVA does not answer"))
+
+    def _seen(self, event: int) -> int | None:
+        """How many decisions on an event are known here."""
+        status = self._system.agent.events.get(event)
+        return None if status is None else status.decisions
+
+    def _device(self, label: str) -> str:
+        """The id of a device by its label.
+
+        Raises:
+            Refused: the DVA has listed none of that label.
+        """
+        known = self._system.told.devices.items()
+        found = next((i for i, told in known if told.device.label == label), None)
+        if found is None:
+            raise Refused(f"there is no device {label!r}")
+        return found

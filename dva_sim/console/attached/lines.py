@@ -1,0 +1,176 @@
+"""Lines for pages about a system of which only messages are known; what is unknown is null."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from dva_sim.console.attached.told import ToldDevice
+from dva_sim.console.device_rows import link_of
+from dva_sim.console.feed import SEVERITIES
+from dva_sim.console.lag import LIMIT
+from dva_sim.console.scene import RULES, legend, site_of
+from dva_sim.console.strangers import UNKNOWN_ROBOT, row_of_stranger
+from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.protocol import messages as m
+from dva_sim.worlds.geo import GeoFrame
+from dva_sim.worlds.site import Site
+
+Line = dict[str, Any]
+AROUND: Final = 40.0  # of the first position, where no site is known [m]
+KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
+SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
+
+
+def things_of(devices: Iterable[ToldDevice], numbers: dict[str, int]) -> list[Line]:
+    """Everybody, with numbers that stay as they are."""
+    things = []
+    for told in devices:
+        device = told.device
+        kind = KINDS.get(device.device_type, "operator")
+        number = numbers.setdefault(device.id_tag, len(numbers))
+        more = UNKNOWN_ROBOT if kind == "robot" else {"radius_m": 0.25}
+        thing = {"i": number, "id": device.id_tag, "label": device.label, "kind": kind}
+        things.append(thing | (more if kind != "operator" else {}))
+    return things
+
+
+def scene_of_told(things: list[Line], address: str, site: Site | None, frame: GeoFrame) -> Line:
+    """The first line that a page gets."""
+    return {
+        "k": "scene",
+        "t": 0,
+        "scenario": f"DVA at {address}",
+        "title": f"What runs at the DVA at {address}",
+        "seed": None,
+        "attached": True,
+        "site": site_of(site) if site is not None else nowhere(frame),
+        "things": things,
+        "patterns": [],
+        "link": link(),
+        "link_limits": {},
+        "pace_limits": [1.0, 1.0],
+        "watchdog_s": None,
+        "stale_s": None,
+        "lag_limit_s": LIMIT,
+        "rules": RULES,
+        "legend": legend(()),
+        "dva_address": address,
+    }
+
+
+def nowhere(frame: GeoFrame) -> Line:
+    """A site of which nothing is known but where on earth it lies."""
+    origin = {"latitude_deg": frame.latitude, "longitude_deg": frame.longitude}
+    return {
+        "name": "unknown",
+        "extent_m": [-AROUND, -AROUND, AROUND, AROUND],
+        "origin": origin,
+        "features": {"type": "FeatureCollection", "features": []},
+        **{key: [] for key in ("rooms", "walls_m", "solids_m", "doors_m", "exits_m")},
+    }
+
+
+def link() -> Line:
+    """How messages travel."""
+    return {"kind": "attached", "processing_s": None}
+
+
+def positions(
+    devices: Mapping[str, ToldDevice], numbers: dict[str, int], frame: GeoFrame
+) -> list[list[int]]:
+    """Who has said where it is."""
+    rows = []
+    for id_tag, told in devices.items():
+        status = told.status
+        if status is None:
+            continue
+        x, y = frame.to_xy(status.position.latitude, status.position.longitude)
+        heading, speed = 0.0, 0.0
+        if isinstance(status, m.RobotStatus):
+            heading, speed = math.remainder(status.heading, 2.0 * math.pi), status.speed
+        whole = round(100 * x), round(100 * y), round(1000 * heading), round(1000 * speed)
+        rows.append([numbers[id_tag], *whole])
+    return rows
+
+
+def robot_row(told: ToldDevice, number: int, now: float) -> Line:
+    """A robot, as it says itself."""
+    status, holder = told.status, told.holder
+    known = status if isinstance(status, m.RobotStatus) else None
+    said, since = holder if holder is not None else (None, now)
+    held = said is not None and said.holder is not None
+    return row_of_stranger(
+        number,
+        known.mode if known is not None else "unknown",
+        holder=said.holder if said is not None else None,
+        holder_label=said.label if said is not None else None,
+        session_age_s=round(said.held_for + now - since, 1) if said and held else None,
+        camera=told.camera,
+        sensors=sensors_of(told),
+    )
+
+
+def sensors_of(told: ToldDevice) -> list[str]:
+    """What a device can measure, in words."""
+    return [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors]
+
+
+def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> Line:
+    """A device, as the DVA lists it and as it is heard here."""
+    device, status, said = told.device, told.status, told.holder
+    silent = now - told.listed > SILENT_AFTER
+    heard = None if told.heard is None else now - told.heard
+    doing = status.mode if isinstance(status, m.RobotStatus) else None
+    holder = said[0] if said is not None else None
+    return {
+        "id": device.id_tag,
+        "label": device.label,
+        "type": device.device_type,
+        "address": device.address,
+        "doing": status.activity if isinstance(status, m.PersonStatus) else doing,
+        "heard_s": None if heard is None else round(heard, 1),
+        "silent": silent,
+        "beats_hz": round(told.rate.of(told.beats, now), 2),
+        "link": None if is_fake or heard is None else link_of(heard, silent),
+        "fake": is_fake,
+        **dict.fromkeys(
+            ("round_trip_s", "commands_hz", "refused", "picture_age_s", "level", "ends_s")
+        ),
+        "holder": holder.holder if holder is not None else None,
+        "holder_label": (holder.label if holder is not None else None) or "",
+        "holder_known": holder is not None or device.device_type != ROBOT,
+        "revocable": may_revoke,
+        "camera": told.camera,
+        "sensors": sensors_of(told),
+    }
+
+
+def event_row(
+    status: m.EventStatus,
+    told_at: float,
+    labels: Mapping[str, str],
+    site: Site | None,
+    frame: GeoFrame,
+) -> Line:
+    """An event, as the DVA tells it."""
+    x, y = frame.to_xy(status.position.latitude, status.position.longitude)
+    sent = dict.fromkeys((status.responder, status.operator, status.actor))
+    over = status.closed_for is not None
+    return {
+        "number": status.event_id,
+        "kind": status.kind,
+        "x_m": round(x, 2),
+        "y_m": round(y, 2),
+        "latitude_deg": status.position.latitude,
+        "longitude_deg": status.position.longitude,
+        "room": site.room_at(x, y) if site is not None else "",
+        "severity": next(name for least, name in SEVERITIES if status.severity >= least),
+        "severity_value": round(status.severity, 2),
+        "state": status.event_state.replace("_", " "),
+        "over": over,
+        "since_ms": round(1000 * (told_at - status.state_for)),
+        "reported_ms": round(1000 * (told_at - status.age)),
+        "assigned": [] if over else [labels.get(i, i) for i in sent if i is not None],
+    }

@@ -1,0 +1,107 @@
+"""Where the DVA is that a console attaches to, and by which keys."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dva_sim.console.options import PageOptions
+from dva_sim.kernel.config_overrides import parse_changes
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.live.options import is_address
+from dva_sim.network.keys import KeyRing
+from dva_sim.network.sockets import split_address
+from dva_sim.simulation.full.stage import id_of, kind_of
+from dva_sim.simulation.scenario import build, load, site_of
+from dva_sim.worlds.site import Site
+
+ROOM = "control-room"
+FIRST_FREE = 1001  # numbers of control rooms that no scenario gives, for who has no key
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttachOptions(PageOptions):
+    """What to attach to, and where it is to be seen.
+
+    Attributes:
+        dva: Address of the DVA, `HOST:PORT`.
+        keys: Folder with the keys of the devices; None: without.
+        scenario: Whose site is drawn; None: no plan is known.
+        changes: Of the scenario, `KEY=VALUE`.
+    """
+
+    dva: str
+    keys: Path | None = None
+    scenario: str | None = None
+    changes: tuple[str, ...] = ()
+
+    @property
+    def listen(self) -> str:
+        """Address of this machine at which the DVA finds the console's own device."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as way:
+            try:
+                way.connect(split_address(self.dva))  # nothing is sent by that
+            except OSError:
+                return "127.0.0.1"
+            return str(way.getsockname()[0])
+
+    def check(self) -> None:
+        """Whether it can be.
+
+        Raises:
+            ConfigError: the address is none.
+        """
+        if not is_address(self.dva):
+            raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
+
+    def site(self) -> Site | None:
+        """What is known of the place.
+
+        Raises:
+            ConfigError: the scenario, or its site, cannot be read.
+        """
+        if self.scenario is None:
+            return None
+        scenario = build(load(self.scenario), parse_changes(self.changes))
+        return site_of(scenario, 1)
+
+    def ring(self) -> KeyRing | None:
+        """The keys, if there are to be any.
+
+        Raises:
+            ConfigError: they cannot be read.
+        """
+        return None if self.keys is None else KeyRing(self.keys)
+
+    def own_id(self, ring: KeyRing | None) -> str:
+        """The id of the console's own device: that of a key, or one that hardly anybody has.
+
+        Raises:
+            ConfigError: there is no secret key of a control room.
+        """
+        if ring is None:
+            return id_of(ROOM, FIRST_FREE + secrets.randbelow(0xFFFF - FIRST_FREE))
+        for device in ring.devices:
+            if kind_of(device)[0] == ROOM and (ring.folder / "secret").exists():
+                try:
+                    ring.pair(device)
+                except ConfigError:
+                    continue
+                return device
+        raise ConfigError(
+            f"no secret key of a control room; make one: dva-sim keys {ring.folder} {ROOM}-1",
+            ring.folder,
+        )
+
+
+def refuse_with_dva(given: Sequence[str]) -> None:
+    """Nothing runs in a console that is attached: what is about that cannot be wanted.
+
+    Raises:
+        ConfigError: something of it was given.
+    """
+    if given:
+        raise ConfigError(f"{given[0]} is not for --dva: what is shown runs elsewhere")

@@ -1,0 +1,120 @@
+"""What the messages of a system tell who listens: devices, and what each published last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from dva_sim.agents.device import HEARTBEAT, HOLDER, STATUS, AgentDevice
+from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.live.parts import Rate
+from dva_sim.network.messaging import Subscription
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+FORGET_AFTER: Final = 60.0  # without being on the list [s]
+TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER), GUARD: (HEARTBEAT, STATUS)}
+
+
+@dataclass
+class ToldDevice:
+    """A device, as far as messages tell.
+
+    Attributes:
+        device: As it stands on the list.
+        listed: When it last stood there [s].
+        heard: When it last published something; None: never [s].
+        status: What it published last about itself.
+        holder: Who holds it, by its own word, and when that came [s].
+        beats: Heartbeats heard.
+        camera: Where its pictures are.
+        sensors: What it can measure.
+    """
+
+    device: m.Device
+    listed: float
+    heard: float | None = None
+    status: m.RobotStatus | m.PersonStatus | None = None
+    holder: tuple[m.RobotHolder, float] | None = None
+    beats: int = 0
+    camera: str | None = None
+    sensors: tuple[m.Sensor, ...] = ()
+    rate: Rate = field(default_factory=Rate)
+    subscriptions: list[Subscription] = field(default_factory=list)
+
+
+class ToldSystem:
+    """All devices that the DVA lists, and what they publish.
+
+    Args:
+        device: Who listens.
+        on_news: Called when there is a device more, or one less.
+
+    Attributes:
+        devices: By id.
+    """
+
+    def __init__(self, device: AgentDevice, on_news: Callable[[], object]) -> None:
+        self._device, self._on_news = device, on_news
+        self.devices: dict[str, ToldDevice] = {}
+
+    @property
+    def _now(self) -> float:
+        return self._device.clock.now
+
+    def list(self, devices: tuple[m.Device, ...]) -> None:
+        """The DVA says who is there."""
+        before = {(i, told.device) for i, told in self.devices.items()}
+        for device in devices:
+            if device.id_tag != self._device.id_tag:
+                self._meet(device)
+        late = [i for i, told in self.devices.items() if self._now - told.listed > FORGET_AFTER]
+        for id_tag in late:
+            self._leave(self.devices.pop(id_tag))
+            self._device.forget(id_tag)
+        if {(i, told.device) for i, told in self.devices.items()} != before:
+            self._on_news()
+
+    def sensors(self, found: m.SensorList) -> None:
+        """The DVA says what the devices can show."""
+        for one in found.devices:
+            if (told := self.devices.get(one.device)) is not None:
+                told.camera, told.sensors = one.camera_url, one.sensors
+
+    def _meet(self, device: m.Device) -> None:
+        """Listen to a device, anew where it has moved."""
+        known = self.devices.get(device.id_tag)
+        if known is not None and known.device.address == device.address:
+            known.device, known.listed = device, self._now
+            return
+        if known is not None:
+            self._leave(known)
+        told = self.devices[device.id_tag] = known or ToldDevice(device, self._now)
+        told.device, told.listed = device, self._now
+        network, me, node = self._device.network, self._device.id_tag, device.id_tag
+        network.introduce(node, device.address)
+        for topic in TOPICS.get(device.device_type, (HEARTBEAT,)):
+            heard = self._hearing(told)
+            told.subscriptions.append(network.subscribe(me, node, topic, heard))
+
+    def _hearing(self, told: ToldDevice) -> Callable[[bytes], object]:
+        def heard(data: bytes) -> None:
+            message = self._device.read(data, told.device.id_tag)
+            if message is None:
+                return
+            told.heard, body = self._now, message.body
+            if isinstance(body, m.RobotStatus | m.PersonStatus):
+                told.status = body
+            elif isinstance(body, m.RobotHolder):
+                told.holder = body, self._now
+            elif isinstance(body, m.Heartbeat):
+                told.beats += 1
+
+        return heard
+
+    @staticmethod
+    def _leave(told: ToldDevice) -> None:
+        for subscription in told.subscriptions:
+            subscription.close()
+        told.subscriptions.clear()

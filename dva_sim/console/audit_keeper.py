@@ -1,0 +1,182 @@
+"""Rows for the audit log, written by a thread of its own: the world waits for no disk.
+
+Whoever asked for an action is told that it is done when its row is on the disk. While no row can
+be written, nothing new is begun (an emergency stop always is), and what waits is tried again.
+"""
+
+from __future__ import annotations
+
+import queue
+import socket
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.audit_log import (
+    BEGIN,
+    END,
+    SUFFIX,
+    AuditEntry,
+    AuditLog,
+    AuditRow,
+    AuditWriteError,
+)
+
+AGAIN: Final = 1.0  # after so long a full disk is tried again [s]
+MOST_AT_ONCE: Final = 500  # rows of a transaction
+MOST_WAITING: Final = 10_000  # rows that wait for a disk; more are counted, and told of in a row
+SYSTEM: Final = "console"  # author of the rows that no person is behind
+
+Then = Callable[[str], object]
+_Asked = tuple[AuditEntry | None, Then]
+
+
+def now_utc() -> str:
+    """The clock on the wall, to the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def check_target(path: Path) -> None:
+    """See whether an audit log can be kept there, before anything starts.
+
+    Raises:
+        ConfigError: its name does not say what it is, or its folder is not there.
+    """
+    if path.suffix.lower() != SUFFIX:
+        raise ConfigError(f"audit log should end in {SUFFIX}, not {path.name!r}")
+    if not path.parent.is_dir():
+        raise ConfigError(f"folder {str(path.parent)!r} for the audit log does not exist")
+    if path.is_dir():
+        raise ConfigError("is a folder; give the name of a file", path)
+
+
+class AuditKeeper:
+    """The audit log of one console.
+
+    Args:
+        path: A log that is there is gone on with; None: a file that is gone with the console.
+        now: Time of the run [s].
+        about: What is told of the run in its first row.
+
+    Attributes:
+        path: Of the file.
+        is_lasting: Whether it stays when the console has ended.
+        problem: Why nothing can be written now; empty if all is well.
+        head: The hash of the last row that is on the disk.
+        number: And its number.
+        on_rows: Told of each row that is.
+
+    Raises:
+        ConfigError: the file cannot be used, or its chain is broken.
+    """
+
+    def __init__(
+        self, path: Path | None, now: Callable[[], float], about: Mapping[str, Any]
+    ) -> None:
+        self._folder = TemporaryDirectory(prefix="dva-sim-audit-") if path is None else None
+        folder = self._folder and Path(self._folder.name)
+        self.path = folder / f"audit{SUFFIX}" if folder else path or Path()
+        self.is_lasting = path is not None
+        self._now, self.problem, self._lost = now, "", 0
+        self._log = AuditLog(self.path)
+        self.number, self.head = self._log.number, self._log.head
+        self.on_rows: Callable[[Sequence[AuditRow]], object] = lambda _: None
+        self._asked: queue.SimpleQueue[_Asked | None] = queue.SimpleQueue()
+        self._done: deque[tuple[Sequence[AuditRow], Sequence[Then], str]] = deque()
+        self._hears, self._wakes = socket.socketpair()
+        self._hears.setblocking(False)
+        self._wakes.setblocking(False)
+        self._thread = threading.Thread(target=self._write, daemon=True)
+        self._thread.start()
+        self.put(self.entry(BEGIN, details=about))
+
+    def entry(self, action: str, author: str = SYSTEM, **more: Any) -> AuditEntry:
+        """What happens now."""
+        now = round(self._now(), 6)
+        return AuditEntry(time_s=now, at_utc=now_utc(), author=author, action=action, **more)
+
+    def put(self, entry: AuditEntry, then: Then = lambda _: None) -> None:
+        """Keep a row; `then` is told when it is on the disk, or why it is not yet."""
+        if self._asked.qsize() >= MOST_WAITING:
+            self._lost += 1
+            then("the audit log cannot be written, and too much waits for it already")
+            return
+        self._asked.put((entry, then))
+
+    def when_safe(self, then: Then) -> None:
+        """`then` is told when all that was put so far is on the disk, or why it is not yet."""
+        self._asked.put((None, then))
+
+    # --- in the world's thread ------------------------------------------------------------------
+
+    def fileno(self) -> int:
+        """Can be read when there is something for `take`."""
+        return self._hears.fileno()
+
+    def take(self) -> None:
+        """Tell whoever waits for rows that are on the disk by now, or are not."""
+        with suppress(BlockingIOError):
+            self._hears.recv(4096)
+        while self._done:
+            rows, waiting, self.problem = self._done.popleft()
+            if rows:
+                self.number, self.head = rows[-1].number, rows[-1].hash
+                self.on_rows(rows)
+            for then in waiting:
+                then(self.problem)
+
+    def close(self) -> None:
+        """Write the last row; what can still not be written is lost."""
+        if not self._thread.is_alive():
+            return
+        lost = f"rows that found no room: {self._lost}" if self._lost else ""
+        self.put(self.entry(END, text=lost))
+        self._asked.put(None)
+        self._thread.join()
+        self.take()
+        self._log.close()
+        self._hears.close()
+        self._wakes.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    # --- in its own -----------------------------------------------------------------------------
+
+    def _write(self) -> None:
+        """Write what is asked for, in its order, until the end is."""
+        waiting, is_over = list[AuditEntry](), False
+        while not is_over:
+            new, is_over = self._next(bool(waiting))
+            waiting += [entry for entry, _ in new if entry is not None]
+            rows, problem = list[AuditRow](), ""
+            try:
+                rows = self._log.append(waiting) if waiting else rows
+                waiting = []
+            except AuditWriteError as error:
+                problem = str(error)
+            if rows or new or problem != self.problem:
+                self._tell(rows, [then for _, then in new], problem)
+
+    def _next(self, is_behind: bool) -> tuple[list[_Asked], bool]:
+        """What was asked for meanwhile, and whether that was all; a while is waited for more."""
+        found = list[_Asked]()
+        with suppress(queue.Empty):
+            asked = self._asked.get(timeout=AGAIN if is_behind else None)
+            while asked is not None:
+                found.append(asked)
+                if len(found) >= MOST_AT_ONCE:
+                    return found, False
+                asked = self._asked.get_nowait()
+            return found, True
+        return found, False
+
+    def _tell(self, rows: Sequence[AuditRow], waiting: Sequence[Then], problem: str) -> None:
+        self._done.append((rows, waiting, problem))
+        with suppress(BlockingIOError):  # then it is awake already
+            self._wakes.send(b"!")

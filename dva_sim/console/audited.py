@@ -1,0 +1,141 @@
+"""Rows of the audit log: what people ask for at pages, and what the DVA says that it decided.
+
+An answer to a page waits until its row is on the disk. Whatever only stops something never waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.core.audit import Fact
+from dva_sim.protocol import messages as m
+from dva_sim.recordings.audit_log import AuditEntry
+
+Line = dict[str, Any]
+
+# What people do beside the DVA's decisions, which tells of its own.
+ACTIONS: Final = frozenset(
+    [
+        *("take", "release", "start", "stop", "emergency", "link", "pattern", "pace"),
+        *("confirm", "refute", "decline", "take_over", "mission"),
+        *("phone_register", "phone_permission", "guard_join", "guard_leave", "guard_answer"),
+        *("guard_say", "guard_report", "room_join"),
+        *("alarm_acknowledge", "alarm_shelve", "alarm_unshelve"),
+        *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
+    ]
+)
+DECISIONS: Final = frozenset(
+    [
+        *("event_raise", "event_acknowledge", "event_assign", "event_take_off"),
+        *("event_false_alarm", "event_escalate", "event_note", "dispatch_mode"),
+    ]
+)
+STOPS: Final = frozenset(["stop", "emergency", "release", "guard_leave"])
+_HEAD: Final = frozenset(["id", "do", "client", "role", "robots", "robot", "event", "reason"])
+SECRET: Final = frozenset(["server", "port"])
+
+
+class Audited:
+    """Keeps the audit log of a console.
+
+    Args:
+        keeper: Of the file.
+        author: What the person of a page is called.
+        label: The name of a device, by its id.
+    """
+
+    def __init__(
+        self,
+        keeper: AuditKeeper,
+        author: Callable[[str], str],
+        label: Callable[[str], str],
+    ) -> None:
+        self.keeper = keeper
+        self._author, self._label = author, label
+
+    def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
+        """Whoever takes the answer to an action, once that is in the log.
+
+        Raises:
+            Refused: the log cannot be written, and the action stops nothing.
+        """
+        if what not in ACTIONS | DECISIONS:
+            return said
+        if self.keeper.problem and what not in STOPS:
+            raise Refused(f"{self.keeper.problem}; nothing is done until it can be")
+
+        def told(ok: bool, text: str, /, **more: Any) -> None:
+            if what in ACTIONS:
+                self._note(what, client, line, ok, text)
+            if what in STOPS:
+                said(ok, text, **more)
+                return
+
+            def safe(problem: str) -> None:
+                if problem:
+                    said(False, f"{text}; but {problem}", **more)
+                else:
+                    said(ok, text, **more)
+
+            self.keeper.when_safe(safe)
+
+        return told
+
+    def _note(self, what: str, client: str, line: Line, ok: bool, text: str) -> None:
+        robots = line.get("robots") or ([line["robot"]] if "robot" in line else [])
+        named = robots if isinstance(robots, str) else ", ".join(map(str, robots))
+        details = {k: v for k, v in line.items() if k not in _HEAD | SECRET}
+        self.keeper.put(
+            self.keeper.entry(
+                what.replace("_", " "),
+                self._author(client),
+                role=str(line.get("role", "")),
+                event=line.get("event"),
+                subject=self._label(named),
+                cause=str(line.get("reason", "")),
+                outcome="done" if ok else "refused",
+                text=text,
+                details=details,
+            )
+        )
+
+    def decided(self, fact: Fact) -> None:
+        """Keep what the DVA, or somebody at it, has decided."""
+        self.keeper.put(self._entry(fact))
+
+    def _entry(self, fact: Fact) -> AuditEntry:
+        ok = fact.code == m.OK
+        told: Line = {
+            "task": fact.task,
+            "mode": fact.mode,
+            "operator": fact.operator and self._label(fact.operator),
+            "arrival_s": fact.arrival_in,
+            "waited_s": fact.waited,
+        }
+        details: Line = {key: _short(value) for key, value in told.items() if value is not None}
+        if fact.action == "assign":
+            details["advised"] = fact.advised and self._label(fact.advised)
+            details["advised_s"] = _short(fact.advised_in)
+        if not ok:
+            details["code"] = fact.code
+        said = (fact.text, fact.outcome)
+        return self.keeper.entry(
+            fact.action.replace("_", " "),
+            fact.label,
+            device=fact.author,
+            role=fact.role or "",
+            event=fact.event,
+            subject=(fact.device and self._label(fact.device)) or "",
+            cause=fact.cause,
+            outcome="done" if ok else "refused",
+            text=": ".join(text for text in said if text),
+            details=details,
+        )
+
+
+def _short(value: Any) -> Any:
+    """A time to the millisecond; all else as it is."""
+    return round(value, 3) if isinstance(value, float) else value

@@ -1,0 +1,144 @@
+"""What people decide about events, as messages: pure, for any console and any control room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from dva_sim.agents.people.person_guard import SEVERITIES
+from dva_sim.core.candidates import FREE
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+CERTAIN: Final = 0.9  # of what somebody in a control room reports
+DECISIONS: Final = (
+    *("event_acknowledge", "event_assign", "event_take_off", "event_false_alarm"),
+    *("event_escalate", "event_note", "event_proposal", "dispatch_mode"),
+)
+
+
+def decision_of(
+    line: Line, device: Callable[[str], str], seen: Callable[[int], int | None]
+) -> tuple[m.Body, str]:
+    """The message that a line of a page asks for, and what is told if it is done.
+
+    Args:
+        line: As the web process has checked it.
+        device: Gives the id of a label.
+        seen: How many decisions on an event are known, where the page does not say so.
+    """
+    number, reason = line.get("event", 0), line.get("reason") or None
+    label = str(line.get("device", ""))
+
+    def known() -> int | None:
+        given: int | None = line.get("decisions")
+        return seen(number) if given is None else given
+
+    match line["do"]:
+        case "event_acknowledge":
+            return m.Acknowledge(number), f"event {number} is acknowledged"
+        case "event_assign":
+            told = f"{label} is sent to event {number}"
+            task = line.get("task")
+            return m.Assign(number, device(label), None, task, reason, known()), told
+        case "event_take_off":
+            told = f"{label} is called off event {number}"
+            return m.TakeOff(number, device(label), reason, known()), told
+        case "event_false_alarm":
+            return m.FalseAlarm(number, reason or "", known()), f"event {number} is a false alarm"
+        case "event_escalate":
+            return m.Escalate(number, reason, known()), f"event {number} is escalated"
+        case "event_note":
+            return m.AddNote(number, str(line["text"])), f"noted at event {number}"
+        case "event_proposal":
+            return m.GetProposal(number), ""
+    mode = str(line["mode"])
+    asks = "the policy asks first" if mode == "ask_first" else "the policy decides by itself"
+    return m.SetDispatch(mode, reason), asks
+
+
+def report_of(line: Line, place: m.Position) -> tuple[m.EventReport, str]:
+    """The report of an event that somebody at a page raises, and what is told if it is done."""
+    kind, severity = str(line["kind"]), SEVERITIES[line["severity"]]
+    report = m.EventReport(None, kind, place, severity, CERTAIN, "detected")
+    return report, f"{kind.replace('_', ' ')} is raised"
+
+
+def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Line:
+    """What a page is told of a reply beside that it is done: a proposal with its reasons."""
+    proposal = reply.content
+    if not isinstance(proposal, m.Proposal):
+        return {}
+    label = next((c.label for c in proposal.candidates if c.device == proposal.device), "")
+    return {
+        "proposal": {
+            "event": proposal.event_id,
+            "policy": proposal.policy,
+            "reason": proposal.reason,
+            "task": proposal.task,
+            "label": label,
+            "arrival_s": proposal.arrival_in,
+            "decide_within_s": proposal.decide_within,
+            "candidates": [_candidate(each, is_robot) for each in proposal.candidates],
+        }
+    }
+
+
+def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> Line:
+    return {
+        "label": who.label,
+        "robot": is_robot(who.device),
+        "can": who.arrival_in is not None,
+        "free": who.arrival_in is not None and who.reason == FREE,
+        "reason": who.reason,
+        "arrival_s": who.arrival_in,
+    }
+
+
+def about_event(events: Mapping[int, m.EventStatus], at: Mapping[int, float], number: int) -> Line:
+    """What a page is told of an event beside what everybody sees.
+
+    Args:
+        events: As the DVA has told of them.
+        at: When that was [s].
+        number: Of the event.
+    """
+    status = events.get(number)
+    if status is None:
+        return {"decisions": None, "acknowledged": None, "decided": None, "note": None}
+    last = status.last_decision
+    decided = last and {
+        "label": last.label,
+        "action": last.action,
+        "at_ms": moment_ms(at[number] - last.ago),
+        "reason": last.reason or "",
+    }
+    return {
+        "decisions": status.decisions,
+        "acknowledged": by_whom(status.acknowledged, at[number]),
+        "decided": decided,
+        "note": status.note,
+    }
+
+
+def dispatch_line(status: m.DispatchStatus | None, at: float) -> Line | None:
+    """How orders are given, as the DVA has said at a time [s]."""
+    if status is None:
+        return None
+    by = status.switched and {"label": status.switched.label, "at_ms": moment_ms(at)}
+    return {
+        "mode": status.dispatch_mode,
+        "decide_within_s": status.decide_within,
+        "switched": by,
+    }
+
+
+def moment_ms(seconds: float) -> int:
+    """To the tenth of a second: what is said twice of the same moment is the same."""
+    return 100 * round(10 * seconds)
+
+
+def by_whom(whom: m.ByWhom | None, at: float) -> Line | None:
+    """Who did something, and when."""
+    return None if whom is None else {"label": whom.label, "at_ms": moment_ms(at - whom.ago)}

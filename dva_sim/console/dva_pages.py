@@ -1,0 +1,121 @@
+"""What the pages Main and Devices show of the DVA, and what people may do there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.console.device_rows import DeviceRows
+from dva_sim.console.dva_port import DvaPort
+from dva_sim.console.fake_devices import NOWHERE, FakeDevices
+from dva_sim.console.real_links import ConsoleSockets
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, address_of, id_of
+
+Line = dict[str, Any]
+
+
+class DvaPages:
+    """The DVA of a run as people see and serve it.
+
+    Args:
+        run: Whose.
+        address: Where the DVA listens, or is said to.
+        sockets: What carries messages, if the links are real.
+        moved: Called when the DVA listens elsewhere.
+
+    Attributes:
+        port: Where it listens.
+        doers: What pages may ask for, by its name.
+        looked: Whether somebody looks at the table of devices.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        address: str,
+        sockets: ConsoleSockets | None,
+        moved: Callable[[str], object],
+    ) -> None:
+        self._run, self._is_real, self._moved = run, sockets is not None, moved
+        self.port = DvaPort(run, run.recorder, address, sockets)
+        self.looked = False
+        self._rows = DeviceRows(run)
+        entries = run.dva.desk.registry.entries
+        self._fakes = FakeDevices(
+            self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
+        )
+        self.doers: Mapping[str, Callable[[str, Line, Said], object]] = {
+            "server_start": self._start,
+            "server_stop": self._stop,
+            "revoke": self._revoke,
+            "fake_add": lambda _, line, said: self._fakes.add(line, said),
+            "fake_remove": self._remove,
+        }
+
+    def devices(self, now_ms: int) -> Line | None:
+        """The table, once a second; None if nobody looks."""
+        if not self.looked:
+            return None
+        rows = self._rows.rows(self._fakes.devices)
+        return {"k": "devices", "t": now_ms, "devices": rows}
+
+    def _start(self, _: str, line: Line, said: Said) -> None:
+        port = line.get("port")
+        if not isinstance(port, int) or not 1 <= port <= 65_534:
+            raise Refused("port should be a whole number from 1 to 65534")
+        self.port.start(port)
+        self._moved(self.port.address)
+        said(True, f"the server listens on {self.port.address}")
+
+    def _stop(self, _: str, __: Line, said: Said) -> None:
+        self.port.stop()
+        said(True, "the server is stopped")
+
+    def _revoke(self, _: str, line: Line, said: Said) -> None:
+        robot = line.get("device")
+        grant = self._run.dva.desk.sessions.permissions.grants.get(str(robot))
+        if grant is None:
+            raise Refused(f"nobody has a permission for {robot}")
+        self._run.dva.revoke(grant.robot, None, holder_told=True)
+        labels = self._run.stage.labels
+        holder = labels.get(grant.holder, grant.holder)
+        said(
+            True, f"{holder} has no permission for {labels.get(grant.robot, grant.robot)} any more"
+        )
+
+    def _remove(self, _: str, line: Line, said: Said) -> None:
+        said(True, f"{self._fakes.remove(line.get('device'))} is removed")
+
+    # --- fake devices ----------------------------------------------------------------------
+
+    def _make(self, id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
+        stage, dva = self._run.stage, self._run.dva.device
+        device = AgentDevice(
+            id_tag=id_tag,
+            label=label,
+            device_type=kind,
+            address=address,
+            dva=DVA,
+            network=stage.network,
+            recorder=stage.recorder,
+            frame=stage.site.frame,
+            timeout=dva.timeout,
+            attempts=dva.attempts,
+            labels=stage.labels,
+            time_of_day=stage.time_of_day,
+        )
+        stage.devices.append(device)
+        return device
+
+    def _identity(self, number: int) -> tuple[str, str]:
+        nowhere = NOWHERE.format(number % 250 + 1)
+        return id_of("fake", number), nowhere if self._is_real else address_of("fake", number)
+
+    def _dismiss(self, id_tag: str) -> None:
+        stage = self._run.stage
+        stage.devices[:] = [d for d in stage.devices if d.id_tag != id_tag]
+        stage.labels.pop(id_tag, None)
+        self._run.dva.dismiss(id_tag)

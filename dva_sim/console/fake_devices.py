@@ -1,0 +1,134 @@
+"""Devices that are not there: registered by hand, on every list, and deaf to whoever contacts them.
+
+They register as others do, by messages, and register again before the DVA could miss them; nothing
+on the wire tells them from others. Nobody takes the requests to them, so that whoever asks one has
+a time-out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any, Final
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.protocol.limits import pattern
+
+RENEW: Final = 3.0  # from one registration to the next: a third of what the DVA bears [s]
+MOST: Final = 64
+NOWHERE: Final = "192.0.2.{}"  # addresses that belong to nobody (RFC 5737)
+TYPES: Final = ("Robot", "Guard", "TeleOp", "Remote Control")
+
+MakeDevice = Callable[[str, str, str, str], AgentDevice]
+
+
+class FakeDevices:
+    """All that were added by hand.
+
+    Args:
+        make: Makes a device of an id, a label, a type and an address.
+        is_known: Whether there is a device of an id already.
+        id_of: Gives the id of the n-th fake device, and an address at which nobody is, from 1.
+        dismiss: Forgets a device, and makes the DVA forget it where it can be made to.
+
+    Attributes:
+        devices: By id.
+    """
+
+    def __init__(
+        self,
+        make: MakeDevice,
+        is_known: Callable[[str], bool],
+        id_of: Callable[[int], tuple[str, str]],
+        dismiss: Callable[[str], object],
+    ) -> None:
+        self._make, self._is_known, self._id_of, self._dismiss = make, is_known, id_of, dismiss
+        self.devices: dict[str, AgentDevice] = {}
+
+    def add(self, line: dict[str, Any], said: Said) -> None:
+        """Add one; `said` hears whether the DVA has taken it.
+
+        Raises:
+            Refused: it cannot be.
+        """
+        kind = line.get("type")
+        if kind not in TYPES:
+            raise Refused(f"type should be one of {', '.join(TYPES)}")
+        if len(self.devices) >= MOST:
+            raise Refused(f"there are {MOST} fake devices already: remove one first")
+        id_tag, address = self._identity(line)
+        device = self._make(id_tag, str(line.get("label", "")), str(kind), address)
+        self.devices[id_tag] = device
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code == m.OK:
+                device.clock.every(RENEW, lambda: self._renew(device))
+                said(True, f"{device.label} is registered as {id_tag}", device=id_tag)
+            else:
+                self._drop(device)
+                said(False, f"the DVA refuses it: {reply.text or m.CODE_NAMES[reply.code]}")
+
+        def failed() -> None:
+            self._drop(device)
+            said(False, "the DVA does not answer")
+
+        try:
+            device.ask(device.dva, _registration(device), answered, failed)
+        except ProtocolError as error:
+            self._drop(device)
+            raise Refused(error.reason) from None
+
+    def remove(self, id_tag: Any) -> str:
+        """Remove one; its label.
+
+        Raises:
+            Refused: there is none of that id.
+        """
+        device = self.devices.get(id_tag)
+        if device is None:
+            raise Refused(f"no fake device is called {id_tag}")
+        self._drop(device)
+        return device.label
+
+    def _drop(self, device: AgentDevice) -> None:
+        self.devices.pop(device.id_tag, None)
+        device.leave()
+        self._dismiss(device.id_tag)
+
+    def _renew(self, device: AgentDevice) -> bool:
+        here = self.devices.get(device.id_tag) is device
+        if here:
+            device.ask(device.dva, _registration(device), lambda _: self._renewed(device))
+        return here
+
+    def _renewed(self, device: AgentDevice) -> None:
+        """What was under way when a device was removed must not bring it back."""
+        if device.id_tag not in self.devices:
+            self._dismiss(device.id_tag)
+
+    def _identity(self, line: dict[str, Any]) -> tuple[str, str]:
+        """Id and address, made where they were not given.
+
+        Raises:
+            Refused: the id is taken, or is none.
+        """
+        wanted = str(line.get("id_tag") or "").strip().upper()
+        number = next(n for n in range(1, 1 << 16) if not self._is_taken(self._id_of(n)[0]))
+        own, address = self._id_of(number)
+        if wanted and not re.fullmatch(pattern("DeviceID"), wanted):
+            raise Refused(
+                "id should be six pairs of digits 0 to 9 and letters A to F, as in " + own
+            )
+        if wanted and self._is_taken(wanted):
+            raise Refused(f"id {wanted} is taken")
+        return wanted or own, str(line.get("address") or "").strip() or address
+
+    def _is_taken(self, id_tag: str) -> bool:
+        return id_tag in self.devices or self._is_known(id_tag)
+
+
+def _registration(device: AgentDevice) -> m.Registration:
+    return m.Registration(device.label, device.device_type, device.address)

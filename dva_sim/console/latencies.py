@@ -1,0 +1,36 @@
+"""How late messages are: the last one, the median, what 95 of 100 stay below, and the largest."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import Any
+
+KEPT = 1000  # of the newest times
+
+
+class Latencies:
+    """Times of one kind [s]; only the newest are kept."""
+
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=KEPT)
+        self._count = 0
+
+    def add(self, seconds: float) -> None:
+        """Another one."""
+        self._times.append(seconds)
+        self._count += 1
+
+    def line(self) -> dict[str, Any] | None:
+        """The figures in milliseconds, of the newest `KEPT`; None without any."""
+        if not self._times:
+            return None
+        ordered = sorted(self._times)
+        last = len(ordered) - 1
+        figures = {
+            "last_ms": self._times[-1],
+            "median_ms": 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]),
+            "p95_ms": ordered[max(0, math.ceil(0.95 * len(ordered)) - 1)],
+            "largest_ms": ordered[-1],
+        }
+        return {name: round(1000 * s, 1) for name, s in figures.items()} | {"count": self._count}

@@ -1,0 +1,294 @@
+"""Plays a recording to pages: its time goes on, faster or slower, stands, or jumps.
+
+All who look see the same moment. Nothing that a page asks for reaches anybody: there is nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from dva_sim.console.replay.exchanges import ExchangeLog
+from dva_sim.console.replay.recorded_run import RecordedRun
+from dva_sim.console.replay.shelf import Shelf
+from dva_sim.console.seats import Answers
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.network.realtime import FASTEST, PacedClock
+from dva_sim.recordings.reading import read_recording
+from dva_sim.recordings.writing import pack
+
+Line = dict[str, Any]
+SLOWEST = 0.1  # that a recording is played, as a multiple of real time
+POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = (
+    0.1,
+    0.25,
+    1.0,
+    0.1,
+    0.2,
+)  # from one line to the next, real time [s]
+NOBODY = "this is a recording: there is nobody who could be told to do anything"
+
+
+class Player:
+    """A recording that is being played.
+
+    Args:
+        run: What is played; None until one is taken from the shelf.
+        shelf: Others that can be played instead.
+        clock: Of whoever looks; the recording's own time follows it.
+
+    Attributes:
+        tell: Takes lines for pages, and a key for those of which the newest counts.
+        show: Takes lines for whoever draws pictures, likewise.
+    """
+
+    def __init__(
+        self, run: RecordedRun | None, shelf: Shelf | None = None, clock: PacedClock | None = None
+    ) -> None:
+        self.run, self.shelf = run, shelf
+        self.clock = clock or PacedClock()
+        self.tell: Callable[..., object] = lambda *_: None
+        self.show: Callable[..., object] = lambda *_: None
+        self.dropped: Callable[[], int] = lambda: 0
+        self._offset, self._jumps, self._frames = 0.0, 0, 0
+        self._watched: set[str] = set()
+        self._logs: dict[str, ExchangeLog] = {}
+        self._told: dict[str, int] = {}  # exchanges of each log that somebody looks at
+        self._answers = Answers()
+        self._site: TemporaryDirectory[str] | None = None
+        self._doers: dict[str, Callable[[Line], str]] = {
+            "pace": self._pace,
+            "seek": self._seek,
+            "open_recording": self._open,
+        }
+
+    @property
+    def now(self) -> float:
+        """The moment that is shown, in the recording's time [s]."""
+        return min(max(0.0, self._offset + self.clock.now), self._duration)
+
+    @property
+    def _duration(self) -> float:
+        return 0.0 if self.run is None else self.run.duration
+
+    # --- what a console shows: see `ConsoleSubject` ------------------------------------------
+
+    def serve_cameras(self, base: str) -> None:
+        """See `ConsoleSubject`: pages know by the robots' labels."""
+
+    def begin(self) -> None:
+        """See `ConsoleSubject`."""
+        self._tell_scene()
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(ROWS, self._tell_rows)
+        self.clock.pulse(HAZARDS, self._tell_hazards)
+        self.clock.pulse(FRAMES, self._show_frames)
+        self.clock.pulse(LOGS, self._tell_logs)
+
+    def show_scene(self) -> None:
+        """See `ConsoleSubject`: the site is the one in the file, whatever became of it since."""
+        run = self.run
+        if run is None or not run.is_drawn:
+            return
+        site = self._site_files(run)
+        named = run.playback.scenario.site.model_copy(
+            update={"name" if run.playback.site.rooms else "map": str(site), "options": {}}
+        )
+        scenario = run.playback.scenario.model_copy(update={"site": named})
+        told = scenario.model_dump(mode="json")
+        self.show({"k": "scene", "t": 0, "scenario": told, "seed": run.playback.seed})
+        for number, when in run.playback.contained.items():
+            self.show({"k": "contain", "t": round(1000 * when), "n": number})
+
+    def note(self, text: str) -> None:
+        """See `ConsoleSubject`."""
+        self.tell({"k": "pictures", "t": round(1000 * self.now), "ok": False, "text": text})
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        if self._site is not None:
+            self._site.cleanup()
+            self._site = None
+
+    def _site_files(self, run: RecordedRun) -> Path:
+        """Where the site of a recording lies as files, as long as it is played."""
+        self.close()
+        self._site = TemporaryDirectory(prefix="dva-sim-")
+        folder, files = Path(self._site.name), pack(run.playback.site)
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
+        return folder / next(name for name in files if name.endswith(".yaml"))
+
+    # --- what is told ----------------------------------------------------------------------
+
+    def _tell_scene(self) -> None:
+        if self.run is None:
+            self.tell(self._empty_scene())
+        else:
+            self.tell(self.run.scene())
+            self.show_scene()
+            if not self.run.is_drawn:
+                self.note("no pictures: a hazard of this run has a class that is not loaded")
+        if self.shelf is not None:
+            self.tell(self.shelf.line())
+        self.tell_now()
+
+    def _empty_scene(self) -> Line:
+        """A console where nothing is played yet."""
+        return {"k": "scene", "t": 0, "things": [], "replay": None, "shelf": True}
+
+    def tell_now(self) -> None:
+        """Tell everything about the moment."""
+        self._tell_rows()
+        self._tell_positions()
+        self._tell_hazards()
+
+    def _tell_positions(self) -> None:
+        if self.run is not None:
+            self.tell(self.run.positions(self.now), "")
+
+    def _tell_rows(self) -> None:
+        run, now = self.run, self.now
+        if run is None:
+            return
+        if now >= run.duration and not self.clock.paused:
+            self.clock.pace(paused=True)
+        rows = {
+            "k": "rows",
+            "t": round(1000 * now),
+            "clock": self._clock_line(),
+            "link": None,
+            "dropped": self.dropped(),
+            "robots": run.robots(now),
+            "people": run.people(now),
+            "order": None,
+        }
+        self.tell(rows)
+        self.tell(run.events(now))
+        self.tell(run.story(now))
+        for robot in self._watched:
+            self.tell(run.window(robot, now))
+
+    def _clock_line(self) -> Line:
+        return {
+            "factor": self.clock.factor,
+            "paused": self.clock.paused,
+            "lag_s": 0.0,
+            "given_up_s": 0.0,
+            "held_by_lag": False,
+            "jumps": self._jumps,
+        }
+
+    def _tell_hazards(self) -> None:
+        if self.run is not None:
+            self.tell(self.run.hazards(self.now))
+
+    def _show_frames(self) -> None:
+        run = self.run
+        for robot in self._watched if run is not None else ():
+            frame = run.frame(robot, self.now) if run is not None else None
+            if frame is not None:
+                self._frames += 1
+                self.show(frame | {"number": self._frames}, frame["robot"])
+
+    def _tell_logs(self) -> None:
+        """What was asked and answered since the last time; after a jump, all of it anew."""
+        run, now = self.run, self.now
+        for name, told in self._told.items() if run is not None else ():
+            log, anew = self._log(name), told < 0
+            end = log.until(now)
+            lines = log.batches(name, max(0, told), end)
+            if anew and not lines:
+                lines = [{"k": "log", "log": name, "lines": []}]
+            for number, line in enumerate(lines):
+                self.tell(line | ({"anew": True} if anew and number == 0 else {}))
+            self._told[name] = end
+
+    def _log(self, name: str) -> ExchangeLog:
+        assert self.run is not None
+        if name not in self._logs:
+            playback = self.run.playback
+            node = next((i for i, label in playback.labels.items() if label == name), name)
+            self._logs[name] = ExchangeLog(playback.recorder.traffic or (), node)
+        return self._logs[name]
+
+    def _look(self, logs: Any) -> None:
+        """Pages look at these logs; those that are new to them are told from the beginning."""
+        names = list(logs) if isinstance(logs, dict) else []
+        self._told = {str(name): self._told.get(str(name), -1) for name in names}
+        self._tell_logs()
+
+    # --- what is asked for -----------------------------------------------------------------
+
+    def take(self, line: Line) -> None:
+        """Do what a page asks for, once; what would tell somebody something is refused."""
+        what, number = line.get("do"), line.get("id")
+        if what == "watch":
+            self._watch(line.get("robots"))
+        elif what == "look":
+            self._look(line.get("logs"))
+        if not isinstance(number, str):
+            return
+        if self._answers.begin(number):
+            self._answers.end(number, self._answer(number, str(what), line))
+        if (answer := self._answers.given[number]) is not None:
+            self.tell({**answer, "t": round(1000 * self.now)})
+
+    def _answer(self, number: str, what: str, line: Line) -> Line:
+        do = self._doers.get(what)
+        ok, text = False, NOBODY
+        if do is not None:
+            try:
+                ok, text = True, do(line)
+            except (ValueError, DvaSimError) as error:
+                text = str(error)
+        return {"k": "done", "id": number, "ok": ok, "text": text}
+
+    def _pace(self, line: Line) -> str:
+        factor, paused = line.get("factor"), line.get("paused")
+        if factor is not None and not SLOWEST <= factor <= FASTEST:
+            raise ValueError(f"factor should be a number from {SLOWEST:g} to {FASTEST:g}")
+        if paused is False and self.now >= self._duration:
+            self._go_to(0.0)
+        self.clock.pace(factor, paused)
+        self.tell_now()
+        return "it stands" if self.clock.paused else f"{self.clock.factor:g} times real time"
+
+    def _seek(self, line: Line) -> str:
+        self._go_to(line["t_ms"] / 1000)
+        self.tell_now()
+        return f"at {self.now:.1f} s"
+
+    def _go_to(self, time: float) -> None:
+        self._offset = min(max(0.0, time), self._duration) - self.clock.now
+        self._jumps += 1
+        self._told = dict.fromkeys(self._told, -1)
+
+    def _open(self, line: Line) -> str:
+        if self.shelf is None:
+            raise ValueError("there are no other recordings")
+        path = self.shelf.find(str(line.get("name")))
+        self.run = RecordedRun(read_recording(path), path.name)
+        self._watched.clear()
+        self._logs.clear()
+        self._go_to(0.0)
+        self.clock.pace(paused=False)
+        self._tell_scene()
+        return f"{path.name} is played"
+
+    def _watch(self, robots: Any) -> None:
+        numbers = robots if isinstance(robots, list) else []
+        things = () if self.run is None else self.run.things
+        self._watched = {t["id"] for t in things if t["i"] in numbers and t["kind"] == "robot"}
+
+
+@contextmanager
+def playing(player: Player) -> Iterator[Player]:
+    """A player that leaves nothing behind."""
+    try:
+        yield player
+    finally:
+        player.close()

@@ -1,0 +1,290 @@
+"""What pages are told of a recorded run at any moment of it, in the lines of a world that runs.
+
+What a recording does not hold, such as the charge of a battery, is not guessed: it is null.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from typing import Any
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.feed import event_line
+from dva_sim.console.fields import HazardFeed
+from dva_sim.console.replay.moments import (
+    ROUNDED,
+    RecordedTracks,
+    captured_at,
+    commands_hz,
+    event_at,
+    set_point,
+)
+from dva_sim.console.replay.robot_lines import RobotLines, about
+from dva_sim.console.scene import scene_of
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.recordings.reading import Opened, RecordedHazard
+from dva_sim.simulation.scenario import robot_profiles
+
+Line = dict[str, Any]
+TURNING = 0.25  # over which a turn rate is measured [s]
+STORY_KEPT = 200  # lines of the story up to a moment
+MOST_MARKS = 400  # moments to jump to
+MARKED = ("event", "drive", "safety", "order")  # kinds of moments that are worth a jump
+
+
+class RecordedRun:
+    """A recording, by moments of its time [s].
+
+    Args:
+        opened: The recording.
+        name: What it is called on the page.
+
+    Attributes:
+        playback: What can be told and shown of the run.
+        things: Everybody, with the number that lines call them by.
+        numbers: Those numbers, by id and by label.
+        duration: How long it lasts [s].
+        tracks: Where everybody was.
+    """
+
+    def __init__(self, opened: Opened, name: str) -> None:
+        self.playback = playback = opened.playback
+        self.name, self.is_whole = name, opened.is_whole
+        self.duration = playback.duration
+        self.things: list[Line] = []
+        self.numbers: dict[str, int] = {}
+        self._number_all()
+        self.tracks = RecordedTracks(playback.recorder.tracks, playback.duration)
+        self._moments = [moment.time for moment in playback.recorder.timeline]
+        self._drives: dict[str, list[DriveLog]] = {}
+        for drive in playback.recorder.drives:
+            self._drives.setdefault(drive.robot, []).append(drive)
+        self._windows: dict[str, RobotLines] = {}
+        self._hazards = HazardFeed(
+            *(playback.site, playback.incidents, playback.surroundings, playback.contained)
+        )
+
+    def _number_all(self) -> None:
+        playback, camera = self.playback, self.playback.scenario.camera
+        limits = self._limits()
+        for number, (id_tag, radius) in enumerate(playback.radii.items()):
+            speed, turn_rate = limits[number] if number < len(limits) else (0.5, math.pi / 6)
+            self._number(
+                *(id_tag, playback.labels[id_tag], "robot"),
+                radius_m=radius,
+                max_speed_mps=speed,
+                max_turn_rate_radps=turn_rate,
+                **about(radius),
+                camera={
+                    "field_of_view_deg": camera.field_of_view_deg,
+                    "range_m": camera.range_m,
+                    "rate_hz": camera.rate_hz,
+                    "frame_bytes": camera.frame_bytes,
+                },
+            )
+        ids = {label: id_tag for id_tag, label in playback.labels.items()}
+        for label in playback.recorder.tracks:
+            if label not in self.numbers:
+                kind = label.rpartition("-")[0]
+                known = kind if kind in ("guard", "bystander") else "guard"
+                self._number(ids.get(label, label), label, known, radius_m=0.25)
+        for id_tag, label in playback.labels.items():
+            if label not in self.numbers:
+                kind = label.partition("-")[0]
+                self._number(id_tag, label, kind if kind in ("dva", "operator") else "device")
+
+    def _limits(self) -> list[tuple[float, float]]:
+        """Of the robots, if their profiles are still to be found; no code is loaded for it."""
+        try:
+            found = robot_profiles(self.playback.scenario)
+        except DvaSimError:
+            return []
+        return [(one.max_speed_mps, one.max_turn_rate_rad_s) for one in found]
+
+    def _number(self, id_tag: str, label: str, kind: str, **more: Any) -> None:
+        number = len(self.things)
+        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
+        self.numbers[id_tag] = self.numbers[label] = number
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether cameras can be drawn: not if a hazard's class is the user's own."""
+        own = (isinstance(i.hazard, RecordedHazard) for i in self.playback.incidents)
+        return bool(self.playback.radii) and not any(own)
+
+    # --- what does not change --------------------------------------------------------------
+
+    def scene(self) -> Line:
+        """The first line."""
+        playback = self.playback
+        line = scene_of(
+            *(playback.scenario, playback.site, playback.incidents, self.things),
+            name=self.name,
+            seed=playback.seed,
+        )
+        link = playback.scenario.link
+        line["link"] = {
+            "kind": "modelled",
+            "delay_s": link.delay_s,
+            "jitter_s": link.jitter_s,
+            "loss": link.loss,
+            "rate_bps": link.rate_bps,
+            "processing_s": 0.0,
+            "trace": link.trace_up or link.trace_down or link.delay_log,
+        }
+        line["replay"] = {
+            "name": self.name,
+            "duration_ms": round(1000 * self.duration),
+            "whole": self.is_whole,
+            "marks": self._marks(),
+        }
+        return line
+
+    def _marks(self) -> list[Line]:
+        """Moments to jump to, in order; of too many, evenly chosen ones."""
+        timeline = self.playback.recorder.timeline
+        marks = [moment for moment in timeline if moment.kind in MARKED]
+        step = max(1, math.ceil(len(marks) / MOST_MARKS))
+        return [
+            {"t": round(1000 * m.time), "who": m.who, "what": m.what, "kind": m.kind}
+            for m in marks[::step]
+        ]
+
+    # --- a moment --------------------------------------------------------------------------
+
+    def positions(self, now: float) -> Line:
+        """Where everybody is."""
+        rows = [
+            [
+                self.numbers[label],
+                *(round(100 * at.x), round(100 * at.y)),
+                round(1000 * math.remainder(at.heading, 2.0 * math.pi)),
+                round(1000 * speed),
+            ]
+            for label, at, speed in self.tracks.places(now)
+        ]
+        return {"k": "pos", "t": _ms(now), "p": rows}
+
+    def robots(self, now: float) -> list[Line]:
+        """A row for each robot."""
+        doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
+        return [
+            self._robot(id_tag, doing.get(self.playback.labels[id_tag], ""), now)
+            for id_tag in self.playback.radii
+        ]
+
+    def _robot(self, id_tag: str, mode: str, now: float) -> Line:
+        drive = self._drive_of(id_tag, now)
+        speed, turn_rate = set_point(drive, now) if mode == Mode.TELEOPERATION else (0.0, 0.0)
+        holder = None if drive is None else drive.operator
+        return {
+            "i": self.numbers[id_tag],
+            "mode": mode or "Idle",
+            "pattern": self.playback.scenario.pattern,
+            "battery": None,
+            "holder": holder,
+            "holder_label": holder and self.playback.labels.get(holder, holder),
+            "session_age_s": None if drive is None else round(now - drive.ordered, 1),
+            "watchdog_left_s": None,
+            "stands": "",
+            "set_speed_mps": round(speed, 3),
+            "set_turn_rate_radps": round(turn_rate, 3),
+            "queue": 0,
+            "lost": 0,
+            "commands_hz": 0.0 if drive is None else commands_hz(drive, now),
+            "refused": 0,
+            "timeouts": 0,
+        }
+
+    def window(self, id_tag: str, now: float) -> Line:
+        """What the windows of a robot show."""
+        if id_tag not in self._windows:
+            playback = self.playback
+            self._windows[id_tag] = RobotLines(
+                *(self._drives.get(id_tag, []), playback.recorder.traffic or ()),
+                *(id_tag, playback.labels),
+            )
+        label = self.playback.labels[id_tag]
+        here = {name: (at, speed) for name, at, speed in self.tracks.places(now)}
+        before = {name: at for name, at, _ in self.tracks.places(now - TURNING)}
+        at, speed = here.get(label, (None, 0.0))
+        turned = 0.0
+        if at is not None and label in before:
+            turned = math.remainder(at.heading - before[label].heading, 2.0 * math.pi) / TURNING
+        row = self._robot(id_tag, "" if at is None else at.mode, now)
+        return self._windows[id_tag].line(row, speed, turned, now)
+
+    def _drive_of(self, robot: str, now: float) -> DriveLog | None:
+        """The drive that goes on, if one does."""
+        for drive in reversed(self._drives.get(robot, [])):
+            if drive.ordered <= now:
+                over = drive.ended is not None and drive.ended <= now
+                return None if over else drive
+        return None
+
+    def people(self, now: float) -> list[Line]:
+        """What those on foot are doing."""
+        radii = {self.playback.labels[robot] for robot in self.playback.radii}
+        return [
+            {"i": self.numbers[label], "doing": at.mode}
+            for label, at, _ in self.tracks.places(now)
+            if label not in radii
+        ]
+
+    def hazards(self, now: float) -> Line:
+        """Where hazards are, and what they make of air and floor."""
+        return self._hazards.line(_ms(now))
+
+    def events(self, now: float) -> Line:
+        """How the events stand."""
+        site, labels = self.playback.site, self.playback.labels
+        known = (event_at(event, now) for event in self.playback.events)
+        lines = [event_line(event, site, labels) for event in known if event is not None]
+        return {"k": "events", "t": _ms(now), "events": lines}
+
+    def story(self, now: float) -> Line:
+        """What was told up to a moment."""
+        end = bisect_right(self._moments, now + ROUNDED)
+        told = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
+        lines = [{"t": _ms(m.time), "who": m.who, "what": m.what, "kind": m.kind} for m in told]
+        return {"k": "told", "t": _ms(now), "lines": lines}
+
+    # --- pictures --------------------------------------------------------------------------
+
+    def frame(self, robot: str, now: float) -> Line | None:
+        """What a robot's operator saw at a moment, or if nobody drove it what its camera showed.
+
+        The picture is drawn from where everybody was when it was taken.
+        """
+        drive = self._drive_of(robot, now)
+        captured = now if drive is None else captured_at(drive, now)
+        if captured is None:
+            return None
+        label = self.playback.labels[robot]
+        there = list(self.tracks.places(captured))
+        own = next((at for name, at, _ in there if name == label), None)
+        if own is None:
+            return None
+        kinds = {thing["i"]: thing["kind"] for thing in self.things}
+        figures = [
+            [
+                *(kinds[self.numbers[name]], self.numbers[name]),
+                *(round(at.x, 3), round(at.y, 3), round(at.heading, 3), at.mode),
+            ]
+            for name, at, _ in there
+            if name != label
+        ]
+        return {
+            "k": "frame",
+            "t": _ms(now),
+            "robot": self.numbers[robot],
+            "captured_ms": _ms(captured),
+            "pose": [round(own.x, 3), round(own.y, 3), round(own.heading, 4)],
+            "figures": figures,
+        }
+
+
+def _ms(time: float) -> int:
+    return round(1000 * time)

@@ -1,0 +1,98 @@
+"""What the windows of a robot show of a recorded moment; what a recording does not hold is open."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable
+from typing import Any
+
+from dva_sim.console.latencies import KEPT, Latencies
+from dva_sim.console.robot_windows import WHEEL
+from dva_sim.kernel.recorder import Applied, DriveLog, Sent
+
+Line = dict[str, Any]
+_EMERGENCY = b"<EmergencyMsg>"
+_NO_FAULTS = {"processing_s": None, "replies": False, "freeze": False, "camera": False}
+
+
+def about(radius: float) -> Line:
+    """What the pictures of a robot are drawn by, as far as a recording tells: its radius [m]."""
+    return {
+        "wheel_radius_m": round(WHEEL * radius, 3),
+        "corners_m": [],
+        "steering": "free",
+        "sensors": [],
+    }
+
+
+class RobotLines:
+    """The windows of one robot.
+
+    Args:
+        drives: Of this robot.
+        traffic: All messages of the run, by time.
+        robot: Its id.
+        labels: Of all devices, by id.
+    """
+
+    def __init__(
+        self,
+        drives: Iterable[DriveLog],
+        traffic: Iterable[Sent],
+        robot: str,
+        labels: dict[str, str],
+    ) -> None:
+        applied = [one for drive in drives for one in drive.applied]
+        self._applied: list[Applied] = sorted(applied, key=lambda one: one.time)
+        self._emergencies = [
+            (sent.time, labels.get(sent.source, sent.source))
+            for sent in traffic
+            if sent.destination == robot
+            and isinstance(sent.payload, bytes)
+            and _EMERGENCY in sent.payload
+        ]
+
+    def line(self, row: Line, speed: float, turn_rate: float, now: float) -> Line:
+        """The windows at a moment.
+
+        Args:
+            row: What everybody knows of the robot then.
+            speed: As it moved [m/s].
+            turn_rate: As it turned [rad/s].
+            now: The moment [s].
+        """
+        return {
+            "k": "robot",
+            "t": round(1000 * now),
+            "i": row["i"],
+            "station": {"state": "listening", "address": None, "dva": None, "problem": ""},
+            "mode": row["mode"],
+            "hand": None,
+            "holder": row["holder_label"],
+            "stands": row["stands"],
+            "link_lost": False,
+            "notice": "",
+            "emergency": self._emergency(now),
+            "speed_mps": row["set_speed_mps"],
+            "turn_rate_radps": row["set_turn_rate_radps"],
+            "now_mps": round(speed, 2),
+            "now_radps": round(turn_rate, 2),
+            "watchdog_left_s": None,
+            "one_way": self._one_way(now),
+            "loop": None,
+            "replies": None,
+            "faults": _NO_FAULTS,
+            "sensors": [],
+        }
+
+    def _emergency(self, now: float) -> Line | None:
+        past = [told for told in self._emergencies if told[0] <= now]
+        return {"at_ms": round(1000 * past[-1][0]), "by": past[-1][1]} if past else None
+
+    def _one_way(self, now: float) -> Line | None:
+        """How long commands were under way, of the newest that had taken effect by then."""
+        end = bisect_right(self._applied, now, key=lambda one: one.time)
+        figures = Latencies()
+        for one in self._applied[max(0, end - KEPT) : end]:
+            figures.add(one.arrived - one.sent)
+        return figures.line()

@@ -1,0 +1,246 @@
+"""What the windows of a robot show: how it moves, who has it in hand, how late messages reach it.
+
+A robot's own clock tells how old the picture was behind a command (`SeenTick`): from the robot to
+its driver and back. How long a message took one way is known where whoever sent it is a device of
+this process; no two clocks agree, so of others it is not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.faults import RobotFaults
+from dva_sim.agents.robot.manual_control import ManualControl
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.latencies import Latencies
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.tap import Exchange
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.worlds.drives import ThreeWay
+
+Line = dict[str, Any]
+
+WHEEL = 1 / 3  # radius of a wheel, as a share of that of the footprint; assumed, for the picture
+SENSING = 1.0  # from one look at the sensors to the next [s]
+
+
+class RobotStation(Protocol):
+    """How far a robot has come: off, registered, listening."""
+
+    def line(self) -> Line:
+        """State, the address at which it listens, and that of the DVA."""
+
+
+class AlwaysListening:
+    """The station of a robot that registers by itself, and listens from the beginning.
+
+    Args:
+        robot: Which.
+    """
+
+    def __init__(self, robot: RobotAgent) -> None:
+        self._robot = robot
+
+    def line(self) -> Line:
+        """See `RobotStation`."""
+        device = self._robot.device
+        state = "listening" if self._robot.body.powered else "off"
+        return {"state": state, "address": device.address, "dva": None, "problem": ""}
+
+
+@dataclass
+class RobotWindow:
+    """What is known of one robot for its windows.
+
+    Attributes:
+        robot: The robot.
+        station: How far it has come.
+        faults: What is wrong with it.
+        hand: For whoever drives it by hand.
+        number: Of the hand that has it, as pages know it; None: nobody's.
+        emergency: The newest emergency that it has heard: when [ms] and of whom.
+        notice: Why manual control has ended last.
+        one_way: From its driver to it.
+        loop: From it to its driver and back, by pictures and the commands behind them.
+        replies: From a request to the reply.
+    """
+
+    robot: RobotAgent
+    station: RobotStation
+    faults: RobotFaults
+    hand: ManualControl
+    number: int | None = None
+    emergency: Line | None = None
+    notice: str = ""
+    one_way: Latencies = field(default_factory=Latencies)
+    loop: Latencies = field(default_factory=Latencies)
+    replies: Latencies = field(default_factory=Latencies)
+    newest: int = 0  # of the messages that it has heard
+    over: float = -1.0  # the newest emergency after which it was ordered anew [s]
+    _sensed: tuple[float, list[Line]] = field(default_factory=lambda: (-math.inf, []))
+
+    def sensors(self, now: float) -> list[Line]:
+        """Newest values of its sensors, looked at once a second."""
+        if now - self._sensed[0] >= SENSING or now < self._sensed[0]:
+            self._sensed = now, [*self._read(now)]
+        return self._sensed[1]
+
+    def _read(self, now: float) -> Iterator[Line]:
+        for name, port in self.robot.sensors.items():
+            values = port.read(now)
+            shown = {"least": min(values)} if len(values) > 3 else {"values": list(values)}
+            stuck = name in self.faults.stuck
+            yield {"name": name, "unit": port.unit, "stuck": stuck, **(shown if values else {})}
+
+
+class RobotWindows:
+    """The windows of all robots of a run.
+
+    Args:
+        recorder: Of the run.
+        robots: By id.
+        numbers: Of everybody, by id.
+        labels: Of all devices, by id.
+        sent_at: When a message was sent, by its bytes [s]; None: by nobody here.
+        lost: Told of each reply that is dropped.
+    """
+
+    def __init__(
+        self,
+        recorder: Recorder,
+        robots: Mapping[str, RobotAgent],
+        numbers: Mapping[str, int],
+        labels: Mapping[str, str],
+        sent_at: Callable[[bytes], float | None],
+        lost: Callable[[str, bytes], object],
+    ) -> None:
+        self._recorder, self._numbers, self._labels = recorder, numbers, labels
+        self._sent_at = sent_at
+        self.by_id = {
+            id_tag: RobotWindow(
+                robot, AlwaysListening(robot), RobotFaults(robot, lost), ManualControl(robot)
+            )
+            for id_tag, robot in robots.items()
+        }
+
+    def about(self, id_tag: str) -> Line:
+        """What does not change of a robot, for the scene: what its pictures are drawn by."""
+        spec, motors = self.by_id[id_tag].robot.body.spec, self.by_id[id_tag].robot.body.motors
+        told: Line = {
+            "wheel_radius_m": round(WHEEL * spec.radius, 3),
+            "corners_m": [list(corner) for corner in spec.corners],
+            "steering": "three_way" if isinstance(motors, ThreeWay) else "free",
+            "sensors": list(self.by_id[id_tag].robot.sensors),
+        }
+        return told
+
+    def set_usual(self, id_tag: str, seconds: float) -> None:
+        """A message usually takes a robot's computer so long from now on [s]."""
+        self.by_id[id_tag].faults.usually(lambda: seconds)
+
+    def heard(self, id_tag: str, exchange: Exchange) -> None:
+        """A robot has heard a message, or has answered one that it had heard before."""
+        window, again = self.by_id[id_tag], exchange.number <= self.by_id[id_tag].newest
+        if exchange.reply is not None and exchange.service_s is not None:
+            window.replies.add(exchange.service_s)
+        if not again:
+            window.newest = exchange.number
+            self._arrived(window, exchange)
+
+    def _arrived(self, window: RobotWindow, exchange: Exchange) -> None:
+        try:
+            message = decode(exchange.data)
+        except ProtocolError:
+            return
+        if isinstance(message.body, m.Emergency):
+            by = self._labels.get(message.source, message.source)
+            window.emergency = {"at_ms": round(1000 * exchange.arrived), "by": by}
+        sent = self._sent_at(exchange.data)
+        if sent is not None:
+            window.one_way.add(exchange.arrived - sent)
+        if isinstance(message.body, m.SetTeleOp) and message.body.seen_tick is not None:
+            age = window.robot.controller.tick(exchange.arrived) - message.body.seen_tick
+            if age >= 0:
+                window.loop.add(age / 1000)
+
+    def look(self) -> None:
+        """What has ended by itself since the last look is told."""
+        for window in self.by_id.values():
+            controller = window.robot.controller
+            if controller.mode is not Mode.IDLE or controller.by_hand is not None:
+                window.over = controller.emergency_at
+            if window.number is not None and controller.by_hand is None:
+                window.number = None
+                emergency = controller.emergency_at > window.over
+                why = "an emergency stop" if emergency else "nothing was heard for long"
+                if window.faults.frozen:
+                    why = "its computer is frozen"
+                window.notice = f"manual control has ended: {why}"
+                window.robot.device.tell(window.notice, "mode")
+
+    def lines(self, watched: Iterable[str], stands: Callable[[RobotAgent], str]) -> Iterator[Line]:
+        """A line for each robot that somebody looks at.
+
+        Args:
+            watched: Those, by id.
+            stands: Why a robot stands, in words.
+        """
+        for id_tag in watched:
+            yield self._line(id_tag, self.by_id[id_tag], stands)
+
+    def _line(self, id_tag: str, window: RobotWindow, stands: Callable[[RobotAgent], str]) -> Line:
+        robot, now = window.robot, window.robot.device.clock.now
+        point, body, faults = robot.set_point, robot.body, window.faults
+        in_force = now < point.until
+        asked = (point.speed, point.turn_rate) if in_force else (0.0, 0.0)
+        speed, turn = body.motors.set_point(*self._limited(robot, *asked))
+        return {
+            "k": "robot",
+            "t": round(1000 * now),
+            "i": self._numbers[id_tag],
+            "station": window.station.line(),
+            "mode": self._mode(window),
+            "hand": window.number,
+            "holder": self._labels.get(robot.holder[0] or "", robot.holder[0]),
+            "stands": stands(robot),
+            "link_lost": robot.controller.mode is Mode.TELEOPERATION and 0.0 < point.until <= now,
+            "notice": window.notice,
+            "emergency": window.emergency,
+            "speed_mps": round(speed, 3),
+            "turn_rate_radps": round(turn, 4),
+            "now_mps": round(body.speed, 2),
+            "now_radps": round(body.turn_rate, 2),
+            "watchdog_left_s": round(point.until - now, 1) if in_force else None,
+            "one_way": window.one_way.line(),
+            "loop": window.loop.line(),
+            "replies": window.replies.line(),
+            "faults": {
+                "processing_s": faults.processing_s,
+                "replies": faults.drops_replies,
+                "freeze": faults.frozen,
+                "camera": faults.camera_lost,
+            },
+            "sensors": window.sensors(now),
+        }
+
+    @staticmethod
+    def _limited(robot: RobotAgent, speed: float, turn: float) -> tuple[float, float]:
+        spec = robot.body.spec
+        most = spec.max_turn_rate
+        return min(speed, spec.max_speed), min(max(turn, -most), most)
+
+    @staticmethod
+    def _mode(window: RobotWindow) -> str:
+        """What it does, as its page names it: an emergency until somebody orders it again."""
+        controller = window.robot.controller
+        if controller.by_hand is not None:
+            return "Manual"
+        if controller.mode is Mode.IDLE and controller.emergency_at > window.over:
+            return "Emergency"
+        return controller.mode.value

@@ -1,0 +1,256 @@
+"""What control rooms are asked for at pages: each becomes messages of the person's own device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from dva_sim.agents.operator.handheld import Gathered
+from dva_sim.agents.operator.steps import give_back, start
+from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.console.seats import Seats
+from dva_sim.console.takeover import Takeover
+from dva_sim.console.world import ConsoleWorld
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+Doer = Callable[[str, Line, Said], object]
+
+ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
+UNDER_WAY: Final = ("under_way", "waiting", "replanning")
+
+
+class RoomActions:
+    """Does what control rooms are asked for.
+
+    Args:
+        world: In which.
+        seats: Who sits where.
+        robot: Finds the id of a robot that a line names.
+        take: Takes a robot for a page's seat.
+    """
+
+    def __init__(
+        self,
+        world: ConsoleWorld,
+        seats: Seats,
+        robot: Callable[[Any], str],
+        take: Doer,
+    ) -> None:
+        self._world, self._rooms, self._seats = world, world.rooms, seats
+        self._robot, self._take = robot, take
+        self.doers: Mapping[str, Doer] = {
+            "room_join": self._join,
+            "event_raise": self._raise,
+            **dict.fromkeys(DECISIONS, self._decide),
+            "mission": self._mission,
+            "take_over": self._take_over,
+        }
+
+    def forget(self, client: str) -> None:
+        """A page is gone for good."""
+        self._rooms.leave(client)
+
+    # --- who asks ---------------------------------------------------------------------------
+
+    def _join(self, client: str, line: Line, said: Said) -> None:
+        name = str(line.get("name", "")).strip()[:64]
+        self._rooms.join(client, str(line.get("role", "look")), name, said)
+
+    def _room(
+        self, client: str, line: Line, said: Said, then: Callable[[ConsoleRoom], object]
+    ) -> None:
+        """The control room of a page; it gets one with its first decision."""
+        room = self._rooms.by_client.get(client)
+        if room is not None and room.registered:
+            then(room)
+            return
+
+        def joined(ok: bool, text: str, /, **_: Any) -> None:
+            room = self._rooms.by_client.get(client)
+            if ok and room is not None:
+                then(room)
+            else:
+                said(False, text)
+
+        self._rooms.join(client, str(line.get("role", "look")), "", joined)
+
+    def _ask(
+        self,
+        client: str,
+        line: Line,
+        said: Said,
+        body: m.Body,
+        done: str,
+        then: Callable[[m.Reply], Line] | None = None,
+    ) -> None:
+        self._room(client, line, said, lambda room: room.ask(body, said, done, then))
+
+    # --- events -----------------------------------------------------------------------------
+
+    def _decide(self, client: str, line: Line, said: Said) -> None:
+        body, done = decision_of(line, self._device, self._rooms.decisions)
+        self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
+
+    def _raise(self, client: str, line: Line, said: Said) -> None:
+        body, done = report_of(line, self._place(line))
+
+        def then(_: m.Reply) -> Line:
+            event = self._world.run.dva.desk.book.near(body.kind, body.position)
+            return {} if event is None else {"event": event.number}
+
+        self._ask(client, line, said, body, done, then)
+
+    def _place(self, line: Line) -> m.Position:
+        """Where on earth a place of the site lies.
+
+        Raises:
+            Refused: it is none.
+        """
+        site = self._world.run.stage.site
+        x, y = line["x_m"], line["y_m"]
+        left, low, right, high = site.extent
+        if not (left <= x <= right and low <= y <= high):
+            raise Refused("x_m and y_m should be a place on the site")
+        return m.Position(*site.frame.to_latlon(x, y))
+
+    def _device(self, label: str) -> str:
+        """The id of a device by its label.
+
+        Raises:
+            Refused: there is none.
+        """
+        entries = self._world.run.dva.desk.registry.entries
+        found = (i for i, entry in entries.items() if entry.device.label == label)
+        id_tag = next(found, None)
+        if id_tag is None:
+            raise Refused(f"there is no device {label!r}")
+        return id_tag
+
+    def _is_robot(self, device: str) -> bool:
+        return device in self._world.run.field.robots
+
+    # --- robots -----------------------------------------------------------------------------
+
+    def _mission(self, client: str, line: Line, said: Said) -> None:
+        """Have a robot go to an event by itself, and look at it."""
+        status = self._rooms.listener.events.get(line["event"])
+        if status is None:
+            raise Refused(f"there is no event {line['event']}")
+        robot = self._robot(line["robot"])
+        body = m.Inspect(status.event_id, status.kind, status.position)
+        self._room(client, line, said, partial(self._send, robot=robot, body=body, said=said))
+
+    def _send(self, room: ConsoleRoom, robot: str, body: m.Inspect, said: Said) -> None:
+        device, label = room.device, room.device.label_of(robot)
+
+        def granted(reply: m.Reply) -> None:
+            if not isinstance(reply.content, m.Permission):
+                said(False, f"{label}: {why(reply)}")
+                return
+            session = reply.content.session
+
+            def refused(text: str) -> None:
+                give_back(device, robot, session)
+                said(False, f"{label}: {text}")
+
+            def begun() -> None:
+                self._follow(room, robot, session)
+                said(True, f"{label} goes to event {body.event_id} by itself")
+
+            start(
+                *(device, robot, body, lambda: session),
+                wanted=lambda: True,
+                begun=begun,
+                refused=refused,
+                lost=lambda: refused("it does not answer"),
+            )
+
+        device.connect(robot)
+        wish = m.PermissionRequest(robot, "missions")
+        device.ask(device.dva, wish, granted, lambda: said(False, NO_ANSWER))
+
+    @staticmethod
+    def _follow(room: ConsoleRoom, robot: str, session: int) -> None:
+        """Ask how a mission stands until it is over; then the robot is given back."""
+        device = room.device
+
+        def answered(reply: m.Reply) -> None:
+            status = reply.content
+            if isinstance(status, m.MissionStatus) and status.mission_state in UNDER_WAY:
+                device.clock.call_after(ASK_PERIOD, ask)
+            else:
+                give_back(device, robot, session)
+
+        def ask() -> None:
+            device.ask(robot, m.GetMissionStatus(), answered, session=session)
+
+        device.clock.call_after(ASK_PERIOD, ask)
+
+    def _take_over(self, client: str, line: Line, said: Said) -> None:
+        """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
+        robot, reason = self._robot(line["robot"]), str(line["reason"])
+
+        def begin(room: ConsoleRoom) -> None:
+            number = self._seats.sit(client)
+            if number is None:
+                said(False, "all seats are taken")
+                return
+            seat = self._world.person(number)
+            label = self._world.run.stage.labels[robot]
+            take = partial(self._take, client, line | {"robots": [label]})
+
+            def ended(ok: bool, text: str, /, **more: Any) -> None:
+                if not ok and not seat.robots:
+                    self._seats.stand_up(client)
+                    seat.attended = client in self._world.client_of.values()
+                said(ok, text, **more)
+
+            event = self._rooms.event_of(robot)
+            Takeover(room, robot, reason, event, seat.device.id_tag, take, ended).begin()
+
+        self._room(client, line, said, begin)
+
+
+class AlarmActions:
+    """Does what people ask for about alarms.
+
+    Args:
+        world: In which.
+        rooms: Whose devices tell the DVA that an event was seen.
+    """
+
+    def __init__(self, world: ConsoleWorld, rooms: RoomActions) -> None:
+        self._world, self._desk, self._rooms = world, world.alarms, rooms
+        self.doers: Mapping[str, Doer] = {
+            "alarm_acknowledge": self._acknowledge,
+            "alarm_shelve": self._shelve,
+            "alarm_unshelve": self._unshelve,
+        }
+
+    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
+        """What an open event is behind is acknowledged at the DVA, all else here."""
+        keys = self._desk.members(line["alarm"])
+        events = self._desk.by_event(keys)
+        for key in keys:
+            if key not in events:
+                self._desk.acknowledge(key, self._world.author(client))
+        if not events:
+            said(True, "seen")
+            return
+        answers = Gathered(len(events), said)
+        for number in events.values():
+            asked = line | {"do": "event_acknowledge", "event": number}
+            self._rooms.doers["event_acknowledge"](client, asked, answers)
+
+    def _shelve(self, client: str, line: Line, said: Said) -> None:
+        keys = self._desk.members(line["alarm"])
+        self._desk.shelve(keys, line["for_s"], self._world.author(client))
+        said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
+
+    def _unshelve(self, client: str, line: Line, said: Said) -> None:
+        self._desk.unshelve(self._desk.members(line["alarm"]))
+        said(True, "back in the list")

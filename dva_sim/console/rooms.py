@@ -1,0 +1,187 @@
+"""The control rooms of a console: a device for each person who decides, and one that listens.
+
+What people decide becomes messages of their devices, and what pages show of events comes by the
+DVA's own: another make of control room, or of DVA, can take either place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.agents.device import AgentDevice
+from dva_sim.console.decisions import dispatch_line
+from dva_sim.console.refusal import Said
+from dva_sim.core.registry import FORGET_AFTER
+from dva_sim.core.roles import Roles
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.run import Run
+
+Line = dict[str, Any]
+
+LISTENER: Final = 1000  # number of the device that listens for the pages; a scenario's are below
+MOST_ROOMS: Final = 250
+RESTS: Final = FORGET_AFTER + 60.0  # from the end of one until its id is given out again [s]
+JOINED_WITHIN: Final = 30.0  # a person is told by then whether the DVA knows the device [s]
+LOOK: Final = 0.05  # from one look whether it does to the next [s]
+NO_ANSWER: Final = "the DVA does not answer"
+
+
+@dataclass
+class ConsoleRoom:
+    """A person's share in the control of a run.
+
+    Attributes:
+        number: By which its id is made.
+        agent: At the DVA.
+        role: What the person's address allows.
+        registered: Whether the DVA knows it.
+    """
+
+    number: int
+    agent: ControlRoomAgent
+    role: str
+    registered: bool = False
+
+    @property
+    def device(self) -> AgentDevice:
+        """Its identity, and ways to talk."""
+        return self.agent.device
+
+    def ask(
+        self, body: m.Body, said: Said, done: str, then: Callable[[m.Reply], Line] | None = None
+    ) -> None:
+        """Ask the DVA, and tell how that went.
+
+        Args:
+            body: What is asked.
+            said: Told what became of it.
+            done: In words, if it is done.
+            then: Makes more of a reply that says so.
+        """
+
+        def answered(reply: m.Reply) -> None:
+            ok = reply.code == m.OK
+            more = then(reply) if ok and then is not None else {}
+            said(ok, done if ok else why(reply), **more)
+
+        self.agent.ask(body, answered, lambda: said(False, NO_ANSWER))
+
+
+def why(reply: m.Reply) -> str:
+    """Why a reply refuses, in words."""
+    return reply.text or m.CODE_NAMES.get(reply.code, str(reply.code))
+
+
+class ConsoleRooms:
+    """All control rooms of a console.
+
+    Args:
+        run: In which.
+        roles: What the DVA knows of who may do what: no device states its own.
+
+    Attributes:
+        listener: Hears for the pages what the DVA says of events.
+        by_client: The rooms by their pages.
+    """
+
+    def __init__(self, run: Run, roles: Roles) -> None:
+        self._run, self._roles = run, roles
+        self.by_client: dict[str, ConsoleRoom] = {}
+        self._used: set[int] = set()
+        self._switched = 0.0
+        self.listener = self._agent(LISTENER, "console")
+        self.listener.on_dispatch = self._note_switch
+        self.listener.start()
+
+    def _agent(self, number: int, label: str) -> ControlRoomAgent:
+        device = self._run.stage.device("control-room", number)
+        device.label = device.labels[device.id_tag] = label
+        return ControlRoomAgent(device)
+
+    def _note_switch(self, _: m.DispatchStatus) -> None:
+        self._switched = self.listener.device.clock.now
+
+    # --- who decides ------------------------------------------------------------------------
+
+    def join(self, client: str, role: str, name: str, said: Said) -> None:
+        """A page's person gets a device of its role, or its device gets another name."""
+        room = self.by_client.get(client)
+        if room is not None and (not name or room.device.label == name):
+            said(True, f"you are {room.device.label}")
+            return
+        if room is not None:
+            self.leave(client)
+        room = self._new(role, name)
+        if room is None:
+            said(False, "too many control rooms have come and gone: try again in two minutes")
+            return
+        self.by_client[client] = room
+
+        clock = room.device.clock
+        ends = clock.now + JOINED_WITHIN
+
+        def looks_again() -> bool:
+            status = room.agent.dispatch
+            if status is not None and status.role is not None:
+                room.registered = True
+                said(True, f"you are {room.device.label}, and may {status.role}")
+            elif clock.now >= ends:
+                said(False, NO_ANSWER)
+            return not room.registered and clock.now < ends
+
+        room.agent.start()
+        clock.every(LOOK, looks_again)
+
+    def _new(self, role: str, name: str) -> ConsoleRoom | None:
+        number = next((n for n in range(1, MOST_ROOMS + 1) if n not in self._used), None)
+        if number is None:
+            return None
+        self._used.add(number)
+        agent = self._agent(LISTENER + number, name or f"{role}-{number}")
+        self._roles.appoint(agent.device.id_tag, role)
+        return ConsoleRoom(number, agent, role)
+
+    def leave(self, client: str) -> None:
+        """A page is gone for good, and its person decides no more."""
+        room = self.by_client.pop(client, None)
+        if room is not None:
+            room.device.leave()
+            room.device.clock.call_after(RESTS, self._forget, room)
+
+    def _forget(self, room: ConsoleRoom) -> None:
+        for peer in (room.device.dva, *self._run.field.robots):
+            room.device.forget(peer)
+        self._run.stage.devices.remove(room.device)
+        room.device.labels.pop(room.device.id_tag, None)
+        self._roles.dismiss(room.device.id_tag)
+        self._used.discard(room.number)
+
+    # --- what pages are told ----------------------------------------------------------------
+
+    def label(self, client: str) -> str:
+        """What the person of a page is called; nothing if it has no control room."""
+        room = self.by_client.get(client)
+        return "" if room is None else room.device.label
+
+    def decisions(self, number: int) -> int | None:
+        """How many decisions on an event there have been, as far as one knows here."""
+        status = self.listener.events.get(number)
+        return None if status is None else status.decisions
+
+    def event_of(self, robot: str) -> m.EventStatus | None:
+        """How that stands which a robot was sent to, and is not over."""
+        every = self.listener.events.values()
+        return next((e for e in every if e.closed_for is None and e.responder == robot), None)
+
+    def line(self, now_ms: int) -> Line:
+        """How orders are given, and who decides."""
+        rooms = [
+            {"label": room.device.label, "role": room.role, "client": client}
+            for client, room in self.by_client.items()
+            if room.registered
+        ]
+        dispatch = dispatch_line(self.listener.dispatch, self._switched)
+        return {"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms}

@@ -1,0 +1,66 @@
+/** Alarms: one list, the gravest on top; only what is new stands out, and only for 5 seconds. */
+import { html, useState } from '../../vendor/preact.js';
+import { alarmList, mayDispatch, selection } from '../store.js';
+import { act } from '../net/actions.js';
+import { worldNow } from '../net/world_time.js';
+import { SeverityMark } from '../ui/icon.js';
+import { useEvery } from '../ui/every.js';
+import { ageText } from '../ui/words.js';
+
+const SHELF_S = 900;
+
+/** @typedef {import('../types.js').AlarmRow} AlarmRow */
+
+/** The list, and what is shelved. */
+export function AlarmList() {
+  useEvery(1000);
+  const { alarms, shelved, flood, rate } = alarmList.value;
+  const unseen = alarms.filter((alarm) => alarm.state !== 'acknowledged').length;
+  return html`<section class="alarms-panel" aria-label="Alarms">
+    <h2>Alarms <span class="count">${unseen ? `${unseen} not seen` : 'all seen'}</span></h2>
+    ${flood && html`<p class="flood" role="status">${rate} alarms in 10 minutes: alike ones are folded.</p>`}
+    ${!alarms.length && html`<p class="none">Nothing needs anybody.</p>`}
+    <ul class="rows">${alarms.map((alarm) => html`<${Row} key=${alarm.key} alarm=${alarm} />`)}</ul>
+    ${shelved.length > 0 &&
+    html`<details><summary>Shelved (${shelved.length})</summary>
+      <ul class="rows">${shelved.map((alarm) => html`<${Shelved} key=${alarm.key} alarm=${alarm} />`)}</ul></details>`}
+  </section>`;
+}
+
+/** @param {{alarm: AlarmRow}} props */
+function Row({ alarm }) {
+  const [busy, setBusy] = useState(false);
+  const ask = async (/** @type {string} */ what, /** @type {object} */ more = {}) => {
+    setBusy(true);
+    await act(what, { alarm: alarm.key, ...more });
+    setBusy(false);
+  };
+  const open = () => {
+    if (alarm.event !== null) selection.value = { kind: 'event', key: alarm.event };
+  };
+  const seen = alarm.state === 'acknowledged';
+  return html`<li class=${`alarm ${alarm.state} ${alarm.is_new ? 'new' : ''}`}>
+    <${SeverityMark} severity=${alarm.priority} quiet=${seen} />
+    <button type="button" class="plain text" onClick=${open} disabled=${alarm.event === null}>${alarm.text}</button>
+    <span class="soft">${alarm.state}${alarm.seen_by ? ` by ${alarm.seen_by}` : ''}</span>
+    <b>${ageText(worldNow() - alarm.since_ms)}</b>
+    ${mayDispatch.value &&
+    html`<span class="do">${!seen &&
+      html`<button type="button" disabled=${busy} aria-label=${`Seen: ${alarm.text}`}
+        onClick=${() => ask('alarm_acknowledge')}>Seen</button>`}
+      <button type="button" disabled=${busy} aria-label=${`Shelve for 15 minutes: ${alarm.text}`}
+        title="Out of the list for 15 minutes"
+        onClick=${() => ask('alarm_shelve', { for_s: SHELF_S })}>Shelve</button></span>`}
+  </li>`;
+}
+
+/** @param {{alarm: AlarmRow}} props */
+function Shelved({ alarm }) {
+  const back = () => act('alarm_unshelve', { alarm: alarm.key });
+  return html`<li class="alarm shelved"><${SeverityMark} severity=${alarm.priority} quiet />
+    <span class="text">${alarm.text}</span>
+    <span class="soft">by ${alarm.shelved_by}, for another ${ageText(1000 * (alarm.left_s ?? 0))}</span>
+    ${mayDispatch.value &&
+    html`<button type="button" aria-label=${`Take from the shelf: ${alarm.text}`} onClick=${back}>Unshelve</button>`}
+  </li>`;
+}

@@ -1,0 +1,61 @@
+/** What waits for me? Alarms, events, one of them with what can be done, and how orders are given. */
+import { html, useEffect } from '../../vendor/preact.js';
+import { connection, control, mayDispatch, maySupervise, you } from '../store.js';
+import { act, ask } from '../net/actions.js';
+import { Choice, Field } from '../ui/fields.js';
+import { AlarmList } from './alarm_list.js';
+import { EventPanel } from './event_panel.js';
+import { EventsTable } from './events_table.js';
+import { Raise } from './raise.js';
+import { mode, ownName, rename } from './shared.js';
+
+const MODES = /** @type {[string, string][]} */ ([
+  ['automatic', 'the policy, by itself'],
+  ['ask_first', 'people: the policy asks first'],
+]);
+
+/** The page. */
+export function EventsPage() {
+  useEffect(keepJoining, [you.value?.client, connection.value]);
+  return html`<main class="page events-page" id="main" tabindex="-1">
+    <h1 class="hidden">Events</h1>
+    <div class="events-list"><${Head} /><${AlarmList} /><${EventsTable} /></div>
+    <div class="events-side"><${EventPanel} /><${Raise} /></div>
+  </main>`;
+}
+
+const AGAIN_MS = 1000;
+
+/** Have a device of one's own at the DVA, by which one decides. */
+const join = () => act('room_join', { name: ownName.peek() });
+
+/** The same, again and again until it is so; the address and the connection allowing. */
+function keepJoining() {
+  if (!mayDispatch.peek() || connection.peek() !== 'open') return undefined;
+  let over = false;
+  const again = async () => {
+    const done = await ask('room_join', { name: ownName.peek() });
+    if (!done.ok && !over) window.setTimeout(again, AGAIN_MS);
+  };
+  again();
+  return () => {
+    over = true;
+  };
+}
+
+function Head() {
+  if (!mayDispatch.value) {
+    return html`<p class="soft events-head">This address may ${you.value?.role ?? 'look'}. Those for dispatch and for
+      supervision are printed where the console was started.</p>`;
+  }
+  const me = control.value?.rooms?.find((room) => room.client === you.value?.client);
+  const asked = control.value?.dispatch;
+  return html`<section class="events-head" aria-label="You">
+    <${Field} name="Your name" value=${ownName.value} onInput=${rename}
+      hint=${me ? `The log calls you ${me.label}` : 'As it stands in the log'} />
+    <button type="button" onClick=${join}>Use this name</button>
+    ${asked && html`<${Choice} name="Who decides" value=${mode.value} options=${MODES}
+      disabled=${!maySupervise.value} onInput=${(/** @type {string} */ to) => act('dispatch_mode', { mode: to })} />`}
+    ${asked?.switched && html`<small class="soft">set by ${asked.switched.label}</small>`}
+  </section>`;
+}

@@ -1,0 +1,101 @@
+/** Whom the policy would send and why, beside everybody else who could go. */
+import { computed, html, signal, useEffect } from '../../vendor/preact.js';
+import { connection, mayDispatch } from '../store.js';
+import { act, ask as askQuietly } from '../net/actions.js';
+import { isOpen } from '../map/shown.js';
+import { secondsText } from '../ui/words.js';
+import { reason } from './shared.js';
+
+/** @typedef {import('../types.js').SiteEvent} SiteEvent */
+/** @typedef {import('../types.js').Proposal} Proposal */
+
+const AGAIN_MS = 4000;
+const SOON_MS = 500; // where it could not be asked, as while the page connects
+
+const known = signal(/** @type {Proposal | null} */ (null));
+const wanted = signal('');
+
+/** Whom Assign sends: who was picked, else who is proposed, else the first who is free. */
+export const chosen = computed(() => {
+  const proposal = known.value;
+  if (!proposal) return '';
+  const able = proposal.candidates.filter((who) => who.can);
+  if (able.some((who) => who.label === wanted.value)) return wanted.value;
+  return proposal.label || able.find((who) => who.free)?.label || '';
+});
+
+/** The guard who would be there first. */
+export const nearestGuard = computed(() => first((who) => !who.robot));
+/** The robot that would be there first. */
+export const nearestRobot = computed(() => first((who) => who.robot));
+
+/** @param {(who: import('../types.js').Candidate) => boolean} fits */
+const first = (fits) => known.value?.candidates.find((who) => who.free && fits(who))?.label ?? '';
+
+/**
+ * Send somebody; an event that somebody else has decided on meanwhile is left as it is.
+ * @param {SiteEvent} event
+ * @param {string} whom
+ * @param {string} [task]
+ */
+export async function assignTo(event, whom, task) {
+  const done = await act('event_assign', {
+    event: event.number,
+    device: whom,
+    reason: reason.peek(),
+    decisions: event.decisions ?? null,
+    ...(task ? { task } : {}),
+  });
+  if (done.ok) reason.value = '';
+  return done;
+}
+
+/** @param {{event: SiteEvent}} props */
+export function ProposalPanel({ event }) {
+  useEffect(() => keepAsking(event), [event.number, event.decisions, event.state, connection.value]);
+  if (!isOpen(event)) return null;
+  const proposal = known.value?.event === event.number ? known.value : null;
+  if (!proposal) return html`<p class="none">The policy is being asked …</p>`;
+  const rival = proposal.candidates.find((who) => who.free && who.label !== proposal.label);
+  return html`<section class="proposal" aria-label="Proposal">
+    <p><b>${proposal.label ? `${proposal.label}, ${timeText(proposal.arrival_s)}` : 'nobody'}</b>
+      ${rival ? ` (${rival.label}: ${timeText(rival.arrival_s)}, ${rival.reason})` : ''}
+      <small>${proposal.policy}: ${proposal.reason}</small></p>
+    ${proposal.decide_within_s !== null &&
+    html`<p class="ask" role="status">The policy asks: it does so by itself in ${secondsText(proposal.decide_within_s)}.</p>`}
+    <fieldset><legend>Whom to send</legend>
+      ${proposal.candidates.map((who) => html`<${Candidate} key=${who.label} who=${who} />`)}
+    </fieldset></section>`;
+}
+
+/** @param {{who: import('../types.js').Candidate}} props */
+function Candidate({ who }) {
+  return html`<label class=${who.can ? 'candidate' : 'candidate cannot'}>
+    <input type="radio" name="candidate" value=${who.label} checked=${chosen.value === who.label}
+      disabled=${!who.can} onInput=${() => (wanted.value = who.label)} />
+    <span>${who.label}</span><span class="figure">${timeText(who.arrival_s)}</span>
+    <small>${who.reason}</small></label>`;
+}
+
+/** @param {number | null} seconds */
+const timeText = (seconds) => (seconds === null ? '–' : secondsText(seconds));
+
+/** Ask now, and again now and then, as long as the event is looked at. @param {SiteEvent} event */
+function keepAsking(event) {
+  if (known.peek()?.event !== event.number) {
+    known.value = null;
+    wanted.value = '';
+  }
+  if (!mayDispatch.peek() || connection.peek() !== 'open' || !isOpen(event)) return undefined;
+  let over = false;
+  const ask = async () => {
+    const done = document.hidden ? null : await askQuietly('event_proposal', { event: event.number });
+    if (over) return;
+    if (done?.ok && done.proposal) known.value = done.proposal;
+    window.setTimeout(ask, done?.ok ? AGAIN_MS : SOON_MS);
+  };
+  ask();
+  return () => {
+    over = true;
+  };
+}

@@ -1,0 +1,95 @@
+/** Raise an event at a place: a click on the map, a room, or two numbers. */
+import { html, useState } from '../../vendor/preact.js';
+import { mayDispatch, maySteer, scene, selection } from '../store.js';
+import { act } from '../net/actions.js';
+import { MapBox } from '../map/map_box.js';
+import { placeOf } from '../map/shown.js';
+import { Choice, Field, wrongNumber } from '../ui/fields.js';
+import { plain } from '../ui/words.js';
+import { place } from './shared.js';
+
+const pairs = (/** @type {string[]} */ names) =>
+  /** @type {[string, string][]} */ (names.map((name) => [name, plain(name)]));
+const KINDS = pairs(['fire', 'gas_leak', 'flood']);
+const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
+
+/** The panel. */
+export function Raise() {
+  if (!mayDispatch.value) return null;
+  return html`<section class="panel raise" aria-label="Raise an event">
+    <h2>Raise an event</h2>
+    <div class="map-region"><${MapBox} cones=${() => []} legend=${false} goals=${goals}
+      onPlace=${(/** @type {number} */ x, /** @type {number} */ y) => (place.value = [x, y])} /></div>
+    <${Form} /></section>`;
+}
+
+/** The place that is chosen, as the map marks goals. */
+const goals = () => {
+  const at = place.peek();
+  return at ? [{ x: at[0], y: at[1], radius: 0.6, name: 'here' }] : [];
+};
+
+/** Where an event would be raised: what was chosen, else the middle of the first room. */
+function where() {
+  return place.value ?? middle(rooms()[0]?.polygon_m ?? [extent()]);
+}
+
+const rooms = () => (scene.value?.site.rooms ?? []).filter((room) => !room.outdoor);
+
+function extent() {
+  const [left, low, right, high] = scene.value?.site.extent_m ?? [0, 0, 0, 0];
+  return [(left + right) / 2, (low + high) / 2];
+}
+
+/** @param {number[][]} points @returns {[number, number]} */
+function middle(points) {
+  const sum = points.reduce(([x, y], [px, py]) => [x + px, y + py], [0, 0]);
+  return [sum[0] / points.length, sum[1] / points.length];
+}
+
+function Form() {
+  const [kind, setKind] = useState('fire');
+  const [severity, setSeverity] = useState('high');
+  const [told, tell] = useState('');
+  const [x, y] = where();
+  const [left, low, right, high] = scene.value?.site.extent_m ?? [0, 0, 0, 0];
+  const wrong = [wrongNumber(`${x}`, left, right, 'm'), wrongNumber(`${y}`, low, high, 'm')];
+  const raise = async () => {
+    tell('');
+    const done = await act('event_raise', { kind, severity, x_m: x, y_m: y });
+    if (!done.ok) return;
+    tell(done.text);
+    if (done.event) selection.value = { kind: 'event', key: done.event };
+  };
+  return html`<div class="report">
+    <${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />
+    <${Choice} name="Severity" value=${severity} options=${SEVERITIES} onInput=${setSeverity} />
+    <${Rooms} />
+    <${Field} name="x, m" mode="decimal" value=${shown(x)} wrong=${wrong[0]} onInput=${set(0)} />
+    <${Field} name="y, m" mode="decimal" value=${shown(y)} wrong=${wrong[1]} onInput=${set(1)} />
+    <button type="button" class="wide" disabled=${!maySteer.value || Boolean(wrong[0] || wrong[1])}
+      onClick=${raise}>Raise event</button>
+    <p class="soft">${wrong[0] || wrong[1] ? '' : `It will be ${placeOf({ x_m: x, y_m: y })}.`}</p>
+    <p role="status" aria-label="Raised">${told}</p></div>`;
+}
+
+/** @param {number} value */
+const shown = (value) => (Number.isFinite(value) ? `${Number(value.toFixed(2))}` : '');
+
+/** @param {0 | 1} axis */
+const set = (axis) => (/** @type {string} */ text) => {
+  const at = /** @type {[number, number]} */ ([...where()]);
+  at[axis] = text.trim() ? Number(text.replace(',', '.')) : NaN;
+  place.value = at;
+};
+
+function Rooms() {
+  const names = [...new Set(rooms().map((room) => room.name))];
+  if (!names.length) return null;
+  const go = (/** @type {string} */ name) => {
+    const room = rooms().find((each) => each.name === name);
+    if (room) place.value = middle(room.polygon_m);
+  };
+  const options = /** @type {[string, string][]} */ ([['', 'choose a room'], ...names.map((n) => [n, n])]);
+  return html`<${Choice} name="Room" value="" options=${options} onInput=${go} />`;
+}

@@ -1,0 +1,36 @@
+/** The DVA's server: whether it listens and where, and how it is started and stopped. */
+import { html, useState } from '../../vendor/preact.js';
+import { maySteer, rows } from '../store.js';
+import { act } from '../net/actions.js';
+import { Field, wrongNumber } from '../ui/fields.js';
+
+const MOST = 65534;
+
+/** The panel. */
+export function ServerBar() {
+  const server = rows.value?.server;
+  const [port, setPort] = useState(/** @type {string | null} */ (null));
+  if (!server) return null;
+  const { listens, modelled } = server;
+  const shown = port ?? String(server.port ?? '');
+  const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MOST, '');
+  const start = () => act('server_start', { port: Number(shown) });
+  return html`<section class="panel server" aria-label="Server">
+    <p role="status" aria-label="Server state" class=${listens ? 'state' : 'state stopped'}>
+      <i class=${listens ? 'lamp on' : 'lamp'} aria-hidden="true"></i>${stateText(server)}</p>
+    ${server.own !== false &&
+    html`<div class="server-controls">
+      <${Field} name="Port" value=${shown} mode="numeric" most=${5} disabled=${listens || !maySteer.value}
+        wrong=${wrong && 'A port from 1 to 65534 is needed.'} onInput=${setPort} />
+      <button type="button" disabled=${listens || Boolean(wrong) || !maySteer.value} onClick=${start}>Start server</button>
+      <button type="button" disabled=${!listens || !maySteer.value} onClick=${() => act('server_stop')}>Stop server</button>
+    </div>`}
+    ${modelled && html`<p class="soft">The links are modelled: no port of this machine is open.</p>`}
+  </section>`;
+}
+
+/** @param {{listens: boolean, address: string, own?: boolean}} server */
+function stateText({ listens, address, own }) {
+  if (own === false) return listens ? `The DVA at ${address} answers` : `The DVA at ${address} does not answer`;
+  return listens ? `Listens on ${address}` : 'Stopped: nobody is answered';
+}

@@ -1,0 +1,76 @@
+/** Knobs that let things go wrong with a robot; all are undone when they are switched off. */
+import { html, useEffect, useState } from '../../vendor/preact.js';
+import { maySteer } from '../store.js';
+import { act } from '../net/actions.js';
+import { Slider } from '../ui/slider.js';
+import { plain } from '../ui/words.js';
+import { windowOf } from './window.js';
+
+const SLOWEST_S = 3;
+const KNOBS = /** @type {[string, string, string][]} */ ([
+  ['replies', 'Drop replies', 'It does what it is asked, and its answers are lost: whoever asks has a time-out.'],
+  ['freeze', 'Freeze', 'Its computer hangs: it hears and says nothing. Its watchdog stops it; it starts anew idle.'],
+  ['camera', 'Lose the camera', 'It takes no pictures.'],
+]);
+
+/** @typedef {import('../types.js').Thing} Thing */
+
+/** @param {{robot: Thing}} props */
+export function Faults({ robot }) {
+  const faults = windowOf(robot.i)?.faults;
+  const stuck = (windowOf(robot.i)?.sensors ?? []).filter((sensor) => sensor.stuck);
+  const some = faults && (faults.processing_s !== null || KNOBS.some(([key]) => /** @type {any} */ (faults)[key]) || stuck.length);
+  return html`<section class=${some ? 'panel faults some' : 'panel faults'} aria-label="Faults">
+    <h2>Faults <span class="count">${some ? 'something is made to go wrong' : 'none'}</span></h2>
+    <${Processing} robot=${robot} />
+    ${KNOBS.map(([key, name, hint]) => html`<${Knob} key=${key} name=${name} hint=${hint}
+      on=${Boolean(/** @type {any} */ (faults)?.[key])} ask=${{ robot: robot.i, what: key }} />`)}
+    ${(robot.sensors ?? []).map((sensor) => html`<${Knob} key=${sensor} name=${`Stuck: ${plain(sensor)}`}
+      hint="It gives its last value for ever." on=${stuck.some((one) => one.name === sensor)}
+      ask=${{ robot: robot.i, what: 'sensor', sensor }} />`)}
+  </section>`;
+}
+
+/** @param {{name: string, hint: string, on: boolean, ask: object}} props */
+function Knob({ name, hint, on, ask }) {
+  const [shown, change] = useAsked(on, (wanted) => act('fault', { ...ask, on: wanted }));
+  return html`<label class="tick" title=${hint}><input type="checkbox" checked=${shown} disabled=${!maySteer.value}
+    onInput=${(/** @type {any} */ event) => change(event.currentTarget.checked)} /> ${name}</label>`;
+}
+
+/**
+ * What was asked for is shown until the world says the same, or refuses.
+ * @param {boolean} told
+ * @param {(wanted: boolean) => Promise<import('../types.js').Done>} ask
+ * @returns {[boolean, (wanted: boolean) => void]}
+ */
+function useAsked(told, ask) {
+  const [asked, set] = useState(/** @type {boolean | null} */ (null));
+  useEffect(() => {
+    if (asked === told) set(null);
+  }, [asked, told]);
+  const change = (/** @type {boolean} */ wanted) => {
+    set(wanted);
+    ask(wanted).then((done) => !done.ok && set(null));
+  };
+  return [asked ?? told, change];
+}
+
+/** @param {{robot: Thing}} props */
+function Processing({ robot }) {
+  const told = windowOf(robot.i)?.faults.processing_s ?? null;
+  const [own, set] = useState(SLOWEST_S);
+  const ask = (/** @type {boolean} */ on, seconds = own) =>
+    act('fault', { robot: robot.i, what: 'processing', on, ...(on ? { seconds } : {}) });
+  const [isSlow, slow] = useAsked(told !== null, (on) => ask(on));
+  const change = (/** @type {number} */ seconds) => {
+    set(seconds);
+    if (told !== null) ask(true, seconds);
+  };
+  return html`<div class="processing">
+    <label class="tick" title="Each message takes its computer so long."><input type="checkbox" checked=${isSlow}
+      disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => slow(event.currentTarget.checked)} /> Slow computer</label>
+    <${Slider} name="Processing time" min=${0} max=${SLOWEST_S} step=${0.1} value=${told ?? own}
+      disabled=${!maySteer.value} text=${(/** @type {number} */ s) => `${s.toFixed(1)} s`} onInput=${change} />
+  </div>`;
+}

@@ -1,0 +1,66 @@
+/** Drive the robot at the robot itself: no message, no session, the same limits and watchdog. */
+import { html, useEffect } from '../../vendor/preact.js';
+import { connection, mayDrive, maySteer } from '../store.js';
+import { act, driveLost } from '../net/actions.js';
+import { DriveSliders } from '../drive/drive_sliders.js';
+import { driveByGamepad } from '../drive/gamepad.js';
+import { interrupt, interrupted, steerWith, watchInterruptions } from '../drive/hold.js';
+import { driveByKeys } from '../drive/keys.js';
+import { Stick } from '../drive/stick.js';
+import { Station } from './station.js';
+import { isInHand, myHand, windowOf } from './window.js';
+
+/** @typedef {import('../types.js').Thing} Thing */
+
+/** @param {{robot: Thing}} props */
+export function ManualControl({ robot }) {
+  const mine = isInHand(robot.i);
+  useEffect(() => (mine ? steering() : undefined), [mine]);
+  useEffect(() => {
+    if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
+  }, [connection.value, driveLost.value]);
+  const may = maySteer.value;
+  const listens = windowOf(robot.i)?.station.state === 'listening';
+  const limits = { max_speed_mps: robot.max_speed_mps, max_turn_rate_radps: robot.max_turn_rate_radps };
+  return html`<section class="panel controls manual" aria-label="Manual control"><h2>Manual control</h2>
+    <${Station} robot=${robot} />
+    <div class="buttons">
+      <button type="button" class=${mine ? '' : 'go'} disabled=${!may || mine || !listens} onClick=${() => take(robot.i)}>Take manual control</button>
+      <button type="button" disabled=${!may || !mine} onClick=${() => act('manual_release')}>Release manual control</button>
+    </div>
+    <p class="hint" role="status" aria-label="Manual control">${hint(robot)}</p>
+    <div class="steering"><${Stick} disabled=${!may || !mine} />
+      <${DriveSliders} limits=${limits} disabled=${!may || !mine} /></div>
+    <p class="keys soft">Hold <kbd>↑</kbd> <kbd>←</kbd> <kbd>→</kbd> or <kbd>W</kbd> <kbd>A</kbd> <kbd>D</kbd>,
+      the stick or a slider. Letting go stops; there is no reverse.</p>
+  </section>`;
+}
+
+/** @param {number} i */
+async function take(i) {
+  const done = await act('manual_take', { robot: i });
+  if (done.ok && typeof done.hand === 'number') myHand.value = done.hand;
+}
+
+/** Keys and gamepad steer this robot for as long as it is in hand, and whatever interrupts stops. */
+function steering() {
+  const ends = [steerWith('manual'), driveByKeys(), driveByGamepad(), watchInterruptions()];
+  return () => {
+    interrupt('');
+    ends.reverse().forEach((end) => end());
+  };
+}
+
+/** @param {Thing} robot */
+function hint(robot) {
+  const shown = windowOf(robot.i);
+  if (connection.value !== 'open') return 'There is no connection to the world: nothing can be driven.';
+  if (!mayDrive.value) return 'This address may only look.';
+  if (!shown) return '';
+  if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped: take hold again.` : 'It is in your hand. Hold to drive; whoever else asks for it is told that it is busy.';
+  if (shown.station.state !== 'listening') return 'It has to be registered and listening first.';
+  if (shown.hand !== null) return 'It is in the hand of another page.';
+  if (shown.mode !== 'Idle' && shown.mode !== 'Emergency') return `Only an idle robot can be taken: it is in mode ${shown.mode}.`;
+  if (shown.holder) return `${shown.holder} holds it.`;
+  return 'It is free.';
+}

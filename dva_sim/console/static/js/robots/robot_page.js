@@ -1,0 +1,69 @@
+/** The windows of one robot: what it hears, how its wheels turn, and hands on it. */
+import { html, useEffect } from '../../vendor/preact.js';
+import { isPast, maySteer, modeOf } from '../store.js';
+import { stopRobots } from '../net/actions.js';
+import { watch } from '../net/sockets.js';
+import { CameraPicture } from '../drive/camera.js';
+import { Icon, ModeMark } from '../ui/icon.js';
+import { clockText } from '../ui/words.js';
+import { Faults } from './faults.js';
+import { ManualControl } from './manual_control.js';
+import { RobotLatency } from './robot_latency.js';
+import { RobotLog } from './robot_log.js';
+import { Sensors } from './sensors.js';
+import { SideView } from './side_view.js';
+import { TopView } from './top_view.js';
+import { shownMode, windowOf } from './window.js';
+
+/** @typedef {import('../types.js').Thing} Thing */
+
+/** @param {{robot: Thing}} props */
+export function RobotPage({ robot }) {
+  useEffect(() => {
+    watch([robot.i]);
+    return () => watch([]);
+  }, [robot.i]);
+  return html`<main class="page robot-page" id="main" tabindex="-1">
+    <${Head} robot=${robot} />
+    <div class="column"><${RobotLog} robot=${robot} /><${RobotLatency} robot=${robot} /></div>
+    <div class="column"><${SideView} robot=${robot} /><${TopView} robot=${robot} />
+      ${!isPast.value && html`<${Sensors} robot=${robot} />`}</div>
+    <div class="column">${!isPast.value && html`<${ManualControl} robot=${robot} />`}
+      <section class="panel camera-panel" aria-label="Camera"><h2>Camera</h2>
+        <${CameraPicture} robot=${robot} /></section>
+      ${!isPast.value && html`<${Faults} robot=${robot} />`}</div>
+  </main>`;
+}
+
+/** @param {{robot: Thing}} props */
+function Head({ robot }) {
+  const shown = windowOf(robot.i);
+  const mode = shown ? shownMode(robot.i) : modeOf(robot.i);
+  const left = shown?.watchdog_left_s ?? null;
+  return html`<header class="robot-bar">
+    <h1>${robot.label}</h1>
+    <span role="status" aria-label="Mode" class="mode-status"><${ModeMark} mode=${mode} /> ${mode}</span>
+    ${shown?.holder && html`<span>held by ${shown.holder}</span>`}
+    ${!isPast.value && html`<span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
+    <span class="gap"></span>
+    <a href="#/robots">All robots</a>
+    ${!isPast.value && html`<button type="button" class="stop-one" disabled=${!maySteer.value}
+      onClick=${() => stopRobots([robot.i])}><${Icon} name="octagon-x" />Stop ${robot.label}</button>
+    <${Reasons} robot=${robot} />`}
+  </header>`;
+}
+
+/** Why it stands; an emergency and a lost link stand out. @param {{robot: Thing}} props */
+function Reasons({ robot }) {
+  const shown = windowOf(robot.i);
+  if (!shown) return html`<p class="reason" role="status" aria-label="Reason">Waiting for word of it …</p>`;
+  const { emergency, mode, stands, notice, link_lost: lost } = shown;
+  const stop = mode === 'Emergency' && emergency;
+  const text = stop
+    ? `Emergency stop by ${emergency.by} at ${clockText(emergency.at_ms)}: it stands until it is ordered anew.`
+    : lost
+      ? `Link lost: ${stands}`
+      : stands && `Stands: ${stands}`;
+  return html`<p class=${stop || lost ? 'reason warning' : 'reason'} role="status" aria-label="Reason">
+    <span>${text || 'It moves.'}${notice && ` ${notice}.`}</span></p>`;
+}

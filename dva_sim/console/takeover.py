@@ -1,0 +1,103 @@
+"""Taking a robot over by hand: from its holder, with what it was sent to, step by step.
+
+A supervisor's control room revokes the holder's session and calls the robot off; it is sent to the
+same event anew, to be driven by the person's own seat; and the seat asks for it, which succeeds
+once it stands. Each step is a message, and the DVA may refuse any.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from dva_sim.console.refusal import Said
+from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.protocol import messages as m
+
+AGAIN: Final = 0.5  # while a robot is brought to a standstill, or the policy was quicker [s]
+MOST_TRIES: Final = 40
+
+
+class Takeover:
+    """One robot on its way into a person's hands.
+
+    Args:
+        room: Whose decision it is.
+        robot: By its id.
+        reason: In words.
+        event: How that stands which the robot was sent to; None: it was sent nowhere.
+        seat: Id of the device that shall drive it.
+        take: Has the seat ask for the robot.
+        said: Told how it ended.
+    """
+
+    def __init__(
+        self,
+        room: ConsoleRoom,
+        robot: str,
+        reason: str,
+        event: m.EventStatus | None,
+        seat: str,
+        take: Callable[[Said], object],
+        said: Said,
+    ) -> None:
+        self._room, self._robot, self._reason = room, robot, reason
+        self._event, self._seat, self._take, self._said = event, seat, take, said
+        self._tries = 0
+
+    def begin(self) -> None:
+        """Take the robot from whoever holds it."""
+        if self._event is not None and self._event.operator == self._seat:
+            self._ask_for_it()
+        else:
+            self._room.agent.ask(m.Revoke(self._robot, self._reason), self._revoked, self._lost)
+
+    def _lost(self) -> None:
+        self._said(False, NO_ANSWER)
+
+    def _revoked(self, reply: m.Reply) -> None:
+        if reply.code != m.OK:
+            self._said(False, why(reply))
+        elif self._event is None:
+            self._ask_for_it()
+        else:
+            # Where nobody held it yet, somebody may still be about to; else this is refused.
+            body = m.TakeOff(self._event.event_id, self._robot, self._reason)
+            self._room.agent.ask(body, self._called_off, self._lost)
+
+    def _called_off(self, reply: m.Reply) -> None:
+        self._send(reply.content)
+
+    def _send(self, content: object) -> None:
+        """Send it to the same event, driven by the seat, if the event is still open."""
+        event = content if isinstance(content, m.EventStatus) else self._event
+        assert event is not None
+        if event.closed_for is not None:
+            self._ask_for_it()
+            return
+        number, decisions = event.event_id, event.decisions
+        body = m.Assign(number, self._robot, self._seat, None, self._reason, decisions)
+        self._room.agent.ask(body, self._sent, self._lost)
+
+    def _sent(self, reply: m.Reply) -> None:
+        status = reply.content
+        if reply.code == m.OK or not self._has_another_try():
+            self._ask_for_it()
+        elif isinstance(status, m.EventStatus):
+            # The policy was quicker, or the robot is not free yet.
+            self._room.device.clock.call_after(AGAIN, self._send, status)
+        else:
+            self._ask_for_it()
+
+    def _ask_for_it(self) -> None:
+        self._take(self._taken)
+
+    def _taken(self, ok: bool, text: str, /, **more: object) -> None:
+        if ok or not self._has_another_try():
+            self._said(ok, text, **more)
+        else:
+            self._room.device.clock.call_after(AGAIN, self._ask_for_it)
+
+    def _has_another_try(self) -> bool:
+        self._tries += 1
+        return self._tries < MOST_TRIES

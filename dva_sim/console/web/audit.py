@@ -1,0 +1,115 @@
+"""The audit log for pages and programs: read from its file, which the world alone writes."""
+
+from __future__ import annotations
+
+import asyncio
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from dva_sim.console.audit_measures import measured
+from dva_sim.console.web.rest import NOT_KEPT, problem
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.audit_log import COLUMNS, AuditRow, plain_row, read_rows, verify
+
+MOST_ROWS = 1000  # in one answer
+FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would compute what begins so
+
+
+class AuditPages:
+    """What is answered of the audit log.
+
+    Args:
+        path: Of its file; None: there is none.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+
+    async def rows(self, request: Request) -> Response:
+        """`GET /api/audit?after=N`: the rows after a number, up to a thousand."""
+        after = request.query_params.get("after", "0")
+        if not after.isascii() or not after.isdigit() or len(after) > 12:
+            return problem(400, "after should be a whole number")
+        return await self._read(self._rows, int(after))
+
+    def _rows(self, path: Path, after: int) -> Response:
+        rows = read_rows(path, after, MOST_ROWS)
+        body = {"rows": [plain_row(row) for row in rows], "more": len(rows) == MOST_ROWS}
+        return JSONResponse(body, headers=NOT_KEPT)
+
+    async def measures(self, _: Request) -> Response:
+        """`GET /api/audit/measures`: times to acknowledge and to assign, and overrides."""
+        return await self._read(
+            lambda path: JSONResponse(measured(read_rows(path)), headers=NOT_KEPT)
+        )
+
+    async def check(self, _: Request) -> Response:
+        """`GET /api/audit/check`: whether the chain holds, and the first row that is wrong."""
+        return await self._read(_checked)
+
+    async def as_csv(self, _: Request) -> Response:
+        """`GET /api/audit.csv`."""
+        return await self._read(lambda path: _file("csv", "text/csv", csv_of(read_rows(path))))
+
+    async def as_json(self, _: Request) -> Response:
+        """`GET /api/audit.json`."""
+        return await self._read(
+            lambda path: _file("json", "application/json", json_of(read_rows(path)))
+        )
+
+    async def _read(self, do: Any, *more: Any) -> Response:
+        if self._path is None:
+            return problem(404, "this console keeps no audit log")
+        try:
+            answer: Response = await asyncio.to_thread(do, self._path, *more)
+        except ConfigError as error:
+            return problem(503, error.problem)
+        return answer
+
+
+def _checked(path: Path) -> Response:
+    found = verify(path)
+    wrong = found.problem
+    body = {
+        "rows": found.rows,
+        "hash": found.head,
+        "problem": None if wrong is None else {"row": wrong.number, "text": wrong.text},
+        "doubts": [doubt for doubt in found.doubts if "not an end" not in doubt],  # it still runs
+    }
+    return JSONResponse(body, headers=NOT_KEPT)
+
+
+def _file(suffix: str, kind: str, text: str) -> Response:
+    headers = NOT_KEPT | {"Content-Disposition": f'attachment; filename="audit.{suffix}"'}
+    return Response(text, headers=headers, media_type=kind)
+
+
+def csv_of(rows: Sequence[AuditRow]) -> str:
+    """Rows for a spreadsheet; what it would take for a formula begins with an apostrophe.
+
+    References:
+        OWASP, "CSV injection".
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(COLUMNS)
+    for row in rows:
+        plain = plain_row(row) | {"details": json.dumps(row.details, sort_keys=True)}
+        writer.writerow([_harmless(value) for value in plain.values()])
+    return text.getvalue()
+
+
+def _harmless(value: Any) -> Any:
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value
+
+
+def json_of(rows: Sequence[AuditRow]) -> str:
+    """Rows for programs, hashes included, so that the chain can be followed there, too."""
+    return json.dumps({"rows": [plain_row(row) for row in rows]}, indent=1)

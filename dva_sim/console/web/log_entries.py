@@ -1,0 +1,153 @@
+"""One line of a log of messages: what was asked, by whom, what came of it, in words and whole."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Final
+
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
+
+Line = dict[str, Any]
+Names = Mapping[str, str]
+
+UNANSWERED: Final = "none"  # in place of the code of a reply
+_SHOWN: Final = 60  # characters of a payload in a line
+_HEADER: Final = ("DestinationID", "MessageID", "SourceID", "Timestamp", "SessionID")
+
+
+@dataclass(slots=True)
+class Entry:
+    """An exchange, read.
+
+    Attributes:
+        number: In its log, from 1.
+        time: Of arrival, by the run's clock [ms].
+        data: The request, or the publication; the first bytes of one that is too long.
+        reply: The answer, if there is one.
+        service_us: How long the answer took.
+        published: Whether it is a publication.
+        kind: Of message, as its element is called; `?` if that cannot be seen.
+        payload: What it says, in a few characters.
+        header: What its header holds, as far as that can be read.
+        label: What a device calls itself that registers.
+        code: Of the reply; None without one.
+        text: What the reply says in words.
+    """
+
+    number: int
+    time: int
+    data: bytes
+    reply: bytes | None
+    service_us: int | None
+    published: bool
+    kind: str = "?"
+    payload: str = ""
+    header: dict[str, str] = field(default_factory=dict)
+    label: str = ""
+    code: int | None = None
+    text: str = ""
+
+    @classmethod
+    def of(cls, line: list[Any]) -> Entry:
+        """What the simulation says of an exchange; see `dva_sim.console.logs`."""
+        number, time, data, reply, took, published = line
+        answer = None if reply is None else str(reply).encode("latin-1")
+        entry = cls(number, time, str(data).encode("latin-1"), answer, took, bool(published))
+        entry._read()
+        return entry
+
+    @property
+    def size(self) -> int:
+        """So many bytes it keeps."""
+        return len(self.data) + len(self.reply or b"")
+
+    def _read(self) -> None:
+        self.header = header_of(self.data)
+        try:
+            body = decode(self.data).body
+            self.kind, self.payload = kind_of(self.data), payload_of(body)
+            self.label = body.label if isinstance(body, m.Registration) else ""
+        except ProtocolError as error:
+            self.kind, self.payload = kind_of(self.data), error.reason[:_SHOWN]
+        if self.reply is not None:
+            try:
+                answer = decode(self.reply).body
+            except ProtocolError:
+                return
+            if isinstance(answer, m.Reply):
+                self.code, self.text = answer.code, answer.text
+
+    def brief(self, names: Names) -> Line:
+        """What a table shows of it."""
+        header = self.header
+        source, to = header.get("SourceID", ""), header.get("DestinationID", "")
+        return {
+            "n": self.number,
+            "t": self.time,
+            "kind": self.kind,
+            "payload": self.payload,
+            "from": source,
+            "from_label": names.get(source, ""),
+            "to": to,
+            "to_label": names.get(to, ""),
+            "session": header.get("SessionID", ""),
+            "code": self.code,
+            "word": m.CODE_NAMES.get(self.code, str(self.code)) if self.code is not None else "",
+            "text": self.text,
+            "service_us": self.service_us,
+            "published": self.published,
+        }
+
+
+_ELEMENT: Final = re.compile(rb"<(\w{1,64})\s*/?>")
+_ENDS: Final = ("SessionID", "Timestamp")
+_GROUPS: Final = frozenset({"Access", "Dispatch", "Event", "Mission", "Sensor", "TeleOp"})
+
+
+def kind_of(data: bytes) -> str:
+    """What a message is, by its elements alone, so that a broken one has a kind, too.
+
+    A message is named by the first element after its header, or by the one in that if it groups
+    several kinds; without a payload it is called by its own element.
+    """
+    found = [name.decode() for name in _ELEMENT.findall(data[:1024])]
+    kind = found[1] if len(found) > 1 and found[0] == "msg" else "?"
+    after = max((found.index(name) for name in _ENDS if name in found), default=-1)
+    inner = found[after + 1 :] if after >= 0 else []
+    if kind != "SimpleMsg" or not inner:
+        return kind
+    return str(inner[1] if len(inner) > 1 and inner[0] in _GROUPS else inner[0])
+
+
+def header_of(data: bytes) -> dict[str, str]:
+    """The elements of a header as they stand, of a message that may be broken."""
+    start, found = data[:1024], {}
+    for name in _HEADER:
+        match = re.search(rb"<%s>([^<]{0,64})</%s>" % (name.encode(), name.encode()), start)
+        if match:
+            found[name] = match[1].decode("utf-8", "replace").strip()
+    return found
+
+
+def payload_of(body: Any) -> str:
+    """What a message says, in a few characters: the values of its fields."""
+    said = ", ".join(
+        f"{one.name} {_value(getattr(body, one.name))}"
+        for one in fields(body)
+        if getattr(body, one.name) not in (None, (), "")
+    )
+    return said if len(said) <= _SHOWN else said[: _SHOWN - 1] + "…"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, m.Position):
+        return f"{value.latitude:.6f} {value.longitude:.6f}"
+    if isinstance(value, tuple):
+        return f"{len(value)}x" if len(value) > 2 else " ".join(_value(one) for one in value)
+    return str(value)

@@ -1,0 +1,275 @@
+"""Logs of messages, as the web process keeps them, and how far each page has seen them.
+
+The world tells exchanges in batches with numbers (`dva_sim.console.logs`); here the newest 10,000
+of each log are kept, read, and filtered. A page says which logs it looks at, and with which filter:
+
+    {"do": "look", "logs": {"robot-1": {"kind": "SetTeleOp", "publications": true}}}
+
+and gets lines of the kind `log` on its state socket: first the newest that match (`first` is
+true: what the page has shown before is over), then what comes, at most 200 at once. `missed` says
+how many were left out before the first of `lines`; an entry that was told before comes again with
+its reply. An empty object takes all; a log that is not named is not told any more.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any, Final
+
+from dva_sim.console.web.checks import BadMessage
+from dva_sim.console.web.log_entries import UNANSWERED, Entry, Names
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+KEPT: Final = 10_000  # exchanges of a log
+KEPT_BYTES: Final = 32 << 20  # of them
+AT_ONCE: Final = 200  # entries told to a page
+TABLES: Final = ("devices",)
+MOST_LOGS: Final = 8  # that a page looks at
+MOST_KNOWN: Final = 256  # logs of which anything is kept
+MOST_NAMES: Final = 4096
+
+
+@dataclass(frozen=True)
+class LogFilter:
+    """What a page wants to see of a log.
+
+    Attributes:
+        device: Part of the id or the label of who asks or is asked.
+        kind: Of message.
+        code: Of the reply, `none` for those without, or `refused` for all but OK.
+        text: What occurs in a message or its reply.
+        publications: Whether publications are wanted.
+        since: Only entries of a higher number: what came before was cleared.
+    """
+
+    device: str = ""
+    kind: str = ""
+    code: str = ""
+    text: str = ""
+    publications: bool = False
+    since: int = 0
+
+    @classmethod
+    def of(cls, given: Any) -> LogFilter:
+        """What a page says.
+
+        Raises:
+            BadMessage: it makes no sense.
+        """
+        if not isinstance(given, dict):
+            raise BadMessage("a log's filter should be an object")
+        words = {key: given.get(key, "") for key in ("device", "kind", "code", "text")}
+        for key, value in words.items():
+            if not isinstance(value, str) or len(value) > 200:
+                raise BadMessage(f"{key} should be a text of at most 200 characters")
+        since, all_kinds = given.get("since", 0), given.get("publications", False)
+        if type(since) is not int or not isinstance(all_kinds, bool):
+            raise BadMessage("since should be a number, publications true or false")
+        return cls(**words, publications=all_kinds, since=since)
+
+    def takes(self, entry: Entry, names: Names) -> bool:
+        """Whether an entry is wanted."""
+        if entry.number <= self.since or (entry.published and not self.publications):
+            return False
+        if self.kind and entry.kind != self.kind:
+            return False
+        return self._is_of_device(entry, names) and self._has_code(entry) and self._says(entry)
+
+    def _is_of_device(self, entry: Entry, names: Names) -> bool:
+        if not self.device:
+            return True
+        header, wanted = entry.header, self.device.lower()
+        ends = header.get("SourceID", ""), header.get("DestinationID", "")
+        return any(wanted in f"{end} {names.get(end, '')}".lower() for end in ends)
+
+    def _has_code(self, entry: Entry) -> bool:
+        if not self.code:
+            return True
+        if self.code == UNANSWERED:
+            return entry.code is None
+        if self.code == "refused":
+            return entry.code not in (None, m.OK)
+        return str(entry.code) == self.code
+
+    def _says(self, entry: Entry) -> bool:
+        wanted = self.text.encode()
+        return not wanted or wanted in entry.data or wanted in (entry.reply or b"")
+
+
+class KeptLog:
+    """One log.
+
+    Attributes:
+        entries: By number, the oldest first.
+        changed: How many changes there were: a new entry, or one that got its reply.
+        lost: How many exchanges the simulation left out.
+        bytes: What messages take.
+        newest: Number of the newest entry.
+        begun: How often it has begun anew, as when a recording is wound back.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.entries: dict[int, Entry] = {}
+        self.changed = self.lost = self.bytes = self.newest = self.begun = 0
+        self._changes: deque[int] = deque(maxlen=KEPT)  # numbers
+
+    def take(self, entries: Iterable[Entry]) -> None:
+        """What the simulation tells."""
+        for entry in entries:
+            known = self.entries.get(entry.number)
+            if entry.number > self.newest:
+                self.lost += entry.number - self.newest - 1
+                self.newest = entry.number
+            elif known is None:
+                continue  # so old that it has been forgotten
+            self.entries[entry.number] = entry  # one that is told again keeps its place
+            self.bytes += entry.size - (known.size if known is not None else 0)
+            self.changed += 1
+            self._changes.append(entry.number)
+        self._forget()
+
+    def begin(self, before: int) -> None:
+        """Forget all: what comes next begins after the entry of that number."""
+        self.entries.clear()
+        self._changes.clear()
+        self.bytes, self.newest = 0, before
+        self.begun += 1
+
+    def _forget(self) -> None:
+        while len(self.entries) > KEPT or self.bytes > KEPT_BYTES:
+            oldest = next(iter(self.entries))
+            self.bytes -= self.entries.pop(oldest).size
+
+    def since(self, change: int) -> Iterator[Entry]:
+        """What has changed since, the newest change first."""
+        numbers = islice(reversed(self._changes), self.changed - change)
+        return (entry for n in numbers if (entry := self.entries.get(n)) is not None)
+
+    def find(self, wanted: LogFilter, names: Names, before: int | None, most: int) -> list[Entry]:
+        """The newest entries that match, below a number; the oldest first."""
+        found = (
+            entry
+            for entry in reversed(self.entries.values())
+            if (before is None or entry.number < before) and wanted.takes(entry, names)
+        )
+        return list(islice(found, most))[::-1]
+
+
+class KeptLogs:
+    """All logs that were ever told.
+
+    Attributes:
+        names: Labels of devices by id: of the scene, of the table, of who has registered.
+    """
+
+    def __init__(self) -> None:
+        self._logs: dict[str, KeptLog] = {}
+        self.names: dict[str, str] = {}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._logs
+
+    def of(self, name: str) -> KeptLog:
+        """A log by its name, empty if nothing was told of it."""
+        if name not in self._logs and len(self._logs) >= MOST_KNOWN:
+            del self._logs[next(iter(self._logs))]
+        return self._logs.setdefault(name, KeptLog(name))
+
+    def meet(self, names: Names) -> None:
+        """Learn labels; of those that nobody can remember all, the oldest are forgotten."""
+        self.names |= names
+        while len(self.names) > MOST_NAMES:
+            del self.names[next(iter(self.names))]
+
+    def take(self, line: Line) -> None:
+        """A line of the kind `log`."""
+        entries = [Entry.of(one) for one in line["lines"]]
+        for entry in entries:
+            if entry.kind == "RegMsg" and entry.code == m.OK:
+                self.meet({entry.header["SourceID"]: entry.label})
+        log = self.of(str(line["log"]))
+        if line.get("anew"):
+            log.begin(entries[0].number - 1 if entries else 0)
+        log.take(entries)
+
+
+class Looks:
+    """Which logs and tables a page looks at, and what it has seen of each log.
+
+    Args:
+        logs: All there are.
+        acts: Whether the page may drive: who may not does not learn of sessions, by which one does.
+
+    Attributes:
+        wanted: The logs it looks at.
+        tables: The tables it looks at: lines that only such pages get.
+    """
+
+    def __init__(self, logs: KeptLogs, acts: bool) -> None:
+        self._logs, self.acts = logs, acts
+        self.wanted: dict[str, LogFilter] = {}
+        self.tables: frozenset[str] = frozenset()
+        self._seen: dict[str, tuple[int, int, int]] = {}  # changes, lost, begun
+
+    def look(self, logs: Any, tables: Any) -> None:
+        """From now on the page looks at these.
+
+        Raises:
+            BadMessage: it makes no sense.
+        """
+        if not isinstance(logs, dict) or len(logs) > MOST_LOGS:
+            raise BadMessage(f"logs should be an object of at most {MOST_LOGS} logs")
+        if not isinstance(tables, list) or not set(tables) <= set(TABLES):
+            raise BadMessage(f"tables should be some of: {', '.join(TABLES)}")
+        wanted = {str(name)[:64]: self.filter(one) for name, one in logs.items()}
+        same = {name for name, one in wanted.items() if self.wanted.get(name) == one}
+        self._seen = {name: seen for name, seen in self._seen.items() if name in same}
+        self.wanted, self.tables = wanted, frozenset(tables)
+
+    def filter(self, given: Any) -> LogFilter:
+        """What a page says it wants to see; who may not act does not search whole messages.
+
+        Raises:
+            BadMessage: it makes no sense.
+        """
+        wanted = LogFilter.of(given)
+        return wanted if self.acts else replace(wanted, text="")
+
+    def next(self) -> Line | None:
+        """What the page gets next of the logs that it looks at; None if it has everything."""
+        for name, wanted in self.wanted.items():
+            log = self._logs.of(name)
+            goes_on = name in self._seen and self._seen[name][2] == log.begun
+            line = self._more(log, wanted) if goes_on else self._first(log, wanted)
+            self._seen[name] = log.changed, log.lost, log.begun
+            if line is not None:
+                return {"k": "log", "log": name, "total": log.newest, **line}
+        return None
+
+    def brief(self, entry: Entry) -> Line:
+        """What a page may see of an entry in a table."""
+        brief = entry.brief(self._logs.names)
+        return brief if self.acts else brief | {"session": "", "payload": ""}
+
+    def _first(self, log: KeptLog, wanted: LogFilter) -> Line:
+        found = log.find(wanted, self._logs.names, None, AT_ONCE)
+        return {"first": True, "missed": 0, "lines": [self.brief(entry) for entry in found]}
+
+    def _more(self, log: KeptLog, wanted: LogFilter) -> Line | None:
+        changed, lost, _ = self._seen[log.name]
+        found = {
+            entry.number: entry
+            for entry in log.since(changed)
+            if wanted.takes(entry, self._logs.names)
+        }
+        missed = max(0, len(found) - AT_ONCE) + log.lost - lost
+        if not found and not missed:
+            return None
+        lines = [self.brief(found[number]) for number in sorted(found)[-AT_ONCE:]]
+        return {"first": False, "missed": missed, "lines": lines}

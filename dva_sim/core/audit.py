@@ -1,0 +1,126 @@
+"""What was decided, by whom, why, and what came of it: the facts that an audit log is made of.
+
+A fact is a value: whoever keeps facts needs nothing else of the DVA. The DVA hands each out once
+(`AuditTrail.take`), and decides nothing by them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from dva_sim.protocol import messages as m
+
+MOST_KEPT = 10_000  # facts that nobody has taken yet; older ones are lost, and counted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fact:
+    """One decision.
+
+    Attributes:
+        time: When, by the DVA's clock [s].
+        author: Id of the device that decided; the DVA's for its policy and its rules.
+        label: What that is called: of the policy its name, of a rule `rule`.
+        role: Of the author, if it is a control room: `look`, `drive`, `dispatch`, `supervise`.
+        action: What was decided: `acknowledge`, `assign`, `take_off`, `false_alarm`, `escalate`,
+            `note`, `set_dispatch`, `revoke`, `raise`, `take`, `take_over`, `give_back`, `expire`.
+        event: Number of the event that it is about.
+        device: Id of the guard or robot that it is about.
+        operator: Id of the device that drives that robot.
+        task: `confirm`, `contain` or `stand_by`.
+        arrival_in: When that one would be there, as expected [s from then].
+        mode: How orders are given from then on: `automatic` or `ask_first`.
+        text: What a note says, or where an event was raised.
+        cause: Why, in words of the author.
+        code: `messages.OK`, or why it was refused.
+        outcome: What came of it, in words; of a refusal its reason.
+        advised: Id of whom the policy would have sent; None: nobody, or that is no matter here.
+        advised_in: When that one would be there, as expected [s from then].
+        waited: Since the event was first reported [s].
+    """
+
+    time: float
+    author: str
+    label: str
+    action: str
+    role: str | None = None
+    event: int | None = None
+    device: str | None = None
+    operator: str | None = None
+    task: str | None = None
+    arrival_in: float | None = None
+    mode: str | None = None
+    text: str | None = None
+    cause: str = ""
+    code: int = m.OK
+    outcome: str = ""
+    advised: str | None = None
+    advised_in: float | None = None
+    waited: float | None = None
+
+    @property
+    def overrides(self) -> bool:
+        """Whether a person has sent somebody else than the policy would have sent."""
+        done = self.action == "assign" and self.code == m.OK and self.role is not None
+        return done and self.device != self.advised
+
+    def row(self) -> dict[str, Any]:
+        """What it holds, by names, in plain numbers and words that JSON can hold."""
+        return asdict(self)
+
+    def record(self) -> m.AuditRecord:
+        """The same as a message, as far as one can hold it."""
+        return m.AuditRecord(
+            self.author,
+            self.label[:64],
+            self.action,
+            _told(self.cause),
+            self.code,
+            _told(self.outcome),
+            self.role,
+            self.event,
+            self.device,
+            self.task,
+            _span(self.arrival_in),
+            self.advised,
+            _span(self.advised_in),
+        )
+
+
+LONGEST = 1e6  # no longer time is told [s]
+
+
+def _told(text: str) -> str:
+    """So much of a text as a message can hold."""
+    return text[:256]
+
+
+def _span(seconds: float | None) -> float | None:
+    return None if seconds is None else max(0.0, min(seconds, LONGEST))
+
+
+@dataclass
+class AuditTrail:
+    """The facts that nobody has taken yet, oldest first.
+
+    Attributes:
+        keeps: Whether facts are wanted at all.
+        lost: How many were forgotten, as nobody took them in time.
+    """
+
+    keeps: bool = True
+    lost: int = 0
+    _facts: deque[Fact] = field(default_factory=lambda: deque(maxlen=MOST_KEPT))
+
+    def note(self, fact: Fact) -> None:
+        """Something was decided."""
+        self.lost += len(self._facts) == MOST_KEPT
+        self._facts.append(fact)
+
+    def take(self) -> list[Fact]:
+        """What was decided since this was last asked."""
+        facts = list(self._facts)
+        self._facts.clear()
+        return facts

@@ -1,0 +1,134 @@
+"""Who could be sent to an event, when each would be there, and why not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from dva_sim.core.dispatcher import Advised, Dispatcher
+from dva_sim.core.events import Event, State
+from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
+from dva_sim.core.situation_builder import KINDS
+from dva_sim.core.travel_times import Start
+from dva_sim.core.wire_size import LIST_BYTES, xml_size
+from dva_sim.protocol import messages as m
+
+FREE = "free"
+MOST_NAMED = 32
+CANDIDATE_BYTES = 200  # of one, without what is written for people [B]
+
+
+def proposal(dispatcher: Dispatcher, event: Event, now: float) -> m.Proposal:
+    """What the policy would do about an event, with its reasons."""
+    advised = dispatcher.advised(event, now)
+    everybody = sorted(_everybody(dispatcher, event, now), key=_earliest_first)
+    question = dispatcher.questions.of(event.number)
+    within = None if question is None else max(0.0, question.until - now)
+    reason = _reason(event, advised, everybody)
+    named, arrival = (advised.device, advised.arrival_in) if advised else (None, None)
+    task = advised.task if advised else event.waits_for if event.open else None
+    return m.Proposal(
+        event.number,
+        dispatcher.name,
+        reason,
+        task,
+        named,
+        arrival,
+        within,
+        _as_many_as_fit(everybody),
+    )
+
+
+def _earliest_first(who: m.Candidate) -> tuple[bool, float, str]:
+    return who.reason != FREE, math.inf if who.arrival_in is None else who.arrival_in, who.device
+
+
+def _reason(event: Event, advised: Advised | None, everybody: list[m.Candidate]) -> str:
+    """Why so: what can be told of a policy by what it advises."""
+    if not event.open:
+        return f"it is over: {event.state}"
+    free = [c for c in everybody if c.reason == FREE and c.arrival_in is not None]
+    if advised is None:
+        if event.waits_for is None:
+            return "nobody is missing there"
+        return "the policy lets it wait" if free else "nobody can go"
+    if advised.device in (event.responder, event.actor):
+        return "was sent there by the policy"
+    sooner = [c for c in free if (c.arrival_in or 0.0) < advised.arrival_in - 0.05]
+    if not sooner:
+        return f"the earliest there of {len(free)} who could go"
+    best = sooner[0]
+    gap = advised.arrival_in - (best.arrival_in or 0.0)
+    return f"chosen by the policy; {best.label} would be there {gap:.0f} s earlier"[:256]
+
+
+def _everybody(dispatcher: Dispatcher, event: Event, now: float) -> Iterator[m.Candidate]:
+    """All guards and robots."""
+    registry = dispatcher.orders.registry
+    entries = [
+        entry for entry in registry.entries.values() if entry.device.device_type in (GUARD, ROBOT)
+    ]
+    for entry, way in zip(entries, _ways(dispatcher, entries, event), strict=True):
+        why = _why_not(dispatcher, entry, event, way, now) or FREE
+        arrival = way if math.isfinite(way) else None
+        yield m.Candidate(entry.device.id_tag, entry.device.label, why[:256], arrival)
+
+
+def _ways(dispatcher: Dispatcher, entries: list[DeviceEntry], event: Event) -> list[float]:
+    """When each would be there [s from now]; infinite where that is not known, or never."""
+    engaged = dispatcher.orders.engaged
+    known = {
+        e.device.id_tag: Start(
+            e.device.id_tag, KINDS[e.device.device_type], e.position, e.device.id_tag in engaged
+        )
+        for e in entries
+        if e.position is not None
+    }
+    if not known:
+        return [math.inf] * len(entries)
+    eta = dispatcher.situations.travel(list(known.values()), [event.position])[1][0]
+    found = dict(zip(known, map(float, eta), strict=True))
+    return [found.get(entry.device.id_tag, math.inf) for entry in entries]
+
+
+def _why_not(
+    dispatcher: Dispatcher, entry: DeviceEntry, event: Event, way: float, now: float
+) -> str:
+    """The first reason why somebody cannot be sent there now; empty: it can."""
+    orders, device = dispatcher.orders, entry.device
+    if entry.silent:
+        return f"not heard of for {now - entry.last_heard:.0f} s"
+    if at := orders.engaged.all(device.id_tag):
+        return "is sent there already" if event in at else f"is at event {at[0].number}"
+    if device.id_tag in event.handling.taken_off:
+        return "was taken off this event"
+    if entry.free_from > now:
+        return f"declined an order; is asked again in {entry.free_from - now:.0f} s"
+    if entry.position is None:
+        return "nobody knows where it is"
+    if not math.isfinite(way):
+        return "there is no way"
+    if device.device_type == ROBOT:
+        return _why_not_a_robot(dispatcher, device.id_tag, event, now)
+    return ""
+
+
+def _why_not_a_robot(dispatcher: Dispatcher, robot: str, event: Event, now: float) -> str:
+    orders = dispatcher.orders
+    if event.state is State.CONFIRMED:
+        return "a robot cannot deal with it"
+    if orders.sessions.is_held(robot):
+        grant = orders.sessions.permissions.grants.get(robot)
+        return f"is held by {orders.label_of(grant.holder)}" if grant else "is being handed over"
+    return "" if dispatcher.situations.operators(now) else "no operator is free"
+
+
+def _as_many_as_fit(everybody: list[m.Candidate]) -> tuple[m.Candidate, ...]:
+    named: list[m.Candidate] = []
+    room = LIST_BYTES
+    for who in everybody[:MOST_NAMED]:
+        room -= CANDIDATE_BYTES + xml_size(who.label) + xml_size(who.reason)
+        if room < 0:
+            break
+        named.append(who)
+    return tuple(named)

@@ -1,0 +1,463 @@
+"""What people at control rooms ask and decide: allowed by their role, done once, and noted.
+
+People decide; the rules hold all the same: an event is in one state, has one responder and loses
+no time of its own, and nobody acts on a robot without its permission. The policy only advises.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from dva_sim.core.audit import Fact
+from dva_sim.core.candidates import proposal
+from dva_sim.core.dispatcher import Advised, Dispatcher
+from dva_sim.core.event_status import by_whom, event_list, status_of
+from dva_sim.core.events import Event, State
+from dva_sim.core.handling import Choice
+from dva_sim.core.handovers import Handovers
+from dva_sim.core.permissions import Access
+from dva_sim.core.registry import CONTROL_ROOM, DRIVERS, GUARD, ROBOT, DeviceEntry
+from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.sessions import Send
+from dva_sim.core.travel_times import Start
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.control_room import ControlRoomBody, ControlRoomContent
+
+R = ControlRoomRole
+NEEDS: Final[dict[type, tuple[ControlRoomRole, str]]] = {
+    m.GetEventList: (R.LOOK, "look"),
+    m.GetDispatch: (R.LOOK, "look"),
+    m.GetProposal: (R.LOOK, "look"),
+    m.Acknowledge: (R.DISPATCH, "acknowledge"),
+    m.Assign: (R.DISPATCH, "assign"),
+    m.TakeOff: (R.DISPATCH, "take_off"),
+    m.FalseAlarm: (R.DISPATCH, "false_alarm"),
+    m.Escalate: (R.DISPATCH, "escalate"),
+    m.AddNote: (R.DISPATCH, "note"),
+    m.SetDispatch: (R.SUPERVISE, "set_dispatch"),
+    m.Revoke: (R.SUPERVISE, "revoke"),
+}
+"""What each message needs, and what it does in the words of a `Fact`."""
+LISTED_CLOSED = 50  # events that are over, of the last
+Decision = m.Acknowledge | m.Assign | m.TakeOff | m.FalseAlarm | m.Escalate | m.AddNote
+
+
+@dataclass(frozen=True, slots=True)
+class RoomAnswer:
+    """What is answered, and what follows; a code other than OK means that nothing was done."""
+
+    code: int = m.OK
+    text: str = ""
+    content: ControlRoomContent | None = None
+    sends: tuple[Send, ...] = ()
+
+
+class _Refused(Exception):
+    """Nothing is done: a code of a reply, and why."""
+
+    def __init__(self, code: int, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class ControlRooms:
+    """Answers control rooms.
+
+    Args:
+        dispatcher: What the policy would do, and all orders.
+        handovers: Who holds which robot.
+        roles: What each control room may do.
+        access: Who may drive what.
+    """
+
+    def __init__(
+        self, dispatcher: Dispatcher, handovers: Handovers, roles: Roles, access: Access
+    ) -> None:
+        self._dispatcher, self._handovers = dispatcher, handovers
+        self._roles, self._access = roles, access
+        self._orders, self._book = dispatcher.orders, dispatcher.orders.book
+        self._doers: dict[type, Callable[[Any, Event, m.Device, float], list[Send] | str]] = {
+            m.Acknowledge: self._acknowledge,
+            m.Assign: self._assign,
+            m.TakeOff: self._take_off,
+            m.FalseAlarm: self._false_alarm,
+            m.Escalate: self._escalate,
+            m.AddNote: self._add_note,
+        }
+
+    # --- what comes in -----------------------------------------------------------------
+
+    def answer(self, body: ControlRoomBody, sender: m.Device, now: float) -> RoomAnswer:
+        """RoomAnswer what a device has asked, or decided."""
+        need, action = NEEDS.get(type(body), (R.SUPERVISE, ""))
+        if not action:
+            name = type(body).__name__
+            return RoomAnswer(m.NOT_SUPPORTED, f"{name} is what the DVA says")
+        if sender.device_type != CONTROL_ROOM:
+            return RoomAnswer(m.NOT_PERMITTED, f"{sender.label} is no control room")
+        if (refusal := self.may(sender, need, action)) is not None:
+            return self._refuse(body, sender, action, m.NOT_PERMITTED, refusal, now)
+        match body:
+            case m.GetEventList():
+                return RoomAnswer(content=self._list(body.event_id or 0, now))
+            case m.GetDispatch():
+                return RoomAnswer(content=self.status(now, sender))
+            case m.SetDispatch():
+                return self._set_dispatch(body, sender, now)
+            case m.Revoke():
+                return self._revoke(body, sender, now)
+        return self._about_event(body, sender, action, now)
+
+    def may(self, sender: m.Device, need: ControlRoomRole, action: str) -> str | None:
+        """Why a control room may not do something, or None."""
+        role = self._roles.of(sender.id_tag)
+        if role.includes(need):
+            return None
+        done = action.replace("_", " ")
+        return f"{sender.label} has the role {role}; to {done} needs {need}"
+
+    def status(self, now: float, asker: m.Device | None = None) -> m.DispatchStatus:
+        """How orders are given; and the role of who asks."""
+        questions = self._dispatcher.questions
+        role = None if asker is None else self._roles.of(asker.id_tag).value
+        mode = "ask_first" if questions.asks else "automatic"
+        return m.DispatchStatus(mode, questions.within, by_whom(questions.switched, now), role)
+
+    def event_status(self, event: Event, now: float) -> m.EventStatus:
+        """How an event stands now."""
+        return status_of(event, self._dispatcher.questions.of(event.number), now)
+
+    def _list(self, above: int, now: float) -> m.EventList:
+        every = (*list(self._book.closed.values())[-LISTED_CLOSED:], *self._book.open.values())
+        rest = sorted((e for e in every if e.number > above), key=lambda event: event.number)
+        return event_list(rest, self._dispatcher.questions, now)
+
+    # --- about one event ---------------------------------------------------------------
+
+    def _about_event(self, body: Any, sender: m.Device, action: str, now: float) -> RoomAnswer:
+        event = self._book.get(body.event_id)
+        if event is None:
+            text = f"no event {body.event_id}"
+            return self._refuse(body, sender, action, m.UNKNOWN_EVENT, text, now)
+        if isinstance(body, m.GetProposal):
+            return RoomAnswer(content=proposal(self._dispatcher, event, now))
+        advised = self._dispatcher.advised(event, now) if action in _ON_HANDS else None
+        try:
+            self._check(body, event, sender, action, now)
+            done = self._doers[type(body)](body, event, sender, now)
+        except _Refused as refused:
+            answer = self._refuse(body, sender, action, refused.code, str(refused), now, advised)
+            return replace(answer, content=self.event_status(event, now))
+        if isinstance(done, str):  # it was so already
+            return RoomAnswer(m.OK, done, self.event_status(event, now))
+        self._decided(body, event, sender, action, advised, now)
+        sends = [*done, *self._dispatcher.decide(now)]
+        return RoomAnswer(m.OK, "", self.event_status(event, now), tuple(sends))
+
+    def _check(
+        self, body: Decision, event: Event, sender: m.Device, action: str, now: float
+    ) -> None:
+        """Refuse what comes too late: after another decision, or when all is over."""
+        handling, seen = event.handling, getattr(body, "decisions", None)
+        about = getattr(body, "device", None)
+        label = self._orders.label_of(about) if about else ""
+        if action not in _ON_HANDS or handling.is_already(sender.id_tag, action, label):
+            return
+        last = "nobody" if handling.last is None else handling.last.told(now)
+        if not event.open:
+            raise _Refused(m.OUT_OF_ORDER, f"event {event.number} is {event.state}; last: {last}")
+        if seen is not None and seen != handling.decisions:
+            raise _Refused(m.OUT_OF_ORDER, f"event {event.number} was decided on since: {last}")
+
+    def _acknowledge(
+        self, body: m.Acknowledge, event: Event, sender: m.Device, now: float
+    ) -> list[Send] | str:
+        known = event.handling.acknowledged
+        if known is None:
+            event.handling.acknowledged = Choice(sender.id_tag, sender.label, "acknowledge", now)
+            return []
+        if known.author == sender.id_tag:
+            return "acknowledged already"
+        raise _Refused(
+            m.OUT_OF_ORDER, f"acknowledged by {known.label}, {now - known.time:.1f} s ago"
+        )
+
+    def _add_note(
+        self, body: m.AddNote, event: Event, sender: m.Device, now: float
+    ) -> list[Send] | str:
+        event.handling.note = body.text
+        return []
+
+    def _false_alarm(
+        self, body: m.FalseAlarm, event: Event, sender: m.Device, now: float
+    ) -> list[Send] | str:
+        if not event.open:
+            return "it is over already"
+        return self._orders.settle(event, State.REFUTED, now)
+
+    def _escalate(
+        self, body: m.Escalate, event: Event, sender: m.Device, now: float
+    ) -> list[Send] | str:
+        if not event.open:
+            return "it is escalated already"
+        return self._orders.settle(event, State.ESCALATED, now)
+
+    def _take_off(
+        self, body: m.TakeOff, event: Event, sender: m.Device, now: float
+    ) -> list[Send] | str:
+        looks = event.state in (State.ASSIGNED, State.ON_SCENE)
+        sent = {event.actor, event.responder if looks else None}
+        if body.device not in sent:
+            if body.device in event.handling.taken_off:
+                return "it is not sent there any longer"
+            label = self._orders.label_of(body.device)
+            raise _Refused(m.WRONG_MODE, f"{label} is not sent to event {event.number}")
+        event.handling.taken_off.add(body.device)
+        return self._orders.recall(event, body.device, now)
+
+    # --- sending -----------------------------------------------------------------------
+
+    def _assign(
+        self, body: m.Assign, event: Event, sender: m.Device, now: float
+    ) -> list[Send] | str:
+        task, entry = body.task or "confirm", self._responder(body.device)
+        device = entry.device
+        if self._is_sent(event, device.id_tag, task):
+            return "is sent there already"
+        if task == "confirm":
+            self._may_look(body, event)
+        else:
+            self._may_act(body, event, device, task)
+        engaged = self._orders.engaged.all(device.id_tag)
+        if engaged:
+            text = f"{device.label} is at event {engaged[0].number}: take it off there first"
+            raise _Refused(m.BUSY, text)
+        driver = self._driver(body, device, sender, now) if device.device_type == ROBOT else None
+        return self._send(body, event, entry, driver, now)
+
+    def _responder(self, device: str) -> DeviceEntry:
+        entry = self._orders.registry.entries.get(device)
+        if entry is None or entry.silent or entry.device.device_type not in (GUARD, ROBOT):
+            raise _Refused(m.UNKNOWN_DEVICE, f"no guard and no robot {device}")
+        return entry
+
+    @staticmethod
+    def _is_sent(event: Event, device: str, task: str) -> bool:
+        if task == "confirm":
+            return event.state in (State.ASSIGNED, State.ON_SCENE) and event.responder == device
+        stands_by = event.state is not State.CONFIRMED
+        return event.actor == device and stands_by == (task == "stand_by")
+
+    def _may_look(self, body: m.Assign, event: Event) -> None:
+        """Nobody is taken from a scene, and from the way only by who knows of it."""
+        who = self._orders.label_of(event.responder or "")
+        if event.state is State.CONFIRMED:
+            raise _Refused(m.WRONG_MODE, f"event {event.number} is confirmed: somebody has looked")
+        if event.state is State.ON_SCENE:
+            raise _Refused(m.BUSY, f"{who} is there already: take it off first")
+        if event.state is State.ASSIGNED and body.decisions is None:
+            raise _Refused(m.BUSY, f"{who} is on the way; state Decisions to send another instead")
+
+    def _may_act(self, body: m.Assign, event: Event, device: m.Device, task: str) -> None:
+        if not event.needs_containment:
+            raise _Refused(m.NOT_SUPPORTED, "nobody deals with events here: they are looked at")
+        if device.device_type == ROBOT:
+            raise _Refused(m.NOT_SUPPORTED, "a robot can look, and nothing else")
+        if (task == "contain") != (event.state is State.CONFIRMED):
+            asked = "stand_by until it is" if task == "contain" else "contain, as it is confirmed"
+            raise _Refused(m.WRONG_MODE, f"event {event.number} is {event.state}: {asked}")
+        if event.state is State.PENDING:
+            raise _Refused(m.WRONG_MODE, "nobody looks there yet: send somebody to first")
+        if event.actor is not None and body.decisions is None:
+            who = self._orders.label_of(event.actor)
+            raise _Refused(m.BUSY, f"{who} has it; state Decisions to send another instead")
+
+    def _driver(self, body: m.Assign, robot: m.Device, sender: m.Device, now: float) -> str:
+        """Who drives a robot there: whom the sender names, or who has the least to do."""
+        if body.operator is None:
+            hands = self._dispatcher.situations.operators(now)
+            if not hands:
+                raise _Refused(m.BUSY, f"no operator is free to drive {robot.label}")
+            driver = hands[0].device
+        else:
+            driver = self._named_driver(body.operator, robot, sender, now)
+        holder = self._handovers.holder(robot.id_tag, driver.id_tag, now)
+        if holder is not None:
+            text = f"{robot.label} is held by {holder.label}: take it over first"
+            raise _Refused(m.BUSY, text)
+        return driver.id_tag
+
+    def _named_driver(self, named: str, robot: m.Device, sender: m.Device, now: float) -> m.Device:
+        entry = self._orders.registry.entries.get(named)
+        if entry is None or entry.silent or entry.device.device_type not in DRIVERS:
+            raise _Refused(m.UNKNOWN_DEVICE, f"no operator {named}")
+        device = entry.device
+        if device.device_type == CONTROL_ROOM and device.id_tag != sender.id_tag:
+            raise _Refused(m.NOT_PERMITTED, f"{device.label} decides itself what it drives")
+        if not self._access.allows(device, robot, "teleoperation", now):
+            raise _Refused(m.NOT_PERMITTED, f"{device.label} may not drive {robot.label}")
+        in_hand = self._orders.engaged.count(named)
+        if in_hand >= self._orders.rules.operator_span:
+            raise _Refused(m.BUSY, f"{device.label} has {in_hand} in hand already")
+        return device
+
+    def _send(
+        self, body: m.Assign, event: Event, entry: DeviceEntry, driver: str | None, now: float
+    ) -> list[Send]:
+        """Call off who is on the way, if anybody is, and give the order."""
+        orders, device = self._orders, entry.device.id_tag
+        looks = (body.task or "confirm") == "confirm"
+        before = event.responder if looks and event.state is State.ASSIGNED else None
+        before = before if looks else event.actor
+        sends = orders.recall(event, before, now) if before else []
+        event.handling.taken_off.discard(device)
+        self._dispatcher.situations.forget_move(device)
+        self._dispatcher.auctions.running.pop(event.number, None)
+        if (way := self._way(entry, event)) is not None:
+            event.handling.expected[device] = now, way
+        event.handling.advised = ""
+        order = orders.confirm(event, device, driver, now) if looks else None
+        return [*sends, order or orders.act(event, device, now)]
+
+    def _way(self, entry: DeviceEntry, event: Event) -> float | None:
+        """When somebody would be there, as expected [s from now]."""
+        if entry.position is None:
+            return None
+        kind = "guard" if entry.device.device_type == GUARD else "robot"
+        start = Start(entry.device.id_tag, kind, entry.position)
+        way = float(self._dispatcher.situations.travel([start], [event.position])[1][0, 0])
+        return way if way < float("inf") else None
+
+    # --- about all events, or none -----------------------------------------------------
+
+    def _set_dispatch(self, body: m.SetDispatch, sender: m.Device, now: float) -> RoomAnswer:
+        questions, asks = self._dispatcher.questions, body.dispatch_mode == "ask_first"
+        if questions.asks == asks:
+            return RoomAnswer(m.OK, "it is so already", self.status(now, sender))
+        questions.asks = asks
+        reason = body.reason or ""
+        questions.switched = Choice(sender.id_tag, sender.label, "set_dispatch", now, reason)
+        self._note(sender, "set_dispatch", now, mode=body.dispatch_mode, cause=reason)
+        sends = self._dispatcher.decide(now)
+        return RoomAnswer(m.OK, "", self.status(now, sender), tuple(sends))
+
+    def _revoke(self, body: m.Revoke, sender: m.Device, now: float) -> RoomAnswer:
+        entry, sessions = self._orders.registry.entries.get(body.device), self._orders.sessions
+        if entry is None or entry.device.device_type != ROBOT:
+            text = f"no robot {body.device}"
+            return self._refuse(body, sender, "revoke", m.UNKNOWN_DEVICE, text, now)
+        grant = sessions.permissions.grants.get(body.device)
+        if grant is None or grant.holder == sessions.permissions.own:
+            return RoomAnswer(m.OK, "nobody holds it")
+        holder = self._orders.label_of(grant.holder)
+        sends = self._orders.taken_away(body.device, now)
+        sessions.revoke(grant)
+        told = f"{holder} held it"
+        self._note(sender, "revoke", now, device=body.device, cause=body.reason or "", outcome=told)
+        return RoomAnswer(m.OK, told, None, (*sends, *self._dispatcher.decide(now)))
+
+    # --- what is kept of it ------------------------------------------------------------
+
+    def raised(self, event: Event, sender: m.Device, now: float) -> None:
+        """A control room has reported an event."""
+        self._note(sender, "raise", now, event=event.number, text=event.kind)
+
+    def asked_for_robot(
+        self, sender: m.Device, body: m.PermissionRequest, reply: m.Reply, now: float
+    ) -> None:
+        """A control room has asked for a robot, or a supervisor has taken it from its holder."""
+        forced = body.takeover in ("ask", "force")
+        action = "take_over" if forced else "take"
+        cause = f"{body.level}, {body.takeover}" if forced else body.level
+        self._note(
+            sender,
+            action,
+            now,
+            device=body.device,
+            cause=cause,
+            code=reply.code,
+            outcome=reply.text,
+        )
+
+    def gave_back(self, sender: m.Device, robot: str, now: float) -> None:
+        """A control room needs a robot no longer."""
+        self._note(sender, "give_back", now, device=robot)
+
+    def _decided(
+        self,
+        body: Any,
+        event: Event,
+        sender: m.Device,
+        action: str,
+        advised: Advised | None,
+        now: float,
+    ) -> None:
+        fact = self._fact(body, sender, action, advised, now)
+        device = fact.device
+        if device is not None and action == "assign":
+            fact = replace(fact, arrival_in=event.handling.arrival_in(device, now))
+        fact = replace(fact, waited=now - event.times["detected"])
+        if action == "assign" and device == event.responder:
+            fact = replace(fact, operator=event.operator)
+        if action in _ON_HANDS:
+            self._orders.decided(event, fact)
+        else:
+            self._book.touch(event)
+            self._orders.trail.note(fact)
+
+    def _refuse(
+        self,
+        body: Any,
+        sender: m.Device,
+        action: str,
+        code: int,
+        text: str,
+        now: float,
+        advised: Advised | None = None,
+    ) -> RoomAnswer:
+        fact = self._fact(body, sender, action, advised, now)
+        if not isinstance(body, m.GetEventList | m.GetDispatch | m.GetProposal):
+            self._orders.trail.note(replace(fact, code=code, outcome=text))
+        return RoomAnswer(code, text)
+
+    def _fact(
+        self, body: Any, sender: m.Device, action: str, advised: Advised | None, now: float
+    ) -> Fact:
+        task = (body.task or "confirm") if isinstance(body, m.Assign) else None
+        return Fact(
+            time=now,
+            author=sender.id_tag,
+            label=sender.label,
+            role=self._roles.of(sender.id_tag).value,
+            action=action,
+            event=getattr(body, "event_id", None),
+            device=getattr(body, "device", None),
+            operator=getattr(body, "operator", None),
+            task=task,
+            mode=getattr(body, "dispatch_mode", None),
+            text=getattr(body, "text", None),
+            cause=getattr(body, "reason", None) or "",
+            advised=advised.device if advised else None,
+            advised_in=advised.arrival_in if advised else None,
+        )
+
+    def _note(self, sender: m.Device, action: str, now: float, **more: Any) -> None:
+        role = None
+        if sender.device_type == CONTROL_ROOM:
+            role = self._roles.of(sender.id_tag).value
+        self._orders.trail.note(
+            Fact(
+                time=now,
+                author=sender.id_tag,
+                label=sender.label,
+                role=role,
+                action=action,
+                **more,
+            )
+        )
+
+
+_ON_HANDS = frozenset({"assign", "take_off", "false_alarm", "escalate"})
+"""What decides on who has an event in hand: there can be only one such decision at a time."""

@@ -1,0 +1,104 @@
+"""What control rooms are told of events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dva_sim.core.events import Event, State
+from dva_sim.core.handling import Choice
+from dva_sim.core.questions import Question, Questions
+from dva_sim.core.wire_size import LIST_BYTES, xml_size
+from dva_sim.protocol import messages as m
+
+MOST_LISTED = 16
+EVENT_BYTES = 950  # of one event without what people have written, at most [B]
+LONGEST = 1e6  # no longer time is told [s]
+_BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
+
+
+def state_since(event: Event) -> float:
+    """When an event came into its state [s]."""
+    times = event.times
+    detected = times.get("detected", 0.0)
+    if not event.open:
+        return times.get("closed", detected)
+    if event.state is State.PENDING:
+        return max(detected, event.waiting_since)
+    return times.get(_BEGINS[event.state], detected)
+
+
+def status_of(event: Event, question: Question | None, now: float) -> m.EventStatus:
+    """How an event stands."""
+    handling, times = event.handling, event.times
+    looks = event.state in (State.ASSIGNED, State.ON_SCENE)
+    acts = event.open and event.actor is not None
+    return m.EventStatus(
+        event.number,
+        event.kind,
+        event.position,
+        event.severity,
+        max(0.0, min(event.confidence, 1.0)),
+        event.state.value.replace(" ", "_"),
+        _ago(times.get("detected", now), now),
+        _ago(state_since(event), now),
+        handling.decisions,
+        None if event.open else _ago(times.get("closed", now), now),
+        event.waits_for if event.open else None,
+        event.responder if looks else None,
+        event.operator if looks else None,
+        event.actor if acts else None,
+        by_whom(handling.acknowledged, now),
+        _last(handling.last, now),
+        _proposed(question, now),
+        handling.note[:256] or None,
+    )
+
+
+def event_list(events: Iterable[Event], questions: Questions, now: float) -> m.EventList:
+    """So many of these events as fit into a message."""
+    listed: list[m.EventStatus] = []
+    room = LIST_BYTES
+    for event in events:
+        status = status_of(event, questions.of(event.number), now)
+        room -= EVENT_BYTES + _written(status)
+        if listed and (room < 0 or len(listed) == MOST_LISTED):
+            break
+        listed.append(status)
+    return m.EventList(tuple(listed))
+
+
+def by_whom(choice: Choice | None, now: float) -> m.ByWhom | None:
+    """Who did something, if anybody did."""
+    if choice is None:
+        return None
+    return m.ByWhom(choice.author, choice.label[:64], _ago(choice.time, now))
+
+
+def _last(choice: Choice | None, now: float) -> m.LastDecision | None:
+    if choice is None:
+        return None
+    ago, reason = _ago(choice.time, now), choice.reason[:256] or None
+    return m.LastDecision(choice.author, choice.label[:64], choice.action, ago, reason)
+
+
+def _proposed(question: Question | None, now: float) -> m.Proposed | None:
+    if question is None:
+        return None
+    arrival, left = _ahead(question.expected, now), _ahead(question.until, now)
+    return m.Proposed(question.device, question.task, arrival, left)
+
+
+def _ago(then: float, now: float) -> float:
+    return max(0.0, min(now - then, LONGEST))
+
+
+def _ahead(then: float, now: float) -> float:
+    return max(0.0, min(then - now, LONGEST))
+
+
+def _written(status: m.EventStatus) -> int:
+    """Room for what people have written [B]."""
+    last, seen = status.last_decision, status.acknowledged
+    texts = [status.note or "", seen.label if seen else ""]
+    texts += [last.label, last.reason or ""] if last else []
+    return sum(map(xml_size, texts))

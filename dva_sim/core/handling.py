@@ -1,0 +1,77 @@
+"""How an event is handled: what was decided on it, by whom, and what people have said of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Choice(NamedTuple):
+    """Who decided what, and when.
+
+    Attributes:
+        author: Id of the device; the DVA's for its policy and its rules.
+        label: What that is called.
+        action: As in `audit.Fact`.
+        time: When [s].
+        reason: In words; may be empty.
+        device: About whom; empty: about nobody.
+    """
+
+    author: str
+    label: str
+    action: str
+    time: float
+    reason: str = ""
+    device: str = ""
+
+    def told(self, now: float) -> str:
+        """The same in words, as of now."""
+        about = self.device and f" of {self.device}"
+        why = self.reason and f": {self.reason}"
+        did, ago = self.action.replace("_", " "), now - self.time
+        return f"{did}{about} by {self.label}, {ago:.1f} s ago{why}"
+
+
+@dataclass(slots=True)
+class Handling:
+    """What has been decided on one event.
+
+    Attributes:
+        decisions: How often something was decided: who acts on an older number acts too late.
+        last: The last of it.
+        acknowledged: Who has seen it first.
+        note: The newest.
+        taken_off: Who is not to be sent there by the policy any more.
+        expected: Of each that was sent: when that was [s], and the way that was expected [s].
+        advised: Id of whom the policy has sent or would have sent last; empty: nobody.
+    """
+
+    decisions: int = 0
+    last: Choice | None = None
+    acknowledged: Choice | None = None
+    note: str = ""
+    taken_off: set[str] = field(default_factory=set)
+    expected: dict[str, tuple[float, float]] = field(default_factory=dict)
+    advised: str = ""
+
+    def decide(self, choice: Choice) -> None:
+        """Something was decided."""
+        self.decisions += 1
+        self.last = choice
+
+    def is_already(self, author: str, action: str, device: str = "") -> bool:
+        """Whether the last decision was just this, by the same author."""
+        last = self.last
+        return last is not None and (last.author, last.action, last.device) == (
+            author,
+            action,
+            device,
+        )
+
+    def arrival_in(self, device: str, now: float) -> float | None:
+        """When somebody who was sent would be there, as expected then [s from now]."""
+        if device not in self.expected:
+            return None
+        sent, way = self.expected[device]
+        return max(0.0, sent + way - now)

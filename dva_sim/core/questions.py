@@ -1,0 +1,76 @@
+"""What the policy asks a person before it acts, and for how long it waits for an answer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from dva_sim.core.events import Event
+from dva_sim.core.handling import Choice
+
+
+@dataclass(slots=True)
+class Question:
+    """What the policy would do about an event.
+
+    Attributes:
+        event: Which.
+        device: Id of the guard or robot that it would send.
+        task: `confirm`, `contain` or `stand_by`.
+        expected: When that would be there [s].
+        until: It is sent by itself if nobody has decided by then [s].
+    """
+
+    event: Event
+    device: str
+    task: str
+    expected: float
+    until: float
+
+
+@dataclass
+class Questions:
+    """All that is open; one for each event and stage.
+
+    What the policy would do may change while it waits; the time that is left does not.
+
+    Attributes:
+        within: How long a question waits [s].
+        asks: Whether the policy asks first.
+        switched: Who has last changed that.
+    """
+
+    within: float
+    asks: bool = False
+    switched: Choice | None = None
+    _open: dict[tuple[int, str], Question] = field(default_factory=dict)
+    _now: dict[tuple[int, str], Question] = field(default_factory=dict)
+
+    def ask(self, event: Event, task: str, device: str, eta: float, now: float) -> bool:
+        """Put a question, or put it again; False: nobody has answered in time."""
+        key = event.number, "confirm" if task == "confirm" else "contain"
+        known = self._open.get(key)
+        until = now + self.within if known is None else known.until
+        if now >= until:
+            return False
+        self._now[key] = Question(event, device, task, now + eta, until)
+        return True
+
+    def settle(self) -> list[Event]:
+        """What was not asked again is no question any more; the events of which that changed."""
+        before, self._open, self._now = self._open, self._now, {}
+        gone = [q.event for key, q in before.items() if key not in self._open]
+        new = (q for key, q in self._open.items() if not _same(before.get(key), q))
+        return gone + [q.event for q in new]
+
+    def of(self, number: int) -> Question | None:
+        """What is asked about an event, looking before dealing with it."""
+        return self._open.get((number, "confirm")) or self._open.get((number, "contain"))
+
+    def next_deadline(self) -> float:
+        """When a question has waited too long [s]."""
+        return min((q.until for q in self._open.values()), default=math.inf)
+
+
+def _same(old: Question | None, new: Question) -> bool:
+    return old is not None and (old.device, old.task) == (new.device, new.task)

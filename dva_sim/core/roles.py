@@ -1,0 +1,51 @@
+"""What control rooms may do: roles, which the DVA is told and no device can claim.
+
+A role goes with the id of a device: with keys an id is proven, without them anybody can claim
+to be anybody, as everywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class ControlRoomRole(StrEnum):
+    """What somebody may do; each includes those before it."""
+
+    LOOK = "look"
+    DRIVE = "drive"
+    DISPATCH = "dispatch"
+    SUPERVISE = "supervise"
+
+    def includes(self, other: ControlRoomRole) -> bool:
+        """Whether who has this role may do what that one allows."""
+        ranks = list(ControlRoomRole)
+        return ranks.index(self) >= ranks.index(other)
+
+
+@dataclass
+class Roles:
+    """Who has which role: stated by configuration, or by who runs the DVA within its process.
+
+    Attributes:
+        known: By id of the device; whoever is not there may look.
+    """
+
+    known: dict[str, ControlRoomRole] = field(default_factory=dict)
+
+    def of(self, device: str) -> ControlRoomRole:
+        """The role of a control room, by its id."""
+        return self.known.get(device, ControlRoomRole.LOOK)
+
+    def appoint(self, device: str, role: ControlRoomRole | str) -> None:
+        """From now on a device has this role.
+
+        Raises:
+            ValueError: there is no such role.
+        """
+        self.known[device] = ControlRoomRole(role)
+
+    def dismiss(self, device: str) -> None:
+        """From now on a device may look, as anybody."""
+        self.known.pop(device, None)

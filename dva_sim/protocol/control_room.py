@@ -1,0 +1,352 @@
+"""What control rooms and the DVA say to each other: events, decisions, proposals.
+
+One frozen dataclass per element below `Dispatch` of `protocol/dva.xsd`, as in `messages`, where
+all of them are found, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dva_sim.protocol.places import Position
+
+
+@dataclass(frozen=True, slots=True)
+class GetEventList:
+    """Ask for the events above this number, or from the first on; answered with `EventList`."""
+
+    event_id: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GetDispatch:
+    """Ask how orders are given, and what one may do; answered with `DispatchStatus`."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetDispatch:
+    """Let the policy act by itself, or ask first.
+
+    Attributes:
+        dispatch_mode: `automatic` or `ask_first`.
+        reason: In words.
+    """
+
+    dispatch_mode: str
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledge:
+    """Somebody has seen an event, and answers for it from now on."""
+
+    event_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """Send a guard or a robot to an event.
+
+    Attributes:
+        event_id: The event.
+        device: Id of the guard or robot.
+        operator: Id of the device that shall drive the robot; None: the DVA chooses.
+        task: As in `Order`; None: `confirm`.
+        reason: In words.
+        decisions: `EventStatus.decisions` as the sender has seen it; who has not, cannot take
+            an event out of somebody's hands. Where it is not the newest, nothing is done.
+    """
+
+    event_id: int
+    device: str
+    operator: str | None = None
+    task: str | None = None
+    reason: str | None = None
+    decisions: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """A guard or a robot shall not go to an event any longer, nor be sent there by the policy.
+
+    Attributes:
+        event_id: The event.
+        device: Id of the guard or robot.
+        reason: In words.
+        decisions: As in `Assign`.
+    """
+
+    event_id: int
+    device: str
+    reason: str | None = None
+    decisions: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FalseAlarm:
+    """There is nothing: the event is over, as if somebody there had refuted it.
+
+    Attributes:
+        event_id: The event.
+        reason: How that is known, in words.
+        decisions: As in `Assign`.
+    """
+
+    event_id: int
+    reason: str
+    decisions: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Escalate:
+    """Others than the DVA's own have to deal with an event, from now on.
+
+    Attributes:
+        event_id: The event.
+        reason: In words.
+        decisions: As in `Assign`.
+    """
+
+    event_id: int
+    reason: str | None = None
+    decisions: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AddNote:
+    """Something about an event that others shall know, up to 256 characters."""
+
+    event_id: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class GetProposal:
+    """Ask whom the policy would send to an event; answered with `Proposal`."""
+
+    event_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class Revoke:
+    """Take a robot from whoever holds it, to be nobody's.
+
+    Attributes:
+        device: Id of the robot.
+        reason: In words.
+    """
+
+    device: str
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ByWhom:
+    """Which device did something, what it is called, and how long ago that was [s], up to 1e6."""
+
+    device: str
+    label: str
+    ago: float
+
+
+@dataclass(frozen=True, slots=True)
+class LastDecision:
+    """The last decision on an event.
+
+    Attributes:
+        device: Who took it: a control room, or the DVA for its policy and its rules.
+        label: What that is called.
+        action: `assign`, `take_off`, `false_alarm`, `escalate` or `expire`.
+        ago: How long ago that was [s], up to 1e6.
+        reason: In words, if any were given.
+    """
+
+    device: str
+    label: str
+    action: str
+    ago: float
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Proposed:
+    """What the policy would do, and waits for a person to decide.
+
+    Attributes:
+        device: Id of the guard or robot that it would send.
+        task: To do what, as in `Order`.
+        arrival_in: When that would be there, as expected [s from now].
+        decide_within: It is sent by itself if nobody has decided by then [s from now].
+    """
+
+    device: str
+    task: str
+    arrival_in: float
+    decide_within: float
+
+
+@dataclass(frozen=True, slots=True)
+class EventStatus:
+    """How an event stands: published by the DVA when that changes, and told if asked.
+
+    Attributes:
+        event_id: The DVA's number of the event.
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Where it is.
+        severity: 0 (harmless) to 1, the highest reported.
+        confidence: That there is something at all, 0 to 1.
+        event_state: `pending`, `assigned`, `on_scene`, `confirmed`, `contained`, `refuted`,
+            `escalated` or `expired`.
+        age: Since it was first reported [s], up to 1e6.
+        state_for: Since when it is in that state [s], up to 1e6.
+        decisions: How many decisions on it there have been: who was sent, taken off, and so on.
+        closed_for: Since when it is over [s], up to 1e6; None: it is not.
+        waits_for: What somebody should do who is not found yet: `confirm` or `contain`.
+        responder: Id of the guard or robot that goes to look, or is there.
+        operator: Id of the device that drives that robot.
+        actor: Id of the guard that deals with it, or stands by to.
+        acknowledged: Who has acknowledged it.
+        last_decision: The last decision.
+        proposed: What the policy asks.
+        note: The newest note.
+    """
+
+    event_id: int
+    kind: str
+    position: Position
+    severity: float
+    confidence: float
+    event_state: str
+    age: float
+    state_for: float
+    decisions: int
+    closed_for: float | None = None
+    waits_for: str | None = None
+    responder: str | None = None
+    operator: str | None = None
+    actor: str | None = None
+    acknowledged: ByWhom | None = None
+    last_decision: LastDecision | None = None
+    proposed: Proposed | None = None
+    note: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EventList:
+    """Events by number; at most 16, and no more than fit into one message: ask for those above."""
+
+    events: tuple[EventStatus, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DispatchStatus:
+    """How orders are given: published by the DVA when that changes, and told if asked.
+
+    Attributes:
+        dispatch_mode: `automatic` or `ask_first`.
+        decide_within: How long a proposal waits for a person [s].
+        switched: Who has last changed the mode.
+        role: What the asker may do: `look`, `drive`, `dispatch` or `supervise`; not published.
+    """
+
+    dispatch_mode: str
+    decide_within: float
+    switched: ByWhom | None = None
+    role: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Somebody who could be sent, or why not.
+
+    Attributes:
+        device: Id of a guard or robot.
+        label: What that is called.
+        reason: Why it can go, or not, in words.
+        arrival_in: When it would be there, as expected [s from now]; None: that is not known.
+    """
+
+    device: str
+    label: str
+    reason: str
+    arrival_in: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What the policy would do about an event now, and with whom.
+
+    Attributes:
+        event_id: The event.
+        policy: Name of the policy.
+        reason: Why so, in words.
+        task: What it would have done, as in `Order`; None: nothing is to be done.
+        device: Id of the guard or robot that it would send; None: nobody.
+        arrival_in: When that would be there, as expected [s from now].
+        decide_within: It is sent by itself if nobody has decided by then [s from now]; None:
+            nobody is asked.
+        candidates: Everybody, the earliest there first; at most 32, and as many as fit.
+    """
+
+    event_id: int
+    policy: str
+    reason: str
+    task: str | None = None
+    device: str | None = None
+    arrival_in: float | None = None
+    decide_within: float | None = None
+    candidates: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class AuditRecord:
+    """A decision, published by the DVA as it is taken: by a person, the policy, or a rule.
+
+    Attributes:
+        author: Id of the device that decided; the DVA's for its policy and its rules.
+        label: What that is called.
+        action: What was decided, such as `assign`.
+        reason: Why, in words; may be empty.
+        code: `OK`, or why it was refused.
+        text: What came of it, in words; may be empty.
+        role: Of the author, if it is a control room.
+        event_id: On which event.
+        device: About which guard or robot.
+        task: To do what.
+        arrival_in: When that would be there, as expected [s from then].
+        advised: Id of the guard or robot that the policy would have sent; None: nobody.
+        advised_in: When that one would be there, as expected [s from then].
+    """
+
+    author: str
+    label: str
+    action: str
+    reason: str
+    code: int
+    text: str
+    role: str | None = None
+    event_id: int | None = None
+    device: str | None = None
+    task: str | None = None
+    arrival_in: float | None = None
+    advised: str | None = None
+    advised_in: float | None = None
+
+
+ControlRoomBody = (
+    GetEventList
+    | GetDispatch
+    | SetDispatch
+    | Acknowledge
+    | Assign
+    | TakeOff
+    | FalseAlarm
+    | Escalate
+    | AddNote
+    | GetProposal
+    | Revoke
+    | EventStatus
+    | DispatchStatus
+    | AuditRecord
+)
+ControlRoomContent = EventList | EventStatus | Proposal | DispatchStatus

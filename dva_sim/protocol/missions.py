@@ -1,0 +1,74 @@
+"""What a robot is told to do by itself, and how that stands; found in `messages`, too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dva_sim.protocol.places import Position
+
+
+@dataclass(frozen=True, slots=True)
+class GoTo:
+    """Visit these places in this order; 1 to 64 of them."""
+
+    waypoints: tuple[Position, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Patrol:
+    """Visit these places in this order, 1 to 64 of them, and begin anew.
+
+    Attributes:
+        waypoints: The places of one lap.
+        laps: How many laps, up to 1000; 0: until the mission is cancelled.
+    """
+
+    waypoints: tuple[Position, ...]
+    laps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Inspect:
+    """Go to where the place of an event can be seen, face it, and say what is in view.
+
+    Attributes:
+        event_id: The event.
+        kind: `fire`, `gas_leak` or `flood`.
+        position: Where it is.
+    """
+
+    event_id: int
+    kind: str
+    position: Position
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnToBase:
+    """Go back to where the robot stood when it was switched on."""
+
+
+@dataclass(frozen=True, slots=True)
+class CancelMission:
+    """Give up the mission and stand idle."""
+
+
+@dataclass(frozen=True, slots=True)
+class GetMissionStatus:
+    """Ask a robot how its newest mission stands; answered with `MissionStatus`."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionStatus:
+    """How the newest mission of a robot stands: published when it changes, and told if asked.
+
+    Attributes:
+        mission_id: MessageID of the message that began it; 0 if there was none.
+        mission_state: `none`, `under_way`, `waiting`, `replanning`, `done` or `failed`.
+        waypoints_left: Places still to be visited, of the present lap; at most 64.
+        reason: Why, in words, up to 256 characters; may be empty.
+    """
+
+    mission_id: int
+    mission_state: str
+    waypoints_left: int
+    reason: str

@@ -1,0 +1,13 @@
+"""Where something is, as messages say it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A place on the WGS-84 ellipsoid, in degrees."""
+
+    latitude: float
+    longitude: float

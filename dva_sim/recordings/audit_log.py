@@ -1,0 +1,359 @@
+"""The audit log: who did what, when, why and with which outcome, in a file that only grows.
+
+Each row carries the SHA-256 of its content and of the row before, so that a row that was changed,
+removed or moved breaks the chain there. Numbers are never given twice, and a run of the console
+ends with a row that says so: a log whose end was cut lacks one of both. Whoever can write the file
+can also compute a new chain; then only the hash of the last row, told when the console ends and
+kept in the recording, shows it.
+
+References:
+    Schneier, B., and Kelsey, J., "Secure audit logs to support computer forensics", ACM TISSEC 2
+    (1999): hash chains, and why the newest hash has to be kept elsewhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Final
+
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+
+FORMAT: Final = 1
+SUFFIX: Final = ".sqlite"
+BEGIN, END = "begin", "end"  # actions of the rows around what one console wrote
+NOTHING_BEFORE: Final = "0" * 64  # what the first row follows
+OPEN_WITHIN: Final = 2.0  # that long somebody else may have the file to itself [s]
+_TABLES = f"""
+BEGIN IMMEDIATE;
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE audit (
+  number INTEGER PRIMARY KEY AUTOINCREMENT, time_s REAL NOT NULL, at_utc TEXT NOT NULL,
+  author TEXT NOT NULL, device TEXT NOT NULL, role TEXT NOT NULL, action TEXT NOT NULL,
+  event INTEGER, subject TEXT NOT NULL, cause TEXT NOT NULL, outcome TEXT NOT NULL,
+  text TEXT NOT NULL, details TEXT NOT NULL, before TEXT NOT NULL, hash TEXT NOT NULL
+);
+CREATE TRIGGER audit_is_not_changed BEFORE UPDATE ON audit
+  BEGIN SELECT RAISE(ABORT, 'the audit log only grows'); END;
+CREATE TRIGGER audit_is_not_cut BEFORE DELETE ON audit
+  BEGIN SELECT RAISE(ABORT, 'the audit log only grows'); END;
+INSERT INTO about VALUES ('kind', 'dva-sim audit log'), ('format', '{FORMAT}');
+COMMIT;
+"""
+
+
+class AuditWriteError(DvaSimError):
+    """A row that could not be written; nothing of it is in the file."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AuditEntry:
+    """What is to be remembered of one action.
+
+    Attributes:
+        time_s: Of the run [s].
+        at_utc: By the clock on the wall, as in ISO 8601.
+        author: Who did it, for people.
+        device: The id of the device by which it was done.
+        role: What its author was entitled to.
+        action: What was done, in a word or two.
+        event: About which event, if any.
+        subject: To whom, such as a robot.
+        cause: Why.
+        outcome: `done`, or `refused`, or what else became of it.
+        text: What was said: a note, or why it was refused.
+        details: More, such as what the policy would have done.
+    """
+
+    time_s: float
+    at_utc: str
+    author: str
+    device: str = ""
+    role: str = ""
+    action: str
+    event: int | None = None
+    subject: str = ""
+    cause: str = ""
+    outcome: str = "done"
+    text: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AuditRow(AuditEntry):
+    """An entry in its place.
+
+    Attributes:
+        number: From 1.
+        before: The hash of the row before.
+        hash: Of this row.
+    """
+
+    number: int
+    before: str
+    hash: str
+
+
+NAMES: Final = tuple(entry.name for entry in fields(AuditEntry))
+COLUMNS: Final = ("number", *NAMES, "before", "hash")
+_INSERT = f"INSERT INTO audit ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
+_SELECT = f"SELECT {', '.join(COLUMNS)} FROM audit"
+_LAST = "SELECT number, hash FROM audit ORDER BY number DESC LIMIT 1"
+
+
+class AuditLog:
+    """A file to which rows are added; a log that is there is gone on with.
+
+    Args:
+        path: Made if it does not exist.
+
+    Attributes:
+        number: Of the last row.
+        head: Its hash.
+
+    Raises:
+        ConfigError: the file cannot be used, is something else, or its chain is broken.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.number, self.head = 0, NOTHING_BEFORE
+        is_new = not path.exists() or _holds_nothing(path)
+        if not is_new:
+            self._refuse_what_is_broken()
+        try:
+            self._file = sqlite3.connect(
+                path, isolation_level=None, timeout=OPEN_WITHIN, check_same_thread=False
+            )
+            self._file.execute("PRAGMA journal_mode=WAL")
+            self._file.execute("PRAGMA synchronous=FULL")  # what was said done survives a power cut
+            if is_new:
+                self._file.executescript(_TABLES)
+        except sqlite3.Error as error:
+            raise ConfigError(f"cannot be used as an audit log: {error}", path) from None
+
+    def _refuse_what_is_broken(self) -> None:
+        found = verify(self.path)
+        if found.problem is not None:
+            told = f"row {found.problem.number} {found.problem.text}"
+            raise ConfigError(f"is no audit log to go on with: {told}", self.path)
+        self.number, self.head = found.rows, found.head
+
+    def append(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
+        """Add rows, all or none; when this returns they are on the disk.
+
+        Raises:
+            AuditWriteError: they are not, for want of room for example.
+        """
+        try:
+            self._file.execute("BEGIN IMMEDIATE")
+            rows = self._rows(entries)  # after the last one, also where two consoles write
+            self._file.executemany(_INSERT, map(_stored, rows))
+            self._file.execute("COMMIT")
+        except sqlite3.Error as error:
+            with suppress(sqlite3.Error):
+                self._file.execute("ROLLBACK")
+            raise AuditWriteError(f"the audit log cannot be written: {error}") from None
+        if rows:
+            self.number, self.head = rows[-1].number, rows[-1].hash
+        return rows
+
+    def _rows(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
+        last = self._file.execute(_LAST).fetchone()
+        known, before = last or (0, NOTHING_BEFORE)
+        rows = list[AuditRow]()
+        for number, entry in enumerate(entries, known + 1):
+            rows.append(row_of(entry, number, before))
+            before = rows[-1].hash
+        return rows
+
+    def close(self) -> None:
+        """Put the file away, as one file without companions where that is possible."""
+        with suppress(sqlite3.Error):
+            self._file.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        self._file.close()
+
+
+def row_of(entry: AuditEntry, number: int, before: str) -> AuditRow:
+    """An entry as the row of that number, after one with that hash."""
+    values = {name: _clean(getattr(entry, name)) for name in NAMES}
+    values["details"] = json.loads(_packed(values["details"]))
+    values["time_s"] = float(values["time_s"])
+    plain = [number, *_columns(values), before]
+    return AuditRow(**values, number=number, before=before, hash=hash_of(plain))
+
+
+def hash_of(plain: Sequence[Any]) -> str:
+    """The SHA-256 of a row: its columns in their order, as JSON, but for the hash itself."""
+    return hashlib.sha256(json.dumps(plain, separators=(",", ":")).encode()).hexdigest()
+
+
+def _clean(value: Any) -> Any:
+    """Text that any file can hold: half a character pair is replaced."""
+    return value.encode("utf-8", "replace").decode() if isinstance(value, str) else value
+
+
+def _packed(details: Mapping[str, Any]) -> str:
+    return json.dumps(details, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _columns(values: Mapping[str, Any]) -> list[Any]:
+    return [_packed(values[name]) if name == "details" else values[name] for name in NAMES]
+
+
+def _stored(row: AuditRow) -> tuple[Any, ...]:
+    return (row.number, *_columns(vars(row)), row.before, row.hash)
+
+
+# --- reading ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FirstWrong:
+    """The first row that is wrong, and in what."""
+
+    number: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Verified:
+    """What a look at the whole chain has shown.
+
+    Attributes:
+        rows: How many rows hold, from the first one on.
+        head: The hash of the last of them.
+        problem: The first row that does not; None if all do.
+        is_ended: Whether the last row says that a console has ended there.
+        doubts: What is odd, and need not be wrong.
+    """
+
+    rows: int
+    head: str
+    problem: FirstWrong | None = None
+    is_ended: bool = False
+    doubts: tuple[str, ...] = ()
+
+
+def read_rows(path: Path, after: int = 0, most: int = -1) -> list[AuditRow]:
+    """The rows after a number, as they stand in the file.
+
+    Raises:
+        ConfigError: the file holds none, or what no log writes.
+    """
+    with closing(_opened(path)) as file:
+        try:
+            found = file.execute(
+                f"{_SELECT} WHERE number > ? ORDER BY number LIMIT ?", (after, most)
+            )
+            return [_row(values) for values in found]
+        except (sqlite3.Error, ValueError, TypeError) as error:
+            raise ConfigError(f"cannot be read as an audit log: {error}", path) from None
+
+
+def verify(path: Path) -> Verified:
+    """Follow the chain from the first row, up to the first one that is wrong.
+
+    Raises:
+        ConfigError: it cannot be read at all.
+    """
+    with closing(_opened(path)) as file:
+        try:
+            return _followed(file)
+        except sqlite3.Error as error:
+            return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is no audit log: {error}"))
+
+
+def _followed(file: sqlite3.Connection) -> Verified:
+    kept = dict(file.execute("SELECT name, value FROM about"))
+    if kept.get("format") != str(FORMAT):
+        return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is no audit log of format {FORMAT}"))
+    number, head, last = 0, NOTHING_BEFORE, ""
+    for values in file.execute(f"{_SELECT} ORDER BY number"):
+        if wrong := _wrong(values, number + 1, head):
+            return Verified(number, head, FirstWrong(number + 1, wrong))
+        number, head, last = number + 1, values[-1], values[COLUMNS.index("action")]
+    (given,) = next(file.execute("SELECT max(seq) FROM sqlite_sequence WHERE name = 'audit'"), (0,))
+    if (given or 0) > number:
+        lost = f"is missing: rows up to {given} were written, and the end was cut"
+        return Verified(number, head, FirstWrong(number + 1, lost))
+    return Verified(number, head, None, last == END, tuple(_doubts(file, last)))
+
+
+def _wrong(values: Sequence[Any], number: int, head: str) -> str | None:
+    """What is wrong with the row in the place of `number`, after one with the hash `head`."""
+    if values[0] != number:
+        return f"is missing: row {values[0]} follows row {number - 1}"
+    *plain, before, told = values
+    if any(isinstance(value, bytes) for value in values):
+        return "holds bytes where there should be text"
+    if hash_of([*plain, before]) != told:
+        return "was changed: its content does not have its hash"
+    if before != head:
+        return f"does not follow row {number - 1}: a row was removed, moved or put in"
+    return None
+
+
+def verify_plain(rows: Sequence[Mapping[str, Any]]) -> Verified:
+    """The same of rows that were kept elsewhere, as in a recording; they may begin anywhere."""
+    first = rows[0] if rows else {}
+    number, head, last = first.get("number", 1) - 1, first.get("before", NOTHING_BEFORE), ""
+    for plain in rows:
+        try:
+            values = [plain["number"], *_columns(plain), plain["before"], plain["hash"]]
+            wrong = _wrong(values, number + 1, head)
+        except (KeyError, TypeError, ValueError) as error:
+            wrong = f"is not whole: {error!r}"
+        if wrong:
+            return Verified(number, head, FirstWrong(number + 1, wrong))
+        number, head, last = number + 1, plain["hash"], plain["action"]
+    return Verified(number, head, None, last == END)
+
+
+def _doubts(file: sqlite3.Connection, last: str) -> Iterator[str]:
+    if last != END:
+        yield "its last row is not an end: a console writes it still, was killed, or it was cut"
+    ((guards,),) = file.execute("SELECT count(*) FROM sqlite_master WHERE type = 'trigger'")
+    if guards < _TABLES.count("CREATE TRIGGER"):
+        yield "its guards against changes by hand were removed"
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """The file, to be read only; nothing else opens it, since that would end SQLite's locks.
+
+    Raises:
+        ConfigError: it cannot be opened.
+    """
+    try:
+        path.stat()
+        return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=OPEN_WITHIN)
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", path) from None
+    except sqlite3.Error as error:
+        raise ConfigError(f"cannot be read: {error}", path) from None
+
+
+def _holds_nothing(path: Path) -> bool:
+    """Whether a file is empty, or one of SQLite in which nothing was made yet."""
+    if not path.stat().st_size:
+        return True
+    try:
+        with closing(_opened(path)) as file:
+            return not file.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    except sqlite3.Error:
+        return False
+
+
+def _row(values: Sequence[Any]) -> AuditRow:
+    named = dict(zip(COLUMNS, values, strict=True))
+    return AuditRow(**named | {"details": json.loads(named["details"])})
+
+
+def plain_row(row: AuditRow) -> dict[str, Any]:
+    """A row as a dictionary, in the order of the columns."""
+    return {name: getattr(row, name) for name in COLUMNS}

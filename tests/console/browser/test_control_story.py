@@ -1,0 +1,139 @@
+"""The program itself: an event is acknowledged, a robot sent, taken over, driven, confirmed."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from driving_by_keys import Driver
+from patience import PATIENCE_S, becomes
+from playwright.sync_api import Page, expect
+from programs import Program, Programs, all_gone_after
+
+from dva_sim.protocol.mistakes import check_message
+from dva_sim.recordings import read_recording
+from dva_sim.recordings.audit_log import read_rows
+
+DELAY_S = 0.25
+NEAR_M = 2.5  # of the fire: there it can be seen
+# What goes by in this order, each as a part of a message.
+MESSAGES = (
+    *(b"<GetProposal>", b"<Acknowledge>", b"<Assign>", b"<Revoke>", b"<Assign>"),
+    *(b"<PermissionRequest>", b"<StartTeleOp", b"<SetTeleOp>", b"<Finding>confirmed<"),
+)
+ROWS = (
+    "begin",
+    "acknowledge",
+    "assign",
+    "revoke",
+    "assign",
+    "take over",
+    "start",
+    "confirm",
+    "end",
+)
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
+
+
+def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
+    """A console in which the policy asks first, and its address."""
+    console = programs.start(
+        *("console", "--no-open", "--port", "0", "--set", "dispatch.mode=ask_first", *words)
+    )
+    console.wait_to_say("Console:")
+    return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
+
+
+def fire_in_hand(page: Page) -> None:
+    """Wait for the fire, and for what the policy proposes."""
+    table = page.get_by_role("table", name="Events")
+    expect(table).to_contain_text("Fire", timeout=1000 * PATIENCE_S)
+    page.get_by_role("button", name="Event 1", exact=True).click()
+    expect(page.get_by_role("region", name="Proposal")).to_contain_text(
+        "min_eta", timeout=1000 * PATIENCE_S
+    )
+
+
+def in_order(wanted: tuple[str, ...] | tuple[bytes, ...], said: list[str] | list[bytes]) -> None:
+    """What is wanted is said, each after the one before."""
+    at = -1
+    for one in wanted:
+        found = (n for n, text in enumerate(said) if n > at and one in text)
+        at = next(found, -1)
+        assert at >= 0, f"{one!r} is missing in its place"
+
+
+def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confirmed(
+    tmp_path: Path, visit, programs: Programs
+) -> None:
+    record, audit = tmp_path / "story.mcap", tmp_path / "audit.sqlite"
+    words = ["--record", record, "--audit", audit, "--set", f"link.delay_s={DELAY_S}"]
+    words += ["--set", "operator.count=2"]  # one of them a person, the other one simulated
+    console, address = started(programs, *words)
+    page = visit.open(address, "events")
+    base = address.partition("?")[0]
+    fire_in_hand(page)
+
+    page.get_by_role("button", name="Acknowledge").click()
+    expect(page.get_by_role("button", name="Acknowledge")).to_be_disabled()
+    robot = page.locator(".candidate:not(.cannot)").filter(has_text="robot-").first
+    label = robot.locator("span").first.inner_text()
+    robot.get_by_role("radio").check()
+    page.get_by_role("button", name="Assign").click()
+    expect(page.get_by_role("table", name="Events")).to_contain_text(label)
+    expect(page.get_by_role("region", name="Event in hand")).to_contain_text("assign by supervise")
+    held = page.get_by_label("Robot", exact=True)
+    expect(held).to_contain_text("held by operator-1", timeout=1000 * PATIENCE_S)
+    page.get_by_label("Reason or note").fill("I drive it there by hand")
+    page.get_by_role("button", name="Take over").click()
+
+    order = page.get_by_role("region", name="Order in hand")
+    expect(order).to_contain_text("fire", timeout=1000 * PATIENCE_S)
+    driver = Driver(page, base, label, DELAY_S)
+    fire = next(event for event in driver.state()["events"] if event["kind"] == "fire")
+    driver.drive_to(fire["x_m"], fire["y_m"], NEAR_M)
+    page.get_by_role("button", name="Confirm").click()
+    assert becomes(lambda: "confirmed" in str(driver.state()["events"]))
+
+    page.get_by_role("link", name="Audit").click()
+    expect(page.get_by_role("status", name="Verification")).to_contain_text("The chain holds")
+    expect(page.get_by_role("region", name="Measures")).to_contain_text("1 event")
+    page.close()  # it would complain that nobody is there any more
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    for file in (record, audit):
+        checked = programs.start("check", file)
+        assert checked.ends() == 0, checked.said + checked.complained
+    in_order(ROWS, [row.action for row in read_rows(audit)])
+    sent = list(read_recording(record).playback.recorder.traffic or ())
+    said = [one.payload for one in sent if isinstance(one.payload, bytes)]
+    in_order(MESSAGES, said)
+    assert [found for data in said for found in check_message(data)] == []
+    assert all(one.time <= later.time for one, later in pairwise(sent))
+
+
+def test_people_decide_over_real_links_too(tmp_path: Path, visit, programs: Programs) -> None:
+    audit = tmp_path / "audit.sqlite"
+    console, address = started(programs, "--links", "real", "--audit", audit)
+    page = visit.open(address, "events")
+    fire_in_hand(page)
+
+    page.get_by_role("button", name="Acknowledge").click()
+    expect(page.get_by_role("button", name="Acknowledge")).to_be_disabled()
+    page.get_by_role("button", name="Send a guard").click()
+    expect(page.get_by_role("table", name="Events")).to_contain_text("guard-")
+    page.get_by_role("link", name="Audit").click()
+    expect(page.get_by_role("table", name="Audit log")).to_contain_text("acknowledge")
+    page.close()
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    checked = programs.start("check", audit)
+    assert checked.ends() == 0, checked.said + checked.complained

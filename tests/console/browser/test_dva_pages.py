@@ -1,0 +1,328 @@
+"""Main and Devices in a browser: the log, its filters, the server, fake devices, rude peers.
+
+What runs is asked for before the browser, so that it is there until the last page is closed.
+"""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import zmq
+from free_ports import free_port
+from page_faults import faults
+from patience import PATIENCE_S
+from playwright.sync_api import Page, expect
+from programs import Program, Programs, all_gone_after
+
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.mistakes import check_message
+
+DVA, STRANGER = "02:00:00:00:00:01", "02:00:00:0A:00:01"
+HOSTILE = "<img src=x onerror=alert(1)>"
+SLOW = 250 * PATIENCE_S
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
+
+
+def started(programs: Programs, *words: str) -> tuple[Program, str]:
+    """A console, and its address."""
+    console = programs.start("console", "--no-open", "--port", "0", *words)
+    console.wait_to_say("Console:")
+    return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
+
+
+class Peer:
+    """A program of somebody else that talks to the DVA by a socket."""
+
+    def __init__(self, console: Program) -> None:
+        console.wait_to_say("DVA:")
+        (address,) = re.findall(r"^DVA: +(\S+)", console.said, re.MULTILINE)
+        self._context = zmq.Context()
+        self._socket = self._context.socket(zmq.DEALER)
+        self._socket.linger = 0
+        self._socket.connect(f"tcp://{address}")
+        self._count = 0
+
+    def ask(self, body: m.Body) -> m.Reply:
+        self._count += 1
+        data = encode(m.Message(DVA, self._count, STRANGER, "12:00:00", 0, body))
+        reply = decode(self.ask_bytes(data)).body
+        assert isinstance(reply, m.Reply)
+        return reply
+
+    def ask_bytes(self, data: bytes) -> bytes:
+        self._socket.send_multipart([b"", data])
+        assert self._socket.poll(1000 * int(PATIENCE_S))
+        return self._socket.recv_multipart()[1]
+
+    def flood(self, number: int) -> None:
+        data = encode(m.Message(DVA, 1, STRANGER, "12:00:00", 0, m.GetDeviceList()))
+        for _ in range(number):
+            self._socket.send_multipart([b"", data])
+        for _ in range(number):
+            assert self._socket.poll(1000 * int(PATIENCE_S))
+            self._socket.recv_multipart()
+
+    def close(self) -> None:
+        self._context.destroy(linger=0)
+
+
+@pytest.fixture
+def joined(programs: Programs) -> Iterator[tuple[Peer, str]]:
+    """Somebody's program beside a console on real links, and the address of that."""
+    console, address = started(programs, "--links", "real")
+    peer = Peer(console)
+    yield peer, address
+    peer.close()
+
+
+def row(page: Page, text: str) -> object:
+    return page.get_by_role("table", name="Requests").get_by_role("row").filter(has_text=text)
+
+
+def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, visit) -> None:
+    page = visit.open(fake().drive, "main")
+
+    page.get_by_role("button", name="Request 3", exact=True).click()
+    message = page.get_by_role("region", name="Message")
+    for word in ("PermissionRequest", "DestinationID", "MessageID", "SourceID", "Timestamp"):
+        expect(message).to_contain_text(word)
+    expect(message.get_by_role("group", name="XML of the request")).to_contain_text("<Level>")
+    expect(message).to_contain_text("held by ana")
+    expect(row(page, "held by ana").first).to_have_class(re.compile("refused"))
+
+
+def test_what_was_no_message_is_shown_with_line_and_column(fake, visit) -> None:
+    page = visit.open(fake().drive, "main")
+
+    page.get_by_role("button", name="Request 10", exact=True).click()
+    message = page.get_by_role("region", name="Message")
+    expect(message).to_contain_text(re.compile(r"Line \d+, column \d+: MessageID 'x10'"))
+    expect(message.locator("mark")).to_have_text("<MessageID>x10</MessageID>")
+
+
+def test_a_hostile_label_is_text_in_log_and_table(fake, visit) -> None:
+    page = visit.open(fake().drive, "main")
+
+    expect(row(page, HOSTILE).first).to_be_visible()
+    page.get_by_role("link", name="Devices").click()
+    expect(page.get_by_role("table", name="Devices")).to_contain_text(HOSTILE)
+    assert page.locator("table img").count() == 0
+
+
+def test_the_log_is_filtered_searched_paused_and_cleared(fake, visit) -> None:
+    page = visit.open(fake().drive, "main")
+    table = page.get_by_role("table", name="Requests")
+    expect(table.get_by_role("button")).not_to_have_count(0)
+
+    page.get_by_label("Kind").select_option("RegMsg")
+    expect(table.get_by_text("GetDeviceList")).to_have_count(0)
+    expect(table.get_by_text("RegMsg").first).to_be_visible()
+    page.get_by_label("Kind").select_option("")
+    page.get_by_label("Code").select_option("refused")
+    expect(table.locator("tbody tr:not(.refused)")).to_have_count(0)
+    page.get_by_label("Code").select_option("")
+    page.get_by_label("Search").fill("nothing says this")
+    expect(page.get_by_text("No request yet.")).to_be_visible()
+    page.get_by_label("Search").fill("")
+    page.get_by_label("Device").fill("onerror")
+    expect(table.get_by_role("button")).not_to_have_count(0)
+    page.get_by_role("button", name="Pause log").click()
+    shown = table.get_by_role("button").count()
+    expect(page.get_by_role("status", name="Shown")).to_contain_text(re.compile("[1-9] more have"))
+    assert table.get_by_role("button").count() == shown
+    page.get_by_role("button", name="Resume log").click()
+    page.get_by_role("button", name="Clear log").click()
+    expect(page.get_by_role("button", name="Request 1", exact=True)).to_have_count(0)
+
+
+def test_lines_are_chosen_by_keys_alone(fake, visit) -> None:
+    page = visit.open(fake().drive, "main")
+    page.get_by_role("button", name="Pause log").click()
+    last = page.get_by_role("table", name="Requests").get_by_role("button").last
+    number = int(last.inner_text())
+
+    last.focus()
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("Enter")
+    heading = page.get_by_role("heading", name=f"Request {number - 1}", exact=True)
+    expect(heading).to_be_visible()
+
+
+def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit) -> None:
+    page = visit.open(fake().look, "main")
+
+    expect(page.get_by_role("table", name="Requests").get_by_role("button")).not_to_have_count(0)
+    expect(page.get_by_role("button", name="Stop server")).to_be_disabled()
+    expect(page.get_by_role("link", name="Export")).to_have_count(0)
+    page.get_by_role("table", name="Requests").get_by_role("button").first.click()
+    expect(page.get_by_role("region", name="Message")).to_contain_text("need the address")
+    page.get_by_role("link", name="Devices").click()
+    expect(page.get_by_role("button", name="Add fake device")).to_have_count(0)
+
+
+def test_a_fake_device_is_added_by_keys_alone(own_world, visit) -> None:
+    page = visit.open(own_world()[0].drive, "devices")
+
+    page.get_by_role("button", name="Add fake device").press("Enter")
+    page.get_by_label("Label", exact=True).focus()
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("A label is needed.")).to_be_visible()
+    assert faults(page) == []
+    page.keyboard.type("ghost")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("row", name="ghost fake")).to_be_visible()
+
+
+def test_on_modelled_links_a_stopped_server_is_silent_and_starts_again(
+    programs: Programs, visit
+) -> None:
+    page = visit.open(started(programs)[1], "main")
+    state = page.get_by_role("status", name="Server state")
+
+    expect(state).to_contain_text("Listens on")
+    expect(page.get_by_text("no port of this machine is open")).to_be_visible()
+    page.get_by_role("button", name="Stop server").click()
+    expect(state).to_contain_text("Stopped")
+    page.get_by_role("link", name="Drive").click()
+    page.get_by_role("button", name="Take control").click()
+    expect(page.locator(".warnings")).to_contain_text("answer", timeout=SLOW)
+    page.get_by_role("link", name="Main").click()
+    page.get_by_label("Port").fill("5600")
+    page.get_by_role("button", name="Start server").click()
+    expect(state).to_contain_text(":5600")
+    expect(row(page, "RegMsg").first).to_be_visible()
+
+
+def test_a_permission_is_revoked_from_the_table(programs: Programs, visit) -> None:
+    page = visit.open(started(programs)[1], "drive")
+    page.get_by_role("button", name="Take control").click()
+    expect(page.get_by_role("button", name="Release control")).to_be_enabled()
+
+    page.get_by_role("link", name="Devices").click()
+    held = page.get_by_role("row", name="robot-1")
+    expect(held).to_contain_text("console-1")
+    held.get_by_role("button", name="Revoke").click()
+    expect(held).not_to_contain_text("console-1")
+
+
+def test_a_peer_on_real_links_shows_up_and_its_faults_are_shown(
+    joined: tuple[Peer, str], visit, tmp_path: Path
+) -> None:
+    peer, address = joined
+    page = visit.open(address, "main")
+
+    assert peer.ask(m.Registration(HOSTILE, "TeleOp", "127.0.0.1:9")).code == m.OK
+    peer.ask_bytes(b"<!DOCTYPE m [<!ENTITY e SYSTEM 'file:///etc/passwd'>]><msg>&e;</msg>")
+    peer.ask_bytes(b"<script>alert(1)</script>")
+    expect(row(page, HOSTILE)).not_to_have_count(0)
+    expect(page.locator("tr.refused")).to_have_count(2)
+    page.locator("tr.refused button").first.click()
+    expect(page.get_by_role("region", name="Message")).to_contain_text("a DOCTYPE is not allowed")
+    page.get_by_role("link", name="Devices").click()
+    expect(page.get_by_role("row", name=HOSTILE)).to_contain_text(STRANGER)
+    page.get_by_role("link", name="Main").click()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Export").click()
+    download.value.save_as(tmp_path / "log.zip")
+    with zipfile.ZipFile(tmp_path / "log.zip") as files:
+        kept = [name for name in files.namelist() if name.startswith("messages/")]
+        assert len(kept) > 10
+        assert [check_message(files.read(name)) for name in kept] == [[]] * len(kept)
+        assert len([name for name in files.namelist() if name.startswith("refused/")]) == 2
+
+
+def test_a_flood_is_counted_and_not_shown_line_by_line(joined: tuple[Peer, str], visit) -> None:
+    peer, address = joined
+    page = visit.open(address, "main")
+    expect(row(page, "RegMsg").first).to_be_visible()
+
+    peer.ask(m.Registration("flood", "TeleOp", "127.0.0.1:9"))
+    peer.flood(3000)
+    gap = page.locator("tr.gap").last
+    expect(gap).to_have_text(re.compile(r"[\d,]+ not shown"))
+    assert page.locator(".log tbody tr").count() <= 401
+    expect(page.locator(".age")).not_to_have_class(re.compile("old"))
+
+
+def test_on_real_links_the_port_is_closed_and_opened(joined: tuple[Peer, str], visit) -> None:
+    peer, address = joined
+    page = visit.open(address, "main")
+
+    page.get_by_role("button", name="Stop server").click()
+    expect(page.get_by_role("status", name="Server state")).to_contain_text("Stopped")
+    page.get_by_role("button", name="Start server").click()
+    expect(page.get_by_role("status", name="Server state")).to_contain_text("Listens on")
+    assert peer.ask(m.Registration("back", "TeleOp", "127.0.0.1:9")).code == m.OK
+
+
+def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
+    programs: Programs, visit
+) -> None:
+    _, address = started(programs)
+    page = visit.open(address, "devices")
+    page.get_by_role("button", name="Add fake device").click()
+    page.get_by_label("Label", exact=True).fill("ghost")
+    page.get_by_role("button", name="Add", exact=True).click()
+    expect(page.get_by_role("row", name="ghost fake")).to_be_visible()
+
+    phone = visit.tab()
+    phone.goto(f"{address.partition('?')[0]}phone#/authentication")
+    phone.get_by_label("Device label").fill("phone")
+    phone.get_by_role("button", name="Register").click()
+    phone.get_by_role("button", name="Get device list").click()
+    device = phone.get_by_label("Device", exact=True)
+    ghost = device.locator("option", has_text="ghost")
+    expect(ghost).to_have_count(1)
+    device.select_option(ghost.inner_text())
+    phone.get_by_role("button", name="Get Permission Level").click()
+    expect(phone.get_by_text("Permission is held")).to_be_visible()
+    phone.evaluate("location.hash = '#/teleoperation'")
+    phone.get_by_role("button", name="Start", exact=True).click()
+    expect(phone.get_by_text("no answer at")).to_be_visible(timeout=SLOW)
+    expect(phone.get_by_role("link", name="Authentication")).to_be_visible(timeout=SLOW)
+
+
+@pytest.fixture
+def elsewhere(programs: Programs) -> tuple[str, Program]:
+    """The address of a DVA that runs elsewhere, and its program; robots and guards know it."""
+    dva = f"127.0.0.1:{free_port()}"
+    first = programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
+    programs.start("live", "hands-on", "--only", "world", "--dva", dva, "--for", "1000")
+    return dva, first
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 360)])
+def test_an_attached_console_shows_what_messages_tell_and_the_rest_as_unknown(
+    programs: Programs, elsewhere: tuple[str, Program], visits, scheme: str, width: int
+) -> None:
+    dva, first = elsewhere
+    _, address = started(programs, "--dva", dva)
+    page = visits(width, 800, color_scheme=scheme).open(address, "devices")
+
+    robot = page.get_by_role("row", name=re.compile("robot-1"))
+    expect(robot).to_contain_text("Idle", timeout=SLOW)
+    expect(robot).to_contain_text("unknown")
+    assert faults(page) == []
+    expect(page.get_by_role("status", name="Link")).to_contain_text(f"attached to {dva}")
+    for name in ("Drive", "Network", "Robots"):
+        expect(page.get_by_role("link", name=name)).to_have_count(0)
+    page.get_by_role("link", name="Main").click()
+    expect(page.get_by_role("status", name="Server state")).to_contain_text("answers")
+    expect(page.get_by_text("is unknown here", exact=False)).to_be_visible()
+    assert faults(page) == []
+
+    first.process.kill()
+    expect(page.get_by_role("alert")).to_contain_text("does not answer", timeout=SLOW)
+    programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
+    expect(page.get_by_text("does not answer")).to_have_count(0, timeout=SLOW)
+    page.get_by_role("link", name="Devices").click()
+    expect(robot).to_contain_text("Idle", timeout=SLOW)

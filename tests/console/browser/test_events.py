@@ -1,0 +1,166 @@
+"""The page Events in the fake world: alarms, decisions, two people at once, hostile words."""
+
+from __future__ import annotations
+
+import re
+
+from playwright.sync_api import Page, WebSocketRoute, expect
+
+
+def cell(page: Page, number: int, text: str) -> None:
+    """A row of the table of events says something."""
+    row = page.get_by_role("table", name="Events").get_by_role("row")
+    found = row.filter(has=page.get_by_role("button", name=f"Event {number}", exact=True))
+    expect(found).to_contain_text(text)
+
+
+def choose(page: Page, number: int) -> None:
+    page.get_by_role("button", name=f"Event {number}", exact=True).click()
+    panel = page.get_by_role("region", name="Event in hand")
+    expect(panel.get_by_role("heading", level=2)).to_contain_text(f"{number} ")
+    expect(panel.get_by_role("region", name="Proposal")).to_contain_text("robot-2, 41 s")
+
+
+def own(own_world, visits, *words: str, **options: int) -> tuple[Page, Page]:
+    """Two people on the page Events of one world."""
+    world, _ = own_world(*words)
+    return tuple(visits(**options).open(world.drive, "events") for _ in range(2))  # type: ignore[return-value]
+
+
+def test_an_event_is_acknowledged_and_somebody_is_sent(own_world, visits) -> None:
+    page, other = own(own_world, visits)
+    choose(page, 1)
+
+    page.get_by_role("button", name="Acknowledge").click()
+    cell(other, 1, "supervise-")
+    expect(page.get_by_role("button", name="Acknowledge")).to_be_disabled()
+    proposal = page.get_by_role("region", name="Proposal")
+    expect(proposal).to_contain_text("robot-3: 58 s, free")
+    page.get_by_label("guard-1").check()
+    page.get_by_label("Reason or note").fill("a person has to look")
+    page.get_by_role("button", name="Assign").click()
+    cell(other, 1, "guard-1")
+    expect(page.get_by_role("region", name="Event in hand")).to_contain_text("a person has to look")
+
+
+def test_of_two_who_decide_at_once_the_second_is_told_and_changes_nothing(
+    own_world, visits
+) -> None:
+    world, _ = own_world()
+    page, visit = visits().open(world.drive, "events"), visits()
+    deaf: list[bool] = []
+
+    def between(ws: WebSocketRoute) -> None:
+        """What the world says does not reach the second page while it is deaf."""
+        server = ws.connect_to_server()
+        server.on_message(lambda text: None if deaf else ws.send(text))
+
+    visit.context.route_web_socket(re.compile("/ws/state"), between)
+    other = visit.open(world.drive, "events")
+    for each in (page, other):
+        choose(each, 1)
+    deaf.append(True)
+    page.get_by_label("robot-3").check()
+    page.get_by_role("button", name="Assign").click()
+    cell(page, 1, "robot-3")
+
+    other.get_by_role("button", name="Assign").click()
+    expect(other.get_by_role("alert")).to_contain_text("decided meanwhile: assign")
+    deaf.clear()
+    cell(other, 1, "robot-3")
+
+
+def test_an_alarm_is_seen_and_one_is_shelved_and_comes_back(own_world, visits) -> None:
+    page, other = own(own_world, visits)
+    alarms = page.get_by_role("region", name="Alarms")
+    expect(alarms).to_contain_text("1 not seen")
+
+    alarms.get_by_role("button", name="Seen").first.click()
+    expect(other.get_by_role("region", name="Alarms")).to_contain_text("acknowledged by supervise-")
+    alarms.get_by_role("button", name="Shelve").first.click()
+    expect(alarms.get_by_text("Shelved (1)")).to_be_visible()
+    expect(other.get_by_role("region", name="Alarms").get_by_text("Shelved (1)")).to_be_visible()
+    alarms.get_by_text("Shelved (1)").click()
+    alarms.get_by_role("button", name="Take from the shelf").click()
+    expect(alarms.get_by_text("Shelved (1)")).to_have_count(0)
+
+
+def test_an_event_is_raised_at_a_place_clicked_on_the_map(own_world, visits) -> None:
+    page, other = own(own_world, visits)
+    page.get_by_label("Kind").select_option("flood")
+    before = page.get_by_label("x, m").input_value()
+    page.locator(".raise .map-ground").click(position={"x": 60, "y": 150})
+    expect(page.get_by_label("x, m")).not_to_have_value(before)
+
+    page.get_by_role("button", name="Raise event").click()
+    cell(other, 100, "Flood")
+    expect(page.get_by_role("region", name="Event in hand")).to_contain_text("100 Flood")
+
+
+def test_all_is_done_by_keys_alone(own_world, visits) -> None:
+    page, other = own(own_world, visits)
+    expect(page.get_by_role("button", name="Raise event")).to_be_enabled()
+    page.get_by_label("Room").focus()
+    page.keyboard.press("ArrowDown")
+    page.get_by_label("x, m").focus()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    cell(other, 100, "Fire")
+    page.get_by_role("button", name="Event 1", exact=True).press("Enter")
+    page.get_by_role("button", name="Acknowledge").press("Space")
+    cell(other, 1, "supervise-")
+
+
+def test_what_needs_words_asks_for_them_and_does_nothing_without(own_world, visits) -> None:
+    page, other = own(own_world, visits)
+    choose(page, 1)
+    page.get_by_role("button", name="False alarm").click()
+    expect(page.get_by_text("Say first in words why, or what.")).to_be_visible()
+    expect(page.get_by_label("Reason or note")).to_be_focused()
+
+    page.get_by_label("Reason or note").fill("burnt toast")
+    page.get_by_role("button", name="False alarm").click()
+    cell(other, 1, "refuted")
+
+
+def test_notes_and_names_that_are_html_are_shown_as_they_are(own_world, visits) -> None:
+    evil = "<img src=x onerror=alert(1)>"
+    page, other = own(own_world, visits, "--hostile")
+    for each in (page, other):
+        each.on("dialog", lambda dialog: dialog.dismiss())
+    page.get_by_label("Your name").fill(evil)
+    page.get_by_role("button", name="Use this name").click()
+    expect(page.get_by_text(f"The log calls you {evil}")).to_be_visible()
+    choose(page, 1)
+    page.get_by_label("Reason or note").fill(evil)
+    page.get_by_role("button", name="Note", exact=True).click()
+
+    other.get_by_role("button", name="Event 1", exact=True).click()
+    expect(other.locator(".note")).to_have_text(evil)
+    log = other.context.new_page()
+    log.goto(other.url.replace("#/events", "#/audit"))
+    expect(log.get_by_role("table", name="Audit log")).to_contain_text(evil)
+    for each in (page, other, log):
+        assert each.locator("img[src=x]").count() == 0
+
+
+def test_who_may_look_sees_all_and_has_no_buttons(fake, visit) -> None:
+    page = visit.open(fake().look, "events")
+    expect(page.get_by_role("table", name="Events")).to_contain_text("Fire")
+
+    expect(page.get_by_text("This address may look.")).to_be_visible()
+    for name in ("Acknowledge", "Assign", "Raise event", "Take over", "Seen", "Shelve"):
+        expect(page.get_by_role("button", name=name)).to_have_count(0)
+
+
+def test_only_what_is_new_stands_out(own_world, visits) -> None:
+    page, _ = own(own_world, visits)
+    new = page.locator(".alarm.new")
+    page.get_by_role("button", name="Raise event").click()
+
+    expect(new).to_have_count(1)
+    assert re.search(
+        r"new-alarm",
+        page.evaluate("getComputedStyle(document.querySelector('.alarm.new')).animationName"),
+    )

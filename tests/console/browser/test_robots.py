@@ -1,0 +1,295 @@
+"""A robot's windows in a browser: over modelled links, over real ones, with hostile names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from page_faults import faults
+from patience import becomes
+from playwright.sync_api import Page, expect
+from programs import Programs, all_gone_after
+
+REGIONS = "Log", "Side view", "Top view", "Manual control", "Latency", "Camera"
+QUIET = "--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operator.count=1"
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path_factory.mktemp("consoles"))
+
+
+@pytest.fixture(scope="module")
+def addresses(programs: Programs) -> tuple[str, str]:
+    """Of a console on modelled links, for driving and for looking."""
+    return started(programs)
+
+
+@pytest.fixture
+def console(addresses: tuple[str, str]) -> str:
+    return addresses[0]
+
+
+def started(programs: Programs, *words: str) -> tuple[str, str]:
+    """A console's addresses."""
+    program = programs.start("console", "--no-open", "--port", "0", *QUIET, *words)
+    program.wait_to_say("Console:", "Look only:")
+    drive, look = re.findall(r"^(?:Console|Look only): +(\S+)$", program.said, re.MULTILINE)
+    return drive, look
+
+
+def opened(visit: Any, address: str, robot: str = "robot-1") -> Page:
+    """The windows of a robot, once the world is there."""
+    page = visit.tab()
+    page.goto(f"{address}#/robots/{robot}")
+    expect(page.get_by_role("region", name="Manual control")).to_be_visible()
+    expect(page.get_by_role("list", name="State")).to_be_visible()
+    return page
+
+
+def take(page: Page) -> None:
+    """Take it in hand, again and again where this machine is late: robots are held then."""
+    button, mode = (
+        page.get_by_role("button", name="Take manual control"),
+        page.get_by_role("status", name="Mode"),
+    )
+
+    def is_taken() -> bool:
+        if button.is_enabled():
+            button.click()
+        page.wait_for_timeout(200)
+        return "Manual" in mode.inner_text()
+
+    assert becomes(is_taken)
+
+
+@contextmanager
+def in_hand(page: Page) -> Iterator[None]:
+    """The robot is in the hand of this page."""
+    take(page)
+    yield
+    page.get_by_role("button", name="Release manual control").click()
+    expect(page.get_by_role("button", name="Take manual control")).to_be_enabled()
+
+
+@contextmanager
+def held(page: Page, *keys: str) -> Iterator[None]:
+    for key in keys:
+        page.keyboard.down(key)
+    yield
+    for key in keys:
+        page.keyboard.up(key)
+
+
+def side(page: Page) -> str:
+    return str(
+        page.get_by_role("region", name="Side view").get_by_role("img").get_attribute("aria-label")
+    )
+
+
+def spokes(page: Page) -> str:
+    return str(page.locator(".spokes").first.get_attribute("transform"))
+
+
+@contextmanager
+def driving(page: Page) -> Iterator[None]:
+    """Somebody drives the robot from the page for driving, in another tab."""
+    page.get_by_role("link", name="Drive").click()
+    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    yield
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+
+
+def test_the_list_leads_to_the_windows_of_each_robot(visit, console: str) -> None:
+    page = visit.open(console)
+    page.get_by_role("link", name="Robots").click()
+    table = page.get_by_role("table", name="Robots")
+    expect(table.get_by_role("row")).to_have_count(3)
+    table.get_by_role("link", name="robot-2").click()
+
+    expect(page.get_by_role("heading", name="robot-2", level=1)).to_be_visible()
+    for region in REGIONS:
+        expect(page.get_by_role("region", name=region, exact=True)).to_have_count(1)
+    page.reload()
+    expect(page.get_by_role("heading", name="robot-2", level=1)).to_be_visible()
+
+
+def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(
+    visit, console
+) -> None:
+    page = opened(visit, console)
+    with in_hand(page):
+        before = spokes(page)
+        with held(page, "ArrowUp", "ArrowRight"):
+            expect(page.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
+            expect(page.get_by_role("region", name="Side view")).to_contain_text("5.00 rad/s")
+            expect(page.get_by_role("region", name="Top view")).to_contain_text("-30°")
+            assert "0.50 m/s, wheels 5.00 rad/s" in side(page)
+            assert becomes(lambda: spokes(page) != before)
+            expect(page.get_by_role("status", name="Reason")).to_contain_text("moves")
+        expect(page.get_by_role("region", name="Side view")).to_contain_text("0.00 m/s")
+        expect(page.get_by_role("status", name="Reason")).to_contain_text("hand")
+    expect(page.get_by_role("status", name="Mode")).to_contain_text("Idle")
+
+
+def test_wheels_stand_still_for_who_wants_no_motion_and_the_number_is_there(
+    visits, console
+) -> None:
+    page = opened(visits(reduced_motion="reduce"), console)
+    with in_hand(page):
+        before = spokes(page)
+        with held(page, "ArrowUp"):
+            expect(page.get_by_role("region", name="Side view")).to_contain_text("5.00 rad/s")
+            page.wait_for_timeout(300)
+            assert spokes(page) == before
+
+
+def test_the_slider_drives_by_keys_alone_and_springs_back(visit, console: str) -> None:
+    page = opened(visit, console)
+    button = page.get_by_role("button", name="Take manual control")
+    assert becomes(lambda: button.is_disabled() or button.press("Enter") or button.is_disabled())
+    speed = page.get_by_role("slider", name="Speed")
+    expect(speed).to_be_enabled()
+    speed.focus()
+    with held(page, "End"):
+        expect(page.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
+    expect(speed).to_have_value("0")
+    page.get_by_role("button", name="Release manual control").focus()
+    page.keyboard.press("Space")
+    expect(page.get_by_role("status", name="Mode")).to_contain_text("Idle")
+
+
+def test_a_page_that_is_closed_lets_the_robot_stand_and_another_one_sees_why(
+    visits, console
+) -> None:
+    driver, other = opened(visits(), console), opened(visits(), console)
+    take(driver)
+    driver.keyboard.down("ArrowUp")
+    expect(other.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
+    expect(other.get_by_text("in the hand of another page")).to_be_visible()
+    driver.close()
+    expect(other.get_by_role("region", name="Side view")).to_contain_text("0.00 m/s")
+    other.get_by_role("button", name="Take manual control").click()
+    expect(other.get_by_text("by hand").first).to_be_visible()
+    other.get_by_role("button", name="Stop robot-1").click()
+    expect(other.get_by_role("status", name="Mode")).to_contain_text("Emergency")
+    expect(other.get_by_role("status", name="Reason")).to_contain_text(
+        "Emergency stop by console-1"
+    )
+
+
+def test_a_robot_in_a_hand_is_busy_for_a_driver_and_a_driven_one_goes_into_no_hand(
+    visits, console
+) -> None:
+    hand, driver = opened(visits(), console), visits().open(console, "drive")
+    with in_hand(hand):
+        driver.get_by_role("button", name="Take control").click()
+        driver.get_by_role("button", name="Start", exact=True).click()
+        expect(driver.get_by_text("does not start yet: driven by hand")).to_be_visible()
+    expect(driver.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    hand.get_by_role("button", name="Take manual control").click()
+    expect(hand.get_by_text("busy: held by console-1")).to_be_visible()
+    driver.get_by_role("button", name="Release control").click()
+    expect(driver.get_by_role("button", name="Take control")).to_be_enabled()
+
+
+def test_an_emergency_wins_over_the_hand_that_drives(visits, console: str) -> None:
+    hand, other = opened(visits(), console), visits().open(console)
+    take(hand)
+    hand.keyboard.down("ArrowUp")
+    expect(hand.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
+    other.get_by_role("button", name="Emergency stop").click()
+    expect(hand.get_by_role("status", name="Mode")).to_contain_text("Emergency")
+    expect(hand.get_by_role("region", name="Side view")).to_contain_text("0.00 m/s")
+    expect(hand.get_by_role("status", name="Reason")).to_contain_text("manual control has ended")
+    hand.keyboard.up("ArrowUp")
+
+
+def test_the_log_and_the_latency_show_a_drive_in_its_order(visits, console: str) -> None:
+    windows, driver = opened(visits(), console), visits().open(console, "drive")
+    log = windows.get_by_role("table", name="Messages")
+    with driving(driver), held(driver, "ArrowUp"):
+        expect(log).to_contain_text("StartTeleOp")
+        expect(log).to_contain_text("SetTeleOp")
+        latency = windows.get_by_role("table", name="Latency")
+        expect(latency.get_by_role("row", name="Client to robot")).not_to_contain_text("–")
+        expect(windows.get_by_role("region", name="Log")).to_contain_text("median")
+    expect(log).to_contain_text("StopTeleOp")
+    kinds = [row.split()[0] for row in log.locator("td.payload").all_inner_texts()]
+    assert kinds[-1] == "StopTeleOp"
+    assert kinds.index("StartTeleOp") < kinds.index("SetTeleOp")
+    assert "0 ok" in log.inner_text()
+
+
+def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(visit, console: str) -> None:
+    page = opened(visit, console)
+    knobs = page.get_by_role("region", name="Faults")
+    expect(knobs).to_contain_text("none")
+    knobs.get_by_label("Lose the camera").check()
+    expect(page.locator(".picture-age")).to_have_class(re.compile("hatched"))
+    knobs.get_by_label("Stuck: smoke").check()
+    expect(page.get_by_role("region", name="Sensors")).to_contain_text("stuck")
+    expect(knobs).to_contain_text("something is made to go wrong")
+    knobs.get_by_label("Lose the camera").uncheck()
+    knobs.get_by_label("Stuck: smoke").uncheck()
+    expect(knobs).to_contain_text("none")
+    expect(page.locator(".picture-age")).to_have_class(re.compile("fresh"))
+
+
+def test_who_may_look_only_sees_all_and_changes_nothing(visit, addresses) -> None:
+    page = opened(visit, addresses[1])
+    expect(page.get_by_role("button", name="Take manual control")).to_be_disabled()
+    expect(page.get_by_label("Freeze")).to_be_disabled()
+    expect(page.get_by_text("This address may only look.")).to_be_visible()
+
+
+def test_over_real_links_all_windows_are_the_same(visit, programs: Programs) -> None:
+    address, _ = started(programs, "--links", "real")
+    page = opened(visit, address)
+    for region in REGIONS:
+        expect(page.get_by_role("region", name=region, exact=True)).to_have_count(1)
+    with in_hand(page), held(page, "ArrowUp"):
+        expect(page.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
+    expect(page.locator(".picture-age")).to_contain_text("old")
+    with driving(page), held(page, "ArrowUp"):
+        expect(page.locator(".stands")).to_contain_text("Set point 0.50 m/s")
+    page.goto(f"{address}#/robots/robot-1")
+    expect(page.get_by_role("table", name="Messages")).to_contain_text("SetTeleOp")
+
+
+def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(visit, programs) -> None:
+    page = opened(visit, started(programs, "--set", "robot.profile=pibot")[0])
+    with in_hand(page), held(page, "ArrowUp"):
+        expect(page.get_by_role("region", name="Side view")).to_contain_text("motor 100 % PWM")
+        expect(page.get_by_role("region", name="Top view")).to_contain_text("straight")
+        with held(page, "ArrowLeft"):
+            expect(page.get_by_role("region", name="Top view")).to_contain_text("left")
+
+
+def test_a_name_that_is_hostile_is_shown_as_text(fake, visit) -> None:
+    page = visit.tab()
+    page.goto(f"{fake('--hostile').drive}#/robots")
+    table = page.get_by_role("table", name="Robots")
+    expect(table).to_contain_text("<")
+    table.get_by_role("link").nth(1).click()
+    expect(page.get_by_role("heading", level=1)).to_contain_text("<")
+    page.goto(f"{fake('--hostile').drive}#/robots/%3Cimg%20src=x%20onerror=alert(1)%3E")
+    expect(page.get_by_text("There is no robot <img src=x onerror=alert(1)>")).to_be_visible()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [360, 1280])
+def test_axe_finds_nothing_serious_and_nothing_is_too_wide(visits, console, scheme, width) -> None:
+    visit = visits(width, 800, color_scheme=scheme)
+    page = opened(visit, console)
+    assert faults(page) == []
+    assert page.evaluate("document.querySelector('.body').scrollWidth") <= width
+    page.goto(f"{console}#/robots")
+    expect(page.get_by_role("table", name="Robots")).to_be_visible()
+    assert faults(page) == []

@@ -1,0 +1,239 @@
+"""A console at a DVA that runs elsewhere: what messages tell, and nothing that they do not."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from free_ports import free_port
+from patience import becomes
+from programs import Program, Programs, all_gone_after
+
+from dva_sim.console.attached import lines
+from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.told import ToldDevice
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.keys import KeyRing, create_keys
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.stage import id_of, team_of
+from dva_sim.simulation.scenario import build, load
+from dva_sim.worlds.geo import GeoFrame
+
+ROBOT, ROOM = id_of("robot", 1), id_of("control-room", 1)
+HERE = GeoFrame(38.66, -9.2)
+
+
+# --- what is told ------------------------------------------------------------------------------
+
+
+def told(kind: str = "Robot", **more: object) -> ToldDevice:
+    return ToldDevice(m.Device(ROBOT, "robot-1", kind, "10.0.0.1:5600"), 0.0, **more)
+
+
+def test_of_a_robot_that_has_said_nothing_everything_is_unknown():
+    row = lines.robot_row(told(), 0, 5.0)
+    assert (row["mode"], row["holder"], row["camera"]) == ("unknown", None, None)
+    assert lines.device_row(told(), 5.0, False, False)["link"] is None
+    assert lines.device_row(told(), 5.0, False, False)["holder_known"] is False
+    assert lines.positions({ROBOT: told()}, {ROBOT: 0}, HERE) == []
+
+
+def test_a_robot_is_shown_as_it_says_itself():
+    latitude, longitude = HERE.to_latlon(3.0, -4.0)
+    status = m.RobotStatus("Teleoperation", m.Position(latitude, longitude), 1.0, 0.25, 0.0, 7)
+    holder = m.RobotHolder(id_of("operator", 1), "ana", 10.0), 2.0
+    robot = told(status=status, holder=holder, heard=4.0)
+    row = lines.robot_row(robot, 3, 5.0)
+    assert (row["mode"], row["holder_label"], row["session_age_s"]) == (
+        "Teleoperation",
+        "ana",
+        13.0,
+    )
+    assert lines.positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
+    shown = lines.device_row(robot, 5.0, False, True)
+    assert (shown["doing"], shown["heard_s"], shown["link"]) == ("Teleoperation", 1.0, "good")
+    assert (shown["commands_hz"], shown["level"], shown["ends_s"]) == (None, None, None)
+
+
+def test_a_device_that_left_the_list_is_shown_as_lost_for_a_while():
+    assert lines.device_row(told(heard=1.0), 30.0, False, False)["silent"] is True
+
+
+def test_an_event_is_shown_as_the_dva_tells_it():
+    latitude, longitude = HERE.to_latlon(1.0, 2.0)
+    status = m.EventStatus(
+        event_id=4,
+        kind="fire",
+        position=m.Position(latitude, longitude),
+        severity=0.8,
+        confidence=0.9,
+        event_state="on_scene",
+        age=20.0,
+        state_for=5.0,
+        decisions=1,
+        responder=ROBOT,
+    )
+    row = lines.event_row(status, 100.0, {ROBOT: "robot-1"}, None, HERE)
+    assert (row["state"], row["severity"], row["over"]) == ("on scene", "critical", False)
+    assert (row["x_m"], row["y_m"], row["room"]) == (1.0, 2.0, "")
+    assert (row["reported_ms"], row["since_ms"]) == (80_000, 95_000)
+    assert row["assigned"] == ["robot-1"]
+
+
+# --- how it is asked for -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dva", ["here", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:70000", ":5600"])
+def test_what_is_no_address_is_refused(dva):
+    with pytest.raises(ConfigError, match="should be HOST:PORT"):
+        AttachOptions(dva=dva).check()
+
+
+def test_without_a_key_each_console_has_an_id_of_its_own():
+    options = AttachOptions(dva="127.0.0.1:5600")
+    assert options.own_id(None) != options.own_id(None)
+
+
+def test_with_keys_it_is_the_control_room_whose_secret_is_here(tmp_path):
+    create_keys(tmp_path, [id_of("dva", 1), ROOM])
+    options = AttachOptions(dva="127.0.0.1:5600", keys=tmp_path)
+    assert options.own_id(KeyRing(tmp_path)) == ROOM
+
+
+def test_keys_without_one_of_a_control_room_are_not_enough(tmp_path):
+    create_keys(tmp_path, [id_of("dva", 1)])
+    options = AttachOptions(dva="127.0.0.1:5600", keys=tmp_path)
+    with pytest.raises(ConfigError, match="control-room-1"):
+        options.own_id(KeyRing(tmp_path))
+
+
+# --- the programs ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
+
+
+class Attached:
+    """A console at a DVA, and what it knows."""
+
+    def __init__(self, programs: Programs, dva: str, *words: str) -> None:
+        self.program = programs.start("console", "--no-open", "--port", "0", "--dva", dva, *words)
+        self.program.wait_to_say("Attached to:")
+        said = self.program.said
+        (self.address,) = re.findall(r"^Console: +(\S+)", said, re.MULTILINE)
+
+    def _ask(self, path: str, body: object = None) -> dict:
+        base, _, token = self.address.partition("?token=")
+        headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(base.rstrip("/") + path, data, headers)
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return json.load(answer)
+
+    def state(self) -> dict:
+        return self._ask("/api/state")
+
+    def story(self) -> list[str]:
+        return [f"{one['who']} {one['what']}" for one in self._ask("/api/story")["lines"]]
+
+    def act(self, action: str, **arguments: object) -> dict:
+        self.count = getattr(self, "count", 0) + 1
+        body = {"id": f"a-{self.count}", "action": action, "arguments": arguments}
+        return self._ask("/api/actions", body)
+
+
+def live(programs: Programs, dva: str, part: str, *words: str) -> Program:
+    more = ("--for", "1000", *words)
+    return programs.start("live", "hands-on", "--only", part, "--dva", dva, *more)
+
+
+def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
+    dva = f"127.0.0.1:{free_port()}"
+    first = live(programs, dva, "dva")
+    live(programs, dva, "world")
+    console = Attached(programs, dva, "hands-on")
+
+    def robots() -> list[tuple[str, str]]:
+        return sorted(
+            (one["label"], one.get("mode")) for one in console.state()["robots"] if "x_m" in one
+        )
+
+    assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
+    people = {one["label"]: one.get("doing") for one in console.state()["people"]}
+    assert people.keys() == {"guard-1", "guard-2"}
+    assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
+    refused = console.act("take", robots=["robot-1"])
+    assert not refused["ok"]
+    assert "runs elsewhere" in refused["text"]
+    assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
+
+    fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")
+    assert console.act("event_proposal", event=fire)["ok"]
+    noted = console.act("event_note", event=fire, text="seen from outside")
+    assert noted["text"] == "control room has the role look; to note needs dispatch"
+
+    first.process.send_signal(signal.SIGKILL)
+    assert becomes(lambda: any("dva does not answer" in line for line in console.story()))
+    assert robots()  # what was told last stays
+    live(programs, dva, "dva")
+    assert becomes(lambda: console.story().count("dva answers") == 2)
+    assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
+
+
+def test_a_fake_device_is_added_to_a_dva_elsewhere_and_taken_away(programs: Programs):
+    dva = f"127.0.0.1:{free_port()}"
+    live(programs, dva, "dva")
+    console = Attached(programs, dva)
+
+    assert becomes(lambda: console.act("fake_add", label="ghost", type="Robot")["ok"])
+    assert becomes(lambda: [one["label"] for one in console.state()["robots"]] == ["ghost"])
+    assert console.act("fake_remove", device=id_of("fake", 1))["ok"]
+
+
+def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(
+    programs: Programs, tmp_path: Path
+):
+    dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
+    create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])
+    role = "dva.control_rooms={control-room-1: dispatch}"
+    live(programs, dva, "dva", "--keys", str(keys), "--set", role)
+    live(programs, dva, "world", "--keys", str(keys))
+    console = Attached(programs, dva, "--keys", str(keys))
+
+    assert becomes(lambda: len([r for r in console.state()["robots"] if "x_m" in r]) == 2)
+    assert becomes(lambda: console.act("room_join", name="")["text"].endswith("may dispatch"))
+    assert becomes(lambda: console.state()["events"] != [])
+    number = console.state()["events"][0]["number"]
+    assert console.act("event_note", event=number, text="seen from elsewhere")["ok"]
+    assert "pretend" in console.act("fake_add", label="ghost", type="Robot")["text"]
+    assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
+    assert console.act("event_acknowledge", event=1)["ok"]
+    done = console.act("event_assign", event=1, device="guard-1", reason="is near")
+    assert done["text"] == "guard-1 is sent to event 1"
+    assert becomes(lambda: "guard-1" in console.state()["events"][0]["assigned"])
+    refused = console.act("dispatch_mode", mode="ask_first")
+    assert "to set dispatch needs supervise" in refused["text"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told_"),
+    [
+        (("--dva", "nowhere"), "should be HOST:PORT"),
+        (("--dva", "127.0.0.1:5600", "--links", "real"), "--links is not for --dva"),
+        (("--dva", "127.0.0.1:5600", "--keys", "none"), "there is no such folder"),
+        (("--keys", "keys"), "--keys is for --dva"),
+    ],
+)
+def test_what_cannot_be_is_told_in_a_line(programs: Programs, words, told_):
+    program = programs.start("console", "--no-open", "--port", "0", *words)
+    assert becomes(lambda: program.process.poll() is not None)
+    assert program.process.returncode == 2
+    (line,) = program.complained
+    assert told_ in line

@@ -1,0 +1,353 @@
+"""People at a console's control rooms: what they decide goes by messages, and the DVA judges it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from phone_page import PhonePage
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.core.events import State
+from dva_sim.protocol.mistakes import check_message
+from dva_sim.recordings.audit_log import AuditRow, read_rows, verify
+
+FIRE = [{"kind": "fire", "room": "North office", "at_s": 2, "latest_s": 2, "reported": True}]
+
+
+def page(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> PhonePage:
+    """A fire in North office after 2 s, two robots, two guards; the policy asks first."""
+    usual = {"bystander__count": 0, "events": FIRE, "dispatch__mode": "ask_first"}
+    return PhonePage(monkeypatch, client="a1", **usual | changes)
+
+
+@pytest.fixture
+def room(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
+    """One person who supervises, and a fire that waits."""
+    one = page(monkeypatch)
+    assert one.do("room_join", name="ana", role="supervise") == (
+        True,
+        "you are ana, and may supervise",
+    )
+    fire(one)
+    return one
+
+
+def fire(one: PhonePage) -> None:
+    """Wait until it is reported and told."""
+    while not events(one):
+        one.let(0.5)
+    one.let(0.3)
+
+
+def events(one: PhonePage) -> list[dict[str, Any]]:
+    """What a page is told of events."""
+    told = one.told("events")
+    return list(told[-1]["events"]) if told else []
+
+
+def event(one: PhonePage, number: int = 1) -> dict[str, Any]:
+    one.let(0.3)
+    return next(row for row in events(one) if row["number"] == number)
+
+
+def alarms(one: PhonePage) -> list[dict[str, Any]]:
+    one.let(1.0)
+    return list(one.told("alarms")[-1]["alarms"])
+
+
+def sent_by(one: PhonePage, label: str) -> list[bytes]:
+    """The messages that a device has sent, in their order."""
+    ids = [i for i, name in one.world.run.stage.labels.items() if name == label]
+    return [data for source, _, data in one.heard if source in ids and isinstance(data, bytes)]
+
+
+def test_an_event_is_acknowledged_once_and_the_second_is_told_by_whom(room: PhonePage) -> None:
+    assert room.do("event_acknowledge", event=1)[0]
+    assert event(room)["acknowledged"]["label"] == "ana"
+
+    assert room.do("room_join", client="b1", name="ben", role="dispatch")[0]
+    done, text = room.do("event_acknowledge", client="b1", event=1)
+    assert not done
+    assert "acknowledged by ana" in text
+
+
+def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room: PhonePage) -> None:
+    done, _ = room.do("event_proposal", event=1)
+    assert done
+    proposal = room.told("done")[-1]["proposal"]
+    assert proposal["label"]
+    assert {who["label"] for who in proposal["candidates"]} >= {"guard-1", "guard-2", "robot-1"}
+    other = next(
+        who["label"]
+        for who in proposal["candidates"]
+        if who["can"] and not who["robot"] and who["label"] != proposal["label"]
+    )
+    done, text = room.do("event_assign", event=1, device=other, reason="knows the place")
+    assert done, text
+    assert event(room)["assigned"] == [other]
+    assert event(room)["decided"]["reason"] == "knows the place"
+
+
+def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(
+    room: PhonePage,
+) -> None:
+    about = {"kind": "flood", "severity": "low", "x_m": 8.0, "y_m": 12.0}
+    assert room.do("event_raise", **about)[0]
+    number = room.told("done")[-1]["event"]
+    assert room.do("event_assign", event=1, device="guard-1")[0]
+    room.do("event_proposal", event=number)
+    who = {one["label"]: one for one in room.told("done")[-1]["proposal"]["candidates"]}
+    assert (who["guard-1"]["free"], who["guard-2"]["free"]) == (False, True)
+
+    done, text = room.do("event_assign", event=number, device="guard-1")
+    assert not done
+    assert "take it off there first" in text
+
+
+def test_of_two_who_decide_with_the_same_knowledge_the_second_changes_nothing(
+    room: PhonePage,
+) -> None:
+    assert room.do("room_join", client="b1", name="ben", role="dispatch")[0]
+    seen = event(room)["decisions"]
+    assert room.do("event_assign", event=1, device="guard-1", decisions=seen)[0]
+    done, text = room.do("event_assign", client="b1", event=1, device="guard-2", decisions=seen)
+
+    assert not done
+    assert "decided on since: " in text
+    assert "ana" in text
+    assert event(room)["assigned"] == ["guard-1"]
+
+
+@pytest.mark.parametrize(
+    ("what", "about", "state"),
+    [
+        ("event_false_alarm", {"reason": "burnt toast"}, State.REFUTED),
+        ("event_escalate", {"reason": "too large for us"}, State.ESCALATED),
+    ],
+)
+def test_an_event_is_ended_by_a_decision(
+    room: PhonePage, what: str, about: dict[str, str], state: State
+) -> None:
+    done, text = room.do(what, event=1, **about)
+
+    assert done, text
+    assert event(room)["state"] == str(state)
+
+
+def test_who_was_sent_is_taken_off_and_a_note_is_for_all(room: PhonePage) -> None:
+    assert room.do("event_assign", event=1, device="guard-1")[0]
+    assert room.do("event_take_off", event=1, device="guard-1", reason="needed here")[0]
+    assert event(room)["assigned"] == []
+    assert room.do("event_note", event=1, text="the door is locked")[0]
+    assert event(room)["note"] == "the door is locked"
+
+
+def test_an_event_is_raised_at_a_place_and_nowhere_else(room: PhonePage) -> None:
+    about = {"kind": "flood", "severity": "critical", "x_m": 20.0, "y_m": 12.0}
+    assert room.do("event_raise", **about)[0]
+    number = room.told("done")[-1]["event"]
+    assert event(room, number)["kind"] == "flood"
+    assert event(room, number)["severity"] == "critical"
+    done, text = room.do("event_raise", **about | {"x_m": 1e5})
+    assert not done
+    assert "on the site" in text
+
+
+@pytest.mark.parametrize("role", ["look", "drive"])
+def test_the_dva_refuses_what_a_role_does_not_allow_though_the_web_let_it_pass(
+    monkeypatch: pytest.MonkeyPatch, role: str
+) -> None:
+    one = page(monkeypatch)
+    fire(one)
+    assert one.do("room_join", name="eve", role=role)[0]
+    for what, about in {
+        "event_acknowledge": {"event": 1},
+        "event_assign": {"event": 1, "device": "guard-1"},
+        "dispatch_mode": {"mode": "automatic"},
+        "take_over": {"robot": "robot-1", "reason": "mine"},
+    }.items():
+        done, text = one.do(what, **about)
+        assert not done, what
+        assert f"eve has the role {role}" in text
+
+
+def test_a_dispatcher_does_not_take_a_robot_from_its_holder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one = page(monkeypatch)
+    assert one.do("room_join", name="dan", role="dispatch")[0]
+    done, text = one.do("take_over", robot="robot-1", reason="mine")
+
+    assert not done
+    assert "needs supervise" in text
+
+
+def test_the_policy_acts_by_itself_once_it_is_let(room: PhonePage) -> None:
+    assert event(room)["assigned"] == []
+    assert room.told("control")[-1]["dispatch"]["mode"] == "ask_first"
+    assert room.do("dispatch_mode", mode="automatic")[0]
+
+    room.let(1.0)
+    assert event(room)["assigned"]
+    told = room.told("control")[-1]["dispatch"]
+    assert (told["mode"], told["switched"]["label"]) == ("automatic", "ana")
+
+
+def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(
+    room: PhonePage,
+) -> None:
+    assert room.do("take", client="b1", robots=["robot-1"], role="drive")[0]
+    assert room.do("start", client="b1", within=60)[0]
+    done, text = room.do("take_over", robot="robot-1", reason="ben is away", role="supervise")
+
+    assert done, text
+    assert room.robot(0).holder[0] == room.world.person(1).device.id_tag
+    assert room.robot(0).controller.mode is not Mode.TELEOPERATION
+    assert room.seat()["drives"][0]["phase"] == "held"
+
+
+@pytest.mark.parametrize("wait", [0.0, 8.0], ids=["before it is held", "while it is driven"])
+def test_a_robot_is_taken_over_from_an_operator_with_the_event_it_was_sent_to(
+    monkeypatch: pytest.MonkeyPatch, wait: float
+) -> None:
+    one = page(monkeypatch, operator__count=2)
+    assert one.do("room_join", name="ana", role="supervise")[0]
+    fire(one)
+    assert one.do("event_assign", event=1, device="robot-1")[0]
+    one.let(wait)
+    assert event(one)["assigned"] == ["robot-1", "operator-1"]
+    done, text = one.do("take_over", robot="robot-1", reason="I know the place", role="supervise")
+
+    assert done, text
+    assert event(one)["assigned"] == ["robot-1", "console-1"]
+    assert event(one)["decided"]["reason"] == "I know the place"
+    assert one.seat()["order"]["event"] == 1
+    assert one.seat()["drives"][0]["phase"] == "held"
+
+
+def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room: PhonePage) -> None:
+    done, text = room.do("mission", robot="robot-1", event=1)
+    assert done, text
+    assert room.robot(0).controller.mode is Mode.MISSION
+
+    end = room.world.clock.now + 400.0
+    while room.robot(0).controller.grant is not None and room.world.clock.now < end:
+        room.let(5.0)
+    assert room.robot(0).controller.grant is None
+
+
+def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room: PhonePage) -> None:
+    (alarm,) = [one for one in alarms(room) if one["event"] == 1]
+    assert alarm["state"] == "unacknowledged"
+    assert alarm["text"] == "Fire, North office"
+    assert room.do("alarm_acknowledge", alarm=alarm["key"])[0]
+
+    (alarm,) = [one for one in alarms(room) if one["event"] == 1]
+    assert (alarm["state"], alarm["seen_by"]) == ("acknowledged", "ana")
+    assert event(room)["acknowledged"]["label"] == "ana"
+
+
+def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room: PhonePage) -> None:
+    (alarm,) = [one for one in alarms(room) if one["event"] == 1]
+    assert room.do("alarm_shelve", alarm=alarm["key"], for_s=60)[0]
+    assert not [one for one in alarms(room) if one["event"] == 1]
+    assert room.told("alarms")[-1]["shelved"][0]["shelved_by"] == "ana"
+    room.let(60.0)
+    assert [one for one in alarms(room) if one["event"] == 1]
+    done, text = room.do("alarm_acknowledge", alarm="event 99")
+    assert (done, text) == (False, "that alarm is none any more")
+
+
+def test_a_page_that_is_gone_for_good_has_no_room_any_more(room: PhonePage) -> None:
+    room.actions.take({"id": "bye-release-a1", "client": "a1", "do": "release"})
+    room.let(1.0)
+
+    assert room.told("control")[-1]["rooms"] == []
+
+
+def test_every_message_of_a_control_room_keeps_the_schema(room: PhonePage) -> None:
+    room.do("event_acknowledge", event=1)
+    room.do("event_assign", event=1, device="guard-1", reason='<b>why & "how"</b>')
+    room.do("event_note", event=1, text="<script>alert(1)</script>")
+    said = sent_by(room, "ana")
+
+    assert len(said) > 5
+    assert [found for data in said for found in check_message(data)] == []
+
+
+# --- the audit log ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def logged(room: PhonePage, tmp_path: Path) -> Iterator[PhonePage]:
+    """The same, with an audit log."""
+    keeper = AuditKeeper(tmp_path / "audit.sqlite", lambda: room.world.clock.now, {})
+    room.world.keep_audit(keeper)
+    room.world.clock.every(0.05, keeper.take)
+    yield room
+    keeper.close()
+
+
+def written(one: PhonePage) -> list[AuditRow]:
+    assert one.world.audited is not None
+    keeper = one.world.audited.keeper
+    keeper.close()
+    one.world.audited = None
+    return read_rows(keeper.path)
+
+
+def test_each_action_is_a_row_with_author_role_cause_and_outcome(logged: PhonePage) -> None:
+    logged.do("event_acknowledge", event=1, role="supervise")
+    logged.do("event_assign", event=1, device="guard-1", reason="is near", role="supervise")
+    logged.do("take", robots=["robot-1"], role="supervise")
+    logged.do("event_assign", event=77, device="guard-1", role="supervise")
+    rows = {(row.action, row.outcome): row for row in written(logged)}
+
+    assert rows["acknowledge", "done"].author == "ana"
+    sent = rows["assign", "done"]
+    assert (sent.role, sent.subject, sent.cause, sent.event) == (
+        *("supervise", "guard-1", "is near", 1),
+    )
+    assert sent.details["advised"]
+    assert sent.details["waited_s"] > 0
+    assert (rows["take", "done"].subject, rows["take", "done"].author) == ("robot-1", "ana")
+    assert rows["assign", "refused"].text == "no event 77"
+
+
+def test_nothing_new_is_done_while_the_log_cannot_be_written_but_whatever_stops_is(
+    logged: PhonePage,
+) -> None:
+    assert logged.world.audited is not None
+    keeper = logged.world.audited.keeper
+    assert logged.do("take", robots=["robot-1"], role="drive")[0]
+    keeper._log._file.execute("PRAGMA max_page_count = 1")
+    keeper.put(keeper.entry("note", text="x" * 100_000))
+    while not keeper.problem:
+        keeper.take()
+    done, text = logged.do("event_assign", event=1, device="guard-1", role="supervise")
+    assert not done
+    assert "the audit log cannot be written" in text
+    assert event(logged)["assigned"] == []
+    assert logged.do("stop")[0]
+    assert logged.do("emergency", robots="all")[0]
+
+    keeper._log._file.execute("PRAGMA max_page_count = 100000")
+    keeper.put(keeper.entry("note"))
+    while keeper.problem:
+        keeper.take()
+    assert logged.do("event_assign", event=1, device="guard-1", role="supervise")[0]
+    found = [row.action for row in written(logged)]
+    assert found.index("emergency") < found.index("assign")
+
+
+def test_the_log_of_a_run_holds(logged: PhonePage) -> None:
+    logged.do("event_acknowledge", event=1)
+    path = logged.world.audited.keeper.path if logged.world.audited else Path()
+    written(logged)
+
+    assert verify(path).problem is None
+    assert verify(path).is_ended

@@ -1,0 +1,300 @@
+"""A recording in the console: any moment of it, told as a world that runs tells it."""
+
+import math
+import shutil
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from recordings.runs import drill, evacuation
+
+from dva_sim.console.replay.exchanges import ExchangeLog
+from dva_sim.console.replay.moments import event_at
+from dva_sim.console.replay.player import NOBODY, Player
+from dva_sim.console.replay.recorded_run import RecordedRun
+from dva_sim.console.replay.shelf import Shelf
+from dva_sim.core.events import Event, State
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.messages import Position
+from dva_sim.recordings import write_recording
+from dva_sim.recordings.reading import read_recording
+from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.full.stage import DVA
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replay")
+    for run in (drill, evacuation):
+        write_recording(run(), folder / f"{run.__name__}.mcap", tables=tables_of(run()))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def recorded(files):
+    return RecordedRun(read_recording(files / "drill.mcap"), "drill.mcap")
+
+
+class Told:
+    """A player, and the newest line of each kind that it tells."""
+
+    def __init__(self, run, shelf=None):
+        self.lines, self.shown, self.answers, self.logs = {}, [], [], []
+        self.player = Player(run, shelf)
+        self.player.tell, self.player.show = self._take, self._show
+
+    def _take(self, line, key=None):
+        self.lines[line["k"]] = line
+        if line["k"] == "log":
+            self.logs.append(line)
+        if line["k"] == "done":
+            self.answers.append(line)
+
+    def _show(self, line, key=None):
+        self.shown.append(line)
+
+    def ask(self, what, number="a", **more):
+        self.player.take({"do": what, "id": number, "client": "c", **more})
+        return self.answers[-1]
+
+
+@pytest.fixture
+def playing():
+    """Makes players, which leave nothing behind."""
+    made = []
+
+    def play(*what):
+        made.append(Told(*what))
+        made[-1].player.begin()
+        return made[-1]
+
+    yield play
+    for told in made:
+        told.player.close()
+
+
+def test_events_come_back_as_the_dva_knew_them(files):
+    known, kept = drill().events, read_recording(files / "drill.mcap").playback.events
+    assert known
+    assert [(e.number, e.kind, e.state, e.times) for e in kept] == [
+        (e.number, e.kind, e.state, e.times) for e in known
+    ]
+    assert [(e.responder, e.operator, e.actor) for e in kept] == [
+        (e.responder, e.operator, e.actor) for e in known
+    ]
+
+
+@pytest.mark.parametrize(
+    ("now", "state"),
+    [
+        (9.9, None),
+        (10.0, State.PENDING),
+        (12.0, State.ASSIGNED),
+        (20.0, State.ON_SCENE),
+        (25.0, State.CONFIRMED),
+        (40.0, State.CONTAINED),
+    ],
+)
+def test_an_event_stood_as_its_times_say(now, state):
+    times = {"detected": 10.0, "assigned": 12.0, "departed": 13.0, "arrived": 20.0}
+    times |= {"confirmed": 25.0, "act_assigned": 25.0, "contained": 40.0, "closed": 40.0}
+    event = Event(1, "fire", Position(0.0, 0.0), 0.5, state=State.CONTAINED, times=times)
+    then = event_at(event, now)
+    assert (then.state if then else None) == state
+    if then is not None:
+        assert then.open == (state is not State.CONTAINED)
+
+
+def test_everybody_is_where_the_run_had_them(recorded):
+    for label, track in drill().recorder.tracks.items():
+        for point in track[:: max(1, len(track) // 7)]:
+            here = {name: at for name, at, _ in recorded.tracks.places(point.time)}
+            assert here[label].x == pytest.approx(point.x, abs=1e-3)
+            assert here[label].y == pytest.approx(point.y, abs=1e-3)
+            assert here[label].mode == point.mode
+
+
+def test_between_two_points_of_a_track_somebody_glides(recorded):
+    who, one, two = next(
+        (name, a, b)
+        for name, track in drill().recorder.tracks.items()
+        for a, b in pairwise(track)
+        if a.x != b.x
+    )
+    middle = (one.time + two.time) / 2
+    at, speed = next((at, v) for name, at, v in recorded.tracks.places(middle) if name == who)
+    assert at.x == pytest.approx((one.x + two.x) / 2, abs=1e-3)
+    way = math.dist((one.x, one.y), (two.x, two.y))
+    assert speed == pytest.approx(way / (two.time - one.time), abs=1e-2)
+
+
+def test_who_has_left_the_site_is_not_there_any_more(files):
+    run = RecordedRun(read_recording(files / "evacuation.mcap"), "evacuation")
+    there = [len(list(run.tracks.places(when))) for when in (1.0, run.duration - 5.0)]
+    assert there[1] < there[0]
+
+
+def test_a_robot_that_is_driven_shows_who_drives_and_how(recorded):
+    drive = next(d for d in drill().recorder.drives if d.started is not None and d.commands)
+    when, speed, turn_rate = drive.commands[len(drive.commands) // 2]
+    row = next(r for r in recorded.robots(when + 0.01) if r["holder"] == drive.operator)
+    assert row["mode"] == "Teleoperation"
+    assert row["set_speed_mps"] == pytest.approx(speed, abs=1e-3)
+    assert row["set_turn_rate_radps"] == pytest.approx(turn_rate, abs=1e-3)
+    assert row["battery"] is None, "a recording does not hold it"
+
+
+def test_a_driver_sees_the_picture_that_had_come_by_then(recorded):
+    drive = next(d for d in drill().recorder.drives if len(d.frames) > 2)
+    shown = drive.frames[2]
+    frame = recorded.frame(drive.robot, shown.time + 0.001)
+    assert frame["captured_ms"] == round(1000 * shown.captured)
+    assert frame["t"] > frame["captured_ms"]
+    before = recorded.frame(drive.robot, drive.frames[0].time - 0.001)
+    assert before is None or before["captured_ms"] < frame["captured_ms"]
+
+
+def test_a_jump_back_tells_the_moment_it_leads_to(recorded, playing):
+    told = playing(recorded)
+    assert told.ask("seek", "1", t_ms=80_000)["ok"]
+    late = told.lines["told"]["lines"]
+    assert told.lines["rows"]["t"] == 80_000
+    assert told.ask("seek", "2", t_ms=20_000)["ok"]
+    early = told.lines["told"]["lines"]
+    assert told.lines["rows"]["t"] == 20_000
+    assert len(early) < len(late)
+    assert all(line["t"] <= 20_000 for line in early)
+    assert told.lines["rows"]["clock"]["jumps"] == 2
+
+
+def test_the_same_question_is_answered_once_and_done_once(recorded, playing):
+    told = playing(recorded)
+    told.ask("seek", "1", t_ms=50_000)
+    told.ask("seek", "2", t_ms=10_000)
+    told.ask("seek", "1", t_ms=50_000)
+    assert round(told.player.now) == 10
+
+
+def test_what_would_tell_somebody_something_is_refused(recorded, playing):
+    told = playing(recorded)
+    for what in ("take", "start", "emergency", "link", "phone_register", "guard_join"):
+        answer = told.ask(what, what)
+        assert (answer["ok"], answer["text"]) == (False, NOBODY)
+
+
+@pytest.mark.parametrize("factor", [0.01, 25.0])
+def test_it_is_played_within_bounds(recorded, factor, playing):
+    told = playing(recorded)
+    assert not told.ask("pace", factor=factor)["ok"]
+
+
+def test_at_its_end_it_stands_and_play_begins_anew(recorded, playing):
+    told = playing(recorded)
+    told.ask("seek", "1", t_ms=10**9)
+    assert told.player.now == recorded.duration
+    assert told.lines["rows"]["clock"]["paused"]
+    told.ask("pace", "2", paused=False)
+    assert told.player.now < 1.0
+
+
+def test_pictures_are_drawn_of_the_site_in_the_file_which_is_gone_afterwards(recorded, playing):
+    told = playing(recorded)
+    (scene,) = [line for line in told.shown if line["k"] == "scene"]
+    site = Path(scene["scenario"]["site"]["name"])
+    assert site.exists()
+    told.player.close()
+    assert not site.exists()
+
+
+def test_frames_are_told_of_robots_that_somebody_looks_at_alone(recorded, playing):
+    told = playing(recorded)
+    told.shown.clear()
+    told.player._show_frames()
+    assert told.shown == []
+    told.player.take({"do": "watch", "robots": [0]})
+    told.player._show_frames()
+    assert [line["robot"] for line in told.shown] == [0]
+
+
+# --- recordings of a folder ---------------------------------------------------------------
+
+
+def test_recordings_without_a_study_are_listed_by_name(files):
+    line = Shelf(files).line()
+    assert [one["name"] for one in line["recordings"]] == ["drill.mcap", "evacuation.mcap"]
+    assert line["measures"] == []
+
+
+def test_a_folder_without_recordings_is_told(tmp_path):
+    with pytest.raises(ConfigError, match="holds no recordings"):
+        Shelf(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["../drill.mcap", "other.mcap", "", "drill.mcap/"])
+def test_only_what_is_on_the_list_is_opened(files, name, playing):
+    told = playing(None, Shelf(files))
+    answer = told.ask("open_recording", name=name)
+    assert not answer["ok"]
+    assert "there is no recording" in answer["text"]
+
+
+def test_one_of_the_list_is_played_from_its_beginning(files, playing):
+    told = playing(None, Shelf(files))
+    assert told.lines["scene"]["replay"] is None
+    assert told.ask("open_recording", name="drill.mcap")["ok"]
+    assert told.lines["scene"]["replay"]["name"] == "drill.mcap"
+    assert told.lines["rows"]["t"] < 1000
+
+
+def test_a_recording_that_is_damaged_is_told_and_the_one_before_goes_on(files, tmp_path, playing):
+    shutil.copy(files / "drill.mcap", tmp_path / "good.mcap")
+    (tmp_path / "bad.mcap").write_bytes(b"no recording at all")
+    told = playing(None, Shelf(tmp_path))
+    assert told.ask("open_recording", "1", name="good.mcap")["ok"]
+    answer = told.ask("open_recording", "2", name="bad.mcap")
+    assert not answer["ok"]
+    assert "is not a recording" in answer["text"]
+    assert told.player.run.name == "good.mcap"
+
+
+# --- logs and windows ----------------------------------------------------------------------
+
+
+def test_a_log_is_told_up_to_the_moment_and_anew_after_a_jump(recorded, playing):
+    told = playing(recorded)
+    told.ask("seek", "1", t_ms=80_000)
+    told.logs.clear()
+    told.player.take({"do": "look", "logs": {"dva": False}})
+    late = [row for line in told.logs for row in line["lines"]]
+    assert told.logs[0]["anew"]
+    assert late[-1][1] <= 80_000
+    assert [row[0] for row in late] == list(range(1, len(late) + 1))
+
+    told.logs.clear()
+    told.ask("seek", "2", t_ms=10_000)
+    told.player._tell_logs()
+    early = [row for line in told.logs for row in line["lines"]]
+    assert told.logs[0]["anew"]
+    assert early == late[: len(early)]
+    assert 0 < len(early) < len(late)
+
+
+def test_each_request_has_the_reply_that_answers_it(recorded):
+    log = ExchangeLog(drill().recorder.traffic, DVA)
+    rows = [row for line in log.batches("dva", 0, log.until(1e9)) for row in line["lines"]]
+    answered = [row for row in rows if row[3] is not None]
+    assert answered
+    for row in answered:
+        request, reply = decode(row[2].encode("latin-1")), decode(row[3].encode("latin-1"))
+        assert reply.body.answers == request.message_id
+        assert reply.destination == request.source
+    assert {row[5] for row in rows if "<HBMsg>" in row[2]} == {1}
+
+
+def test_a_window_tells_how_long_commands_were_under_way(recorded):
+    drive = next(d for d in drill().recorder.drives if d.applied)
+    one = drive.applied[len(drive.applied) // 2]
+    line = recorded.window(drive.robot, one.time)
+    assert line["one_way"]["last_ms"] == pytest.approx(1000 * (one.arrived - one.sent), abs=0.1)
+    assert recorded.window(drive.robot, drive.applied[0].time - 0.01)["one_way"] is None

@@ -1,0 +1,249 @@
+"""A robot of a run in somebody's hand: it moves, is stopped, and the audit believes nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from dva_sim.agents.robot.controller import STAND, Decision, RobotController, TimedSetPoint
+from dva_sim.agents.robot.faults import RobotFaults
+from dva_sim.agents.robot.manual_control import ManualControl
+from dva_sim.protocol import messages as m
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import id_of
+
+ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 9)
+HAND = "hand"
+
+
+class InHand:
+    """A run in which nothing else happens, with a hand on its robot."""
+
+    def __init__(self) -> None:
+        quiet = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
+        self.run = Run(scenarios.build(scenarios.load("drive-to-event"), quiet), 1)
+        self.robot = self.run.field.robots[ROBOT]
+        self.hand = ManualControl(self.robot)
+        self.let(5.0)
+
+    def let(self, seconds: float) -> None:
+        self.run.clock.run(self.run.clock.now + seconds)
+
+    def drive(self, seconds: float, speed: float = 0.3) -> list[int]:
+        codes = []
+        for _ in range(round(10 * seconds)):
+            codes.append(self.hand.drive(HAND, speed, 0.0).code)
+            self.let(0.1)
+        return codes
+
+    def asks(self, body: m.Body, session: int = 0) -> None:
+        """Somebody sends the robot a request, and it is answered."""
+        device = self.run.stage.device("operator", 9)
+        device.ask(ROBOT, body, session=session)
+        self.let(1.0)
+
+    def is_held(self) -> None:
+        """The DVA gives the robot to an operator."""
+        grant = m.PermissionGrant(OPERATOR, "both", 1 << 33)
+        self.run.dva.device.ask(ROBOT, grant)
+        self.let(1.0)
+
+    @property
+    def broken(self) -> set[str]:
+        return set(self.run.recorder.violations)
+
+
+@pytest.fixture
+def bench() -> InHand:
+    return InHand()
+
+
+def test_a_hand_drives_a_robot_and_breaks_no_rule(bench: InHand) -> None:
+    assert bench.hand.take(HAND).code == m.OK
+    assert set(bench.drive(3.0)) == {m.OK}
+    assert bench.robot.body.speed == pytest.approx(0.3, abs=0.02)
+    assert bench.hand.let_go(HAND).code == m.OK
+    bench.let(2.0)
+    assert bench.robot.body.speed == pytest.approx(0.0, abs=1e-3)
+    assert bench.broken == set()
+
+
+@pytest.mark.invariant("S1")
+def test_a_hand_that_falls_silent_is_stopped_by_the_watchdog(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(2.0)
+    bench.let(2.5)
+    assert bench.robot.body.speed > 0.2
+    bench.let(2.0)
+    assert bench.robot.body.speed == pytest.approx(0.0, abs=1e-3)
+    assert bench.broken == set()
+
+
+@pytest.mark.invariant("S4")
+def test_a_hand_gets_no_more_than_the_motors_limits(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(4.0, speed=9.0)
+    assert bench.robot.body.speed <= 0.5 * 1.02
+    assert bench.broken == set()
+
+
+def test_an_emergency_stops_a_hand_for_good(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(2.0)
+    bench.asks(m.Emergency())
+    bench.let(1.0)
+    assert set(bench.drive(2.0)) == {m.WRONG_MODE}
+    assert bench.robot.body.speed == pytest.approx(0.0, abs=1e-3)
+    assert bench.broken == set()
+
+
+def slack_watchdog(self: RobotController, who: str, speed: float, turn: float, now: float):
+    return Decision(m.OK, set_point=TimedSetPoint(speed, turn, now + 60.0))
+
+
+def takes_whatever(self: RobotController, who: str, now: float, moving: bool) -> Decision:
+    self.by_hand, self.last_valid = who, now
+    return Decision(m.OK, set_point=STAND)
+
+
+def obeys_any_hand(self: RobotController, who: str, speed: float, turn: float, now: float):
+    return Decision(m.OK, set_point=TimedSetPoint(speed, turn, now + self.limits.watchdog))
+
+
+def does_not_begin(self: RobotController, arrived: float, moving: bool) -> None:
+    """Whatever is asked for begins, whoever has the robot in hand."""
+
+
+def falls_silent(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(1.0)
+    bench.let(10.0)
+
+
+def takes_a_held_one(bench: InHand) -> None:
+    bench.is_held()
+    bench.hand.take(HAND)
+
+
+def drives_without_taking(bench: InHand) -> None:
+    bench.drive(1.0)
+
+
+def drives_after_an_emergency(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(1.0)
+    bench.asks(m.Emergency())
+    bench.drive(1.0)
+
+
+def takes_a_moving_one(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(2.0)
+    bench.hand.take("another")
+
+
+def is_driven_by_messages_too(bench: InHand) -> None:
+    bench.hand.take(HAND)
+    bench.drive(1.0)
+    bench.is_held()
+    bench.asks(m.StartTeleOp(), session=1 << 33)
+
+
+@pytest.mark.parametrize(
+    ("what", "fault", "happens", "rule"),
+    [
+        ("drive_by_hand", slack_watchdog, falls_silent, "S1"),
+        ("take_by_hand", takes_whatever, takes_a_held_one, "S2"),
+        ("take_by_hand", takes_whatever, takes_a_moving_one, "S2"),
+        ("_begin", does_not_begin, is_driven_by_messages_too, "S2"),
+        ("drive_by_hand", obeys_any_hand, drives_without_taking, "S1"),
+        ("drive_by_hand", obeys_any_hand, drives_after_an_emergency, "S3"),
+    ],
+)
+def test_a_planted_fault_is_found_by_its_rule_and_without_it_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+    what: str,
+    fault: Callable[..., object],
+    happens: Callable[[InHand], object],
+    rule: str,
+) -> None:
+    honest = InHand()
+    happens(honest)
+    honest.let(1.0)
+    assert honest.broken == set()
+
+    monkeypatch.setattr(RobotController, what, fault)
+    faulty = InHand()
+    happens(faulty)
+    faulty.let(1.0)
+    assert faulty.broken == {rule}
+
+
+def test_every_fault_is_told_acts_and_leaves_no_trace_when_it_is_undone(bench: InHand) -> None:
+    robot, frames = bench.robot, []
+    robot.filmed = lambda _, frame: frames.append(frame)
+    bench.run.network.subscribe(OPERATOR, ROBOT, "frame|", lambda _: None)
+    faults = RobotFaults(robot)
+    service = robot.inbox.service
+
+    faults.slow_down(2.5)
+    faults.drop_replies(True)
+    faults.lose_camera(True)
+    faults.stick("temperature", True)
+    assert faults.any
+    assert robot.inbox.service() == 2.5
+    frames.clear()
+    stuck = robot.sensors["temperature"].read(bench.run.clock.now)
+    bench.let(60.0)
+    assert robot.sensors["temperature"].read(bench.run.clock.now) == stuck
+    assert frames == []
+
+    faults.slow_down(None)
+    faults.drop_replies(False)
+    faults.lose_camera(False)
+    faults.stick("temperature", False)
+    bench.let(2.0)
+    assert not faults.any
+    assert robot.inbox.service is service
+    assert frames
+    story = [told.what for told in bench.run.recorder.timeline if told.who == "robot-1"]
+    assert [what for what in story if "fault" in what] == [
+        "fault: processing of a message takes 2.5 s",
+        "fault: its replies are dropped",
+        "fault: its camera is lost",
+        "fault: its temperature is stuck",
+        "fault: processing of a message takes as usual",
+    ]
+    assert bench.broken == set()
+
+
+def test_who_asks_a_robot_that_drops_its_replies_has_a_time_out(bench: InHand) -> None:
+    faults, lost = RobotFaults(bench.robot, lambda robot, reply: lost.append(reply)), []
+    device, answers = bench.run.stage.device("operator", 9), []
+    faults.drop_replies(True)
+    device.ask(ROBOT, m.GetSensorInfo(None), answers.append, lambda: answers.append(None))
+    bench.let(60.0)
+    assert answers == [None]
+    assert len(lost) == device.attempts
+    faults.drop_replies(False)
+    device.ask(ROBOT, m.GetSensorInfo(None), answers.append)
+    bench.let(5.0)
+    assert answers[1].code == m.OK
+
+
+def test_a_frozen_robot_runs_on_to_its_watchdog_and_wakes_up_idle(bench: InHand) -> None:
+    faults = RobotFaults(bench.robot)
+    bench.hand.take(HAND)
+    bench.drive(2.0)
+    faults.freeze(True)
+    assert set(bench.drive(1.0)) == {m.BUSY}
+    assert bench.robot.body.speed > 0.2
+    bench.let(4.0)
+    assert bench.robot.body.speed == pytest.approx(0.0, abs=1e-3)
+    faults.freeze(False)
+    bench.let(2.0)
+    assert set(bench.drive(1.0)) == {m.WRONG_MODE}
+    assert bench.hand.take(HAND).code == m.OK
+    assert bench.broken == set()
