@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from dva_sim.agents.people.person_guard import SEVERITIES
+from dva_sim.core.candidates import FREE
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -89,6 +90,7 @@ def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> Line:
         "label": who.label,
         "robot": is_robot(who.device),
         "can": who.arrival_in is not None,
+        "free": who.arrival_in is not None and who.reason == FREE,
         "reason": who.reason,
         "arrival_s": who.arrival_in,
     }

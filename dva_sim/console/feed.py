@@ -11,7 +11,8 @@ from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.stands import why_stands
-from dva_sim.core.events import FINAL, Event, State
+from dva_sim.core.event_status import state_since
+from dva_sim.core.events import FINAL, Event
 from dva_sim.kernel.recorder import Moment
 from dva_sim.live.parts import Rate
 from dva_sim.simulation.full.run import Run
@@ -198,22 +199,10 @@ def event_line(event: Event, site: Site, labels: Mapping[str, str]) -> Line:
         "severity_value": round(event.severity, 2),
         "state": str(event.state),
         "over": not event.open,
-        "since_ms": round(1000 * _since(event)),
+        "since_ms": round(1000 * state_since(event)),
         "reported_ms": round(1000 * event.times.get("detected", 0.0)),
         "assigned": [labels.get(name, name) for name in _sent(event)],
     }
-
-
-_BEGINS = {State.ASSIGNED: "assigned", State.ON_SCENE: "arrived", State.CONFIRMED: "confirmed"}
-
-
-def _since(event: Event) -> float:
-    """When an event came into its state [s]."""
-    times = event.times
-    detected = times.get("detected", 0.0)
-    if event.state is State.PENDING:
-        return max(detected, event.waiting_since)
-    return times.get(_BEGINS.get(event.state, "closed"), detected)
 
 
 def _sent(event: Event) -> Iterator[str]:

@@ -162,11 +162,23 @@ class ControlRoomDesk:
         """Whom the policy would send."""
         strange = "<img src=x onerror=alert(1)>" if self.hostile else "free"
         rows = [
-            {"label": who, "robot": who.startswith("robot"), "can": True, "reason": strange}
+            {
+                "label": who,
+                "robot": who.startswith("robot"),
+                "can": True,
+                "free": True,
+                "reason": strange,
+            }
             | {"arrival_s": when}
             for who, when in WHO.items()
         ]
-        busy = {"label": "guard-2", "robot": False, "can": False, "reason": "at event 1"}
+        busy = {
+            "label": "guard-2",
+            "robot": False,
+            "can": False,
+            "free": False,
+            "reason": "at event 1",
+        }
         about = {"event": asked["event"], "policy": "nearest", "reason": "is there first"}
         about |= {"task": "confirm", "label": "robot-2", "arrival_s": 41.0}
         rows.append(busy | {"arrival_s": None})

@@ -175,6 +175,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
 
     fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")
+    assert console.act("event_proposal", event=fire)["ok"]
     noted = console.act("event_note", event=fire, text="seen from outside")
     assert noted["text"] == "control room has the role look; to note needs dispatch"
 

@@ -92,6 +92,22 @@ def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room: Phon
     assert event(room)["decided"]["reason"] == "knows the place"
 
 
+def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(
+    room: PhonePage,
+) -> None:
+    about = {"kind": "flood", "severity": "low", "x_m": 8.0, "y_m": 12.0}
+    assert room.do("event_raise", **about)[0]
+    number = room.told("done")[-1]["event"]
+    assert room.do("event_assign", event=1, device="guard-1")[0]
+    room.do("event_proposal", event=number)
+    who = {one["label"]: one for one in room.told("done")[-1]["proposal"]["candidates"]}
+    assert (who["guard-1"]["free"], who["guard-2"]["free"]) == (False, True)
+
+    done, text = room.do("event_assign", event=number, device="guard-1")
+    assert not done
+    assert "take it off there first" in text
+
+
 def test_of_two_who_decide_with_the_same_knowledge_the_second_changes_nothing(
     room: PhonePage,
 ) -> None:

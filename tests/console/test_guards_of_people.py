@@ -205,6 +205,9 @@ def test_who_needs_help_is_seen_to(page):
     page.let(1.0)
     assert line(page)["doing"] == "needs help"
     assert any(b"needs help" in x[2] for x in page.heard if isinstance(x[2], bytes))
+    assert page.do("guard_say", what="help")[0]
+    page.let(1.0)
+    assert line(page)["doing"] == "waiting"
 
 
 def test_nothing_is_contained_from_afar(page):

@@ -9,8 +9,9 @@ import pytest
 from recordings.runs import drill, evacuation
 
 from dva_sim.console.replay.exchanges import ExchangeLog
+from dva_sim.console.replay.moments import event_at
 from dva_sim.console.replay.player import NOBODY, Player
-from dva_sim.console.replay.recorded_run import RecordedRun, event_at
+from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
@@ -108,7 +109,7 @@ def test_an_event_stood_as_its_times_say(now, state):
 def test_everybody_is_where_the_run_had_them(recorded):
     for label, track in drill().recorder.tracks.items():
         for point in track[:: max(1, len(track) // 7)]:
-            here = {name: at for name, at, _ in recorded.places(point.time)}
+            here = {name: at for name, at, _ in recorded.tracks.places(point.time)}
             assert here[label].x == pytest.approx(point.x, abs=1e-3)
             assert here[label].y == pytest.approx(point.y, abs=1e-3)
             assert here[label].mode == point.mode
@@ -122,7 +123,7 @@ def test_between_two_points_of_a_track_somebody_glides(recorded):
         if a.x != b.x
     )
     middle = (one.time + two.time) / 2
-    at, speed = next((at, v) for name, at, v in recorded.places(middle) if name == who)
+    at, speed = next((at, v) for name, at, v in recorded.tracks.places(middle) if name == who)
     assert at.x == pytest.approx((one.x + two.x) / 2, abs=1e-3)
     way = math.dist((one.x, one.y), (two.x, two.y))
     assert speed == pytest.approx(way / (two.time - one.time), abs=1e-2)
@@ -130,7 +131,7 @@ def test_between_two_points_of_a_track_somebody_glides(recorded):
 
 def test_who_has_left_the_site_is_not_there_any_more(files):
     run = RecordedRun(read_recording(files / "evacuation.mcap"), "evacuation")
-    there = [len(list(run.places(when))) for when in (1.0, run.duration - 5.0)]
+    there = [len(list(run.tracks.places(when))) for when in (1.0, run.duration - 5.0)]
     assert there[1] < there[0]
 
 

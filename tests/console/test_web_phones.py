@@ -6,6 +6,7 @@ import http.client
 import json
 import ssl
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
 
 import pytest
 from console_served import Answer, Served, serving
@@ -14,6 +15,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from dva_sim.console.qr_code import half_blocks, svg
+from dva_sim.console.web.certificate_files import certificates
+from dva_sim.console.web.certificates import Hosts
 
 REGISTER = {"server": "127.0.0.1", "port": 5600, "label": "my phone", "type": "Teleoperation"}
 
@@ -263,6 +266,17 @@ def test_a_folder_that_cannot_be_written_leaves_all_else_as_it_is(tmp_path):
         assert len(served.serving["told"]) == 1
         assert "no address for phones: no certificate can be kept in" in served.serving["told"][0]
         assert served.ask("/healthz").status == 200
+
+
+def test_an_expired_certificate_is_renewed_at_the_start_and_a_phone_gets_in(tmp_path):
+    hosts = Hosts.of(["127.0.0.1", "localhost"])
+    long_ago = datetime.now(UTC) - timedelta(days=500)
+    certificates(tmp_path, hosts, long_ago)
+    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(tmp_path))
+    with serving(*words) as served:
+        told = " ".join(served.serving["told"])
+        assert "the certificate for phones is made anew" in told
+        assert ask(served, "/phone", token=served.phone).status == 200  # verified
 
 
 def test_codes_are_dark_on_light_with_a_rim():

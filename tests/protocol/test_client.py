@@ -41,6 +41,28 @@ def live_until(clock, condition):
     clock.run(clock.now + PATIENCE_S)
 
 
+def programs_of_the_specification():
+    return re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
+
+
+def run(code, dva, clock, folder):
+    """What a program prints that is given the address of a DVA."""
+    program = folder / "client.py"
+    program.write_text(code)
+    client = subprocess.Popen(
+        [sys.executable, str(program), dva.device.address],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        live_until(clock, lambda: client.poll() is not None)
+    finally:
+        client.kill()
+        out, err = client.communicate()
+    return out, err
+
+
 def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
     quiet = {"events": [{"kind": "fire", "at_s": 500}]}
     scenario = scenarios.build(scenarios.load("drive-to-event"), quiet)
@@ -54,27 +76,44 @@ def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
     clock = network.clock
     live_until(clock, lambda: dva.beats[ROBOT] > 0)
 
-    code = re.search(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)[1]
+    code = programs_of_the_specification()[0]
     assert len(code.splitlines()) <= 30
-    program = tmp_path / "client.py"
-    program.write_text(code)
-    client = subprocess.Popen(
-        [sys.executable, str(program), dva.device.address],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        live_until(clock, lambda: client.poll() is not None)
-    finally:
-        client.kill()
-        out, err = client.communicate()
+    out, err = run(code, dva, clock, tmp_path)
     assert (out, err) == ("the last command was answered with code 0\n", "")
     assert robot.applied == 20
     assert robot.controller.without_tick == 20
     field.world.advance_to(clock.now)
     assert robot.body.distance > 0.3
     assert robot.controller.mode == "Idle"
+
+
+def test_the_control_room_of_the_specification_acknowledges_and_sends_as_proposed(
+    network, tmp_path
+):
+    client, control_room = programs_of_the_specification()[:2]
+    me = re.search(r'ME = "(.*?)"', control_room)[1]
+    changes = {
+        "events": [{"kind": "fire", "at_s": 0, "reported": True}],
+        "dispatch.mode": "ask_first",
+        "dva.control_rooms": {me: "dispatch"},
+    }
+    scenario = scenarios.build(scenarios.load("fire-drill"), changes)
+    stage = Stage(
+        scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
+    )
+    dva = add_dva(stage)
+    field = Field(stage)
+    field.populate()
+    field.schedule_incidents()
+    guards = [id_of("guard", 1), id_of("guard", 2)]
+    live_until(network.clock, lambda: all(dva.desk.registry.entries.get(g) for g in guards))
+    live_until(network.clock, lambda: dva.desk.registry.located("Guard"))
+    code = client.partition("dva, robot =")[0] + control_room
+    out, err = run(code, dva, network.clock, tmp_path)
+    assert (out, err) == ("code 0 and the event is assigned\n", "")
+    event = dva.desk.book.get(1)
+    assert event.handling.acknowledged.author == me
+    assert [f.overrides for f in dva.facts if f.action == "assign"] == [False]
 
 
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):

@@ -28,6 +28,7 @@ from dva_sim.recordings.audit_log import (
     read_rows,
     row_of,
     verify,
+    verify_plain,
 )
 
 
@@ -211,6 +212,24 @@ def test_a_process_that_is_killed_has_written_all_that_it_said_was_done(tmp_path
     found = verify(path)
     assert found.problem is None
     assert found.rows >= said
+
+
+def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log: Path) -> None:
+    plain = [plain_row(row) for row in read_rows(log)]
+    assert verify_plain(plain[2:]).problem is None
+    assert verify_plain(plain[2:]).head == plain[-1]["hash"]
+    assert verify_plain([]).problem is None
+
+    changed = [*plain[:3], plain[3] | {"author": "bob"}, plain[4]]
+    left_out = [*plain[:2], *plain[3:]]
+    for rows, number, words in (
+        (changed, 4, "was changed"),
+        (left_out, 3, "is missing"),
+        ([{"number": 1}], 1, "is not whole"),
+    ):
+        problem = verify_plain(rows).problem
+        assert problem is not None
+        assert (problem.number, words in problem.text) == (number, True)
 
 
 def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path: Path) -> None:

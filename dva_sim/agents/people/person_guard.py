@@ -141,10 +141,11 @@ class PersonGuard(OnFoot):
         """Say how it goes, one of `SAYINGS`."""
         order = self.order
         if what == "help":
-            self._needs_help = True
-            self.device.tell("needs help", "safety")
+            self._needs_help = not self._needs_help  # said once more, it is over
+            now = "need help" if self._needs_help else "need no help any more"
+            self.device.tell(now.replace("need", "needs", 1), "safety")
             self._publish_status()
-            said(True, "the DVA is told that you need help")
+            said(True, f"the DVA is told that you {now}")
         elif order is None:
             said(False, "there is no order in hand")
         elif what in FINDINGS:

@@ -7,34 +7,31 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import event_line
 from dva_sim.console.fields import HazardFeed
+from dva_sim.console.replay.moments import (
+    ROUNDED,
+    RecordedTracks,
+    captured_at,
+    commands_hz,
+    event_at,
+    set_point,
+)
 from dva_sim.console.replay.robot_lines import RobotLines, about
 from dva_sim.console.scene import scene_of
-from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.kernel.recorder import DriveLog, TrackPoint
+from dva_sim.kernel.recorder import DriveLog
 from dva_sim.recordings.reading import Opened, RecordedHazard
 from dva_sim.simulation.scenario import robot_profiles
 
 Line = dict[str, Any]
-GONE = 1.0  # whoever was not seen for so long has left the site [s]
 TURNING = 0.25  # over which a turn rate is measured [s]
-ROUNDED = 0.0005  # pages know moments to the millisecond [s]
 STORY_KEPT = 200  # lines of the story up to a moment
 MOST_MARKS = 400  # moments to jump to
 MARKED = ("event", "drive", "safety", "order")  # kinds of moments that are worth a jump
-_STEPS = (
-    ("detected", State.PENDING),
-    ("assigned", State.ASSIGNED),
-    ("arrived", State.ON_SCENE),
-    ("confirmed", State.CONFIRMED),
-)
 
 
 class RecordedRun:
@@ -49,6 +46,7 @@ class RecordedRun:
         things: Everybody, with the number that lines call them by.
         numbers: Those numbers, by id and by label.
         duration: How long it lasts [s].
+        tracks: Where everybody was.
     """
 
     def __init__(self, opened: Opened, name: str) -> None:
@@ -58,10 +56,7 @@ class RecordedRun:
         self.things: list[Line] = []
         self.numbers: dict[str, int] = {}
         self._number_all()
-        self._times = {
-            label: [point.time for point in track]
-            for label, track in playback.recorder.tracks.items()
-        }
+        self.tracks = RecordedTracks(playback.recorder.tracks, playback.duration)
         self._moments = [moment.time for moment in playback.recorder.timeline]
         self._drives: dict[str, list[DriveLog]] = {}
         for drive in playback.recorder.drives:
@@ -159,20 +154,6 @@ class RecordedRun:
 
     # --- a moment --------------------------------------------------------------------------
 
-    def places(self, now: float) -> Iterator[tuple[str, TrackPoint, float]]:
-        """Everybody who is on the site: label, where, and how fast [m/s]."""
-        for label, track in self.playback.recorder.tracks.items():
-            index = bisect_right(self._times[label], now)
-            if index == 0:
-                continue
-            before, after = track[index - 1], track[min(index, len(track) - 1)]
-            if after is before:
-                left = now - before.time > GONE and before.time < self.duration - GONE
-                if not left:
-                    yield label, before, 0.0
-                continue
-            yield label, *_between(before, after, now)
-
     def positions(self, now: float) -> Line:
         """Where everybody is."""
         rows = [
@@ -182,13 +163,13 @@ class RecordedRun:
                 round(1000 * math.remainder(at.heading, 2.0 * math.pi)),
                 round(1000 * speed),
             ]
-            for label, at, speed in self.places(now)
+            for label, at, speed in self.tracks.places(now)
         ]
         return {"k": "pos", "t": _ms(now), "p": rows}
 
     def robots(self, now: float) -> list[Line]:
         """A row for each robot."""
-        doing = {label: at.mode for label, at, _ in self.places(now)}
+        doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
         return [
             self._robot(id_tag, doing.get(self.playback.labels[id_tag], ""), now)
             for id_tag in self.playback.radii
@@ -196,7 +177,7 @@ class RecordedRun:
 
     def _robot(self, id_tag: str, mode: str, now: float) -> Line:
         drive = self._drive_of(id_tag, now)
-        speed, turn_rate = _set_point(drive, now) if mode == Mode.TELEOPERATION else (0.0, 0.0)
+        speed, turn_rate = set_point(drive, now) if mode == Mode.TELEOPERATION else (0.0, 0.0)
         holder = None if drive is None else drive.operator
         return {
             "i": self.numbers[id_tag],
@@ -212,7 +193,7 @@ class RecordedRun:
             "set_turn_rate_radps": round(turn_rate, 3),
             "queue": 0,
             "lost": 0,
-            "commands_hz": 0.0 if drive is None else _rate(drive, now),
+            "commands_hz": 0.0 if drive is None else commands_hz(drive, now),
             "refused": 0,
             "timeouts": 0,
         }
@@ -226,8 +207,8 @@ class RecordedRun:
                 *(id_tag, playback.labels),
             )
         label = self.playback.labels[id_tag]
-        here = {name: (at, speed) for name, at, speed in self.places(now)}
-        before = {name: at for name, at, _ in self.places(now - TURNING)}
+        here = {name: (at, speed) for name, at, speed in self.tracks.places(now)}
+        before = {name: at for name, at, _ in self.tracks.places(now - TURNING)}
         at, speed = here.get(label, (None, 0.0))
         turned = 0.0
         if at is not None and label in before:
@@ -248,7 +229,7 @@ class RecordedRun:
         radii = {self.playback.labels[robot] for robot in self.playback.radii}
         return [
             {"i": self.numbers[label], "doing": at.mode}
-            for label, at, _ in self.places(now)
+            for label, at, _ in self.tracks.places(now)
             if label not in radii
         ]
 
@@ -278,11 +259,11 @@ class RecordedRun:
         The picture is drawn from where everybody was when it was taken.
         """
         drive = self._drive_of(robot, now)
-        captured = now if drive is None else _shown(drive, now)
+        captured = now if drive is None else captured_at(drive, now)
         if captured is None:
             return None
         label = self.playback.labels[robot]
-        there = list(self.places(captured))
+        there = list(self.tracks.places(captured))
         own = next((at for name, at, _ in there if name == label), None)
         if own is None:
             return None
@@ -303,60 +284,6 @@ class RecordedRun:
             "pose": [round(own.x, 3), round(own.y, 3), round(own.heading, 4)],
             "figures": figures,
         }
-
-
-def event_at(event: Event, now: float) -> Event | None:
-    """An event as it stood at a moment; None if it was not known yet."""
-    times = {step: time for step, time in event.times.items() if time <= now + ROUNDED}
-    if "detected" not in times:
-        return None
-    if "closed" in times:
-        state = event.state
-    else:
-        state = [state for step, state in _STEPS if step in times][-1]
-    sent = state is not State.PENDING
-    return replace(
-        event,
-        state=state,
-        needs_containment="contained" in event.times or "act_assigned" in event.times,
-        responder=event.responder if sent else None,
-        operator=event.operator if sent else None,
-        actor=event.actor if "act_assigned" in times else None,
-        times=times,
-    )
-
-
-def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPoint, float]:
-    """Where somebody was between two points of a track, and how fast [m/s]."""
-    period = after.time - before.time
-    share = 0.0 if period <= 0.0 else (now - before.time) / period
-    x = before.x + share * (after.x - before.x)
-    y = before.y + share * (after.y - before.y)
-    turn = math.remainder(after.heading - before.heading, 2.0 * math.pi)
-    speed = math.dist((before.x, before.y), (after.x, after.y)) / period if period > 0.0 else 0.0
-    return TrackPoint(now, x, y, before.heading + share * turn, before.mode), speed
-
-
-def _set_point(drive: DriveLog | None, now: float) -> tuple[float, float]:
-    """The newest command of a drive: speed [m/s] and turn rate [rad/s], as its phone made it."""
-    commands: Sequence[tuple[float, float, float]] = () if drive is None else drive.commands
-    index = bisect_right(commands, now, key=lambda command: command[0])
-    return commands[index - 1][1:] if index else (0.0, 0.0)
-
-
-def _rate(drive: DriveLog, now: float) -> float:
-    """Commands in the last second [1/s]."""
-    first, last = (
-        bisect_right(drive.commands, when, key=lambda command: command[0])
-        for when in (now - 1.0, now)
-    )
-    return float(last - first)
-
-
-def _shown(drive: DriveLog, now: float) -> float | None:
-    """When the picture was taken that was on the operator's screen [s]; None before the first."""
-    index = bisect_right(drive.frames, now, key=lambda frame: frame.time)
-    return drive.frames[index - 1].captured if index else None
 
 
 def _ms(time: float) -> int:

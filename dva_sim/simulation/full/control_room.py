@@ -25,7 +25,7 @@ from dva_sim.core.dispatch import load_policy
 from dva_sim.core.dispatcher import Patrols
 from dva_sim.core.dva import Dva
 from dva_sim.core.permissions import Access, AccessRule
-from dva_sim.core.roles import ControlRoomRole, Roles
+from dva_sim.core.roles import Roles
 from dva_sim.core.sensing import Sensing, SensorAlarm
 from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.store import Store
@@ -35,7 +35,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.dva_server import DvaAgent
-from dva_sim.simulation.full.stage import DVA, Stage, id_of, label_of, middle_of
+from dva_sim.simulation.full.stage import DVA, Stage, control_rooms_of, middle_of
 from dva_sim.simulation.scenario import (
     Scenario,
     command_timeout_s,
@@ -94,7 +94,7 @@ def make_desk(stage: Stage, permissions: Permissions) -> Dva:
         patrols=_patrols(stage),
         sensing=Sensing({n: _ALARMS[n] for n in stage.scenario.dva.sensors}, rate_hz),
         supervisors=_supervisors(stage),
-        roles=_roles(stage),
+        roles=Roles(control_rooms_of(stage.scenario)),
         ask_first=dispatch.mode == "ask_first",
         policy_name=dispatch.policy.rpartition(":")[2],
     )
@@ -115,16 +115,6 @@ def _supervisors(stage: Stage) -> frozenset[str]:
     return frozenset(ids.get(name, name) for name in stage.scenario.dva.supervisors)
 
 
-def _roles(stage: Stage) -> Roles:
-    """What control rooms may do, by their ids, as the scenario says; and its own dispatcher."""
-    known = dict(stage.scenario.dva.control_rooms)
-    if stage.scenario.dispatch.person is not None:
-        known.setdefault(id_of("control-room", 1), stage.scenario.dispatch.person.role)
-    named = {label_of("control-room", n): id_of("control-room", n) for n in range(1, ROOMS + 1)}
-    return Roles({named.get(name, name): ControlRoomRole(role) for name, role in known.items()})
-
-
-ROOMS = 99  # control rooms that a scenario can name by a label
 MOVED_SINCE = 2.0  # since somebody last told where it is; assumed [m]
 
 

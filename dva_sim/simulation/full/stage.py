@@ -16,6 +16,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.operator.strategies import Reach
 from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, ROBOT
+from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
@@ -66,6 +67,19 @@ def team_of(scenario: Scenario) -> Iterator[str]:
     yield DVA
     for kind, count in counts.items():
         yield from (id_of(kind, number) for number in range(1, count + 1))
+    yield from control_rooms_of(scenario)
+
+
+def control_rooms_of(scenario: Scenario) -> dict[str, ControlRoomRole]:
+    """What control rooms may do, by id: those that a scenario names, and that of its dispatcher."""
+    stated = dict(scenario.dva.control_rooms)
+    if scenario.dispatch.person is not None:
+        stated.setdefault(label_of("control-room", 1), scenario.dispatch.person.role)
+    known = {}
+    for name, role in stated.items():
+        id_tag = name if ":" in name else id_of("control-room", int(name.rpartition("-")[2]))
+        known[id_tag] = ControlRoomRole(role)
+    return known
 
 
 def label_of(kind: str, number: int) -> str:

@@ -83,6 +83,11 @@ def test_a_phone_registers_drives_by_tilt_and_is_a_row(
     assert set(drives["pipeline"]) == {"default"}
     assert 20 < drives["sensor_hz"][-1] < 80
     assert sum(drives["commands_applied"]) > 5
+    token = phone.rpartition("token=")[2]
+    kept = [path for path in tmp_path.rglob("*") if path.is_file() and "data" not in path.parts]
+    printed = {path for path in kept if token.encode() in path.read_bytes()}
+    assert all(path.suffix == ".out" for path in printed), printed  # what the terminal showed
+    assert not any(b"BEGIN" in path.read_bytes() and b"KEY" in path.read_bytes() for path in kept)
     log = programs.start("phone-log", motion / "motion-1.csv")
     assert log.ends() == 0, log.complained
     assert "Jane" not in (motion / "motion-1.csv").read_text()

@@ -84,6 +84,8 @@ export const robots = computed(
 );
 /** Whether this page's address is one for driving, or for a phone. */
 export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
+/** Whether it is one of the console's own, and no phone's. */
+export const isOperator = computed(() => roleIsOneOf('drive', 'dispatch', 'supervise'));
 /** Whether it is one for sending people and robots to events. */
 export const mayDispatch = computed(() => roleIsOneOf('dispatch', 'supervise'));
 /** Whether it is one for taking robots from their holders. */

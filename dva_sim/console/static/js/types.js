@@ -75,7 +75,7 @@
  * @typedef {{label: string, role: string, client: string}} ControlRoom
  * @typedef {{dispatch: {mode: string, decide_within_s: number,
  *   switched: {label: string, at_ms: number} | null} | null, rooms: ControlRoom[]}} Control
- * @typedef {{label: string, robot: boolean, can: boolean, reason: string,
+ * @typedef {{label: string, robot: boolean, can: boolean, free: boolean, reason: string,
  *   arrival_s: number | null}} Candidate
  * @typedef {{event: number, policy: string, reason: string, task: string | null, label: string,
  *   arrival_s: number | null, decide_within_s: number | null, candidates: Candidate[]}} Proposal

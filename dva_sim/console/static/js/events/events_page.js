@@ -45,8 +45,8 @@ function keepJoining() {
 
 function Head() {
   if (!mayDispatch.value) {
-    return html`<p class="soft events-head">This address may look. Those for dispatch and for supervision are
-      printed where the console was started.</p>`;
+    return html`<p class="soft events-head">This address may ${you.value?.role ?? 'look'}. Those for dispatch and for
+      supervision are printed where the console was started.</p>`;
   }
   const me = control.value?.rooms?.find((room) => room.client === you.value?.client);
   const asked = control.value?.dispatch;

@@ -15,13 +15,13 @@ const SOON_MS = 500; // where it could not be asked, as while the page connects
 const known = signal(/** @type {Proposal | null} */ (null));
 const wanted = signal('');
 
-/** Whom Assign sends: who was picked, else who is proposed, else the first who can go. */
+/** Whom Assign sends: who was picked, else who is proposed, else the first who is free. */
 export const chosen = computed(() => {
   const proposal = known.value;
   if (!proposal) return '';
   const able = proposal.candidates.filter((who) => who.can);
   if (able.some((who) => who.label === wanted.value)) return wanted.value;
-  return proposal.label || able[0]?.label || '';
+  return proposal.label || able.find((who) => who.free)?.label || '';
 });
 
 /** The guard who would be there first. */
@@ -30,7 +30,7 @@ export const nearestGuard = computed(() => first((who) => !who.robot));
 export const nearestRobot = computed(() => first((who) => who.robot));
 
 /** @param {(who: import('../types.js').Candidate) => boolean} fits */
-const first = (fits) => known.value?.candidates.find((who) => who.can && fits(who))?.label ?? '';
+const first = (fits) => known.value?.candidates.find((who) => who.free && fits(who))?.label ?? '';
 
 /**
  * Send somebody; an event that somebody else has decided on meanwhile is left as it is.
@@ -56,7 +56,7 @@ export function ProposalPanel({ event }) {
   if (!isOpen(event)) return null;
   const proposal = known.value?.event === event.number ? known.value : null;
   if (!proposal) return html`<p class="none">The policy is being asked …</p>`;
-  const rival = proposal.candidates.find((who) => who.can && who.label !== proposal.label);
+  const rival = proposal.candidates.find((who) => who.free && who.label !== proposal.label);
   return html`<section class="proposal" aria-label="Proposal">
     <p><b>${proposal.label ? `${proposal.label}, ${timeText(proposal.arrival_s)}` : 'nobody'}</b>
       ${rival ? ` (${rival.label}: ${timeText(rival.arrival_s)}, ${rival.reason})` : ''}

@@ -125,7 +125,7 @@ function OrderCard({ me }) {
   if (!order) {
     return html`<section class="panel" aria-label="Order" aria-live="polite"><h2>No order</h2>
       <p>${me.doing ? `You: ${me.doing}.` : 'Wait for an order.'}</p>
-      <button type="button" class="big help-me" disabled=${off} onClick=${() => say('help')}>Help</button></section>`;
+      <${Help} me=${me} /></section>`;
   }
   const far = order.distance_m === null ? '' : `, ${Math.round(order.distance_m)} m`;
   return html`<section class="panel order-card" aria-label="Order" aria-live="polite">
@@ -144,6 +144,13 @@ function OrderCard({ me }) {
       ([what, name]) => html`<button type="button" class="big" key=${what} disabled=${off}
         onClick=${() => say(what)}>${name}</button>`,
     )}</div>`}
-    <button type="button" class="big help-me" disabled=${off} onClick=${() => say('help')}>Help</button>
+    <${Help} me=${me} />
   </section>`;
+}
+
+/** For oneself; pressed once more, it is over. @param {{me: import('../types.js').Guard}} props */
+function Help({ me }) {
+  const asked = me.doing === 'needs help';
+  return html`<button type="button" class="big help-me" disabled=${!maySteer.value} aria-pressed=${asked}
+    onClick=${() => act('guard_say', { what: 'help' })}>${asked ? 'Help is no longer needed' : 'Help'}</button>`;
 }

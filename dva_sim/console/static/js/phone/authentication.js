@@ -1,6 +1,6 @@
 /** Register, list, choose, ask for permission: each step opens the next. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
-import { mayDrive, maySteer, notice, robots, scene, seat, thingAt, you } from '../store.js';
+import { isOperator, mayDrive, maySteer, notice, robots, scene, seat, thingAt } from '../store.js';
 import { act } from '../net/actions.js';
 import { choices, choose } from './choices.js';
 import { holds, phone, robot } from './drive.js';
@@ -23,7 +23,7 @@ export function AuthenticationScreen() {
     return html`<p>This address may only look. Scan the code that the console shows for phones.</p>`;
   }
   const registered = Boolean(phone.value?.registered);
-  const own = you.value?.role === 'drive' && !registered;
+  const own = isOperator.value && !registered;
   return html`<ol class="steps">
     <${Register} />
     ${own && html`<${AsOperator} />`}

@@ -6,7 +6,6 @@ import { screen } from './screens.js';
 import { listen, onSample } from './sensor.js';
 
 const LEAST_MS = 12; // between two batches: of 60 samples a second none waits for another
-const LOOK_MS = 20; // what has had to wait goes then
 const MOST = 64; // samples in one
 const MOST_BACKLOG = 4096; // [B] beyond it the connection does not keep up: the oldest are lost
 const NEEDED_ON = ['calibration', 'teleoperation'];
@@ -15,6 +14,7 @@ const NEEDED_ON = ['calibration', 'teleoperation'];
 let waiting = [];
 let count = 0; // of the first that waits
 let sent = -Infinity;
+let timer = 0;
 
 /** From now on. */
 export function keepSampling() {
@@ -23,9 +23,15 @@ export function keepSampling() {
     if (!isWanted()) return drop();
     waiting.push(sample);
     if (waiting.length > MOST) lose();
-    if (performance.now() - sent >= LEAST_MS) send();
+    sendSoon();
   });
-  window.setInterval(send, LOOK_MS);
+}
+
+/** Now, or as soon as the last batch is old enough: a timer of its own would make samples wait. */
+function sendSoon() {
+  const wait = LEAST_MS - (performance.now() - sent);
+  if (wait <= 0) send();
+  else if (!timer) timer = window.setTimeout(send, wait);
 }
 
 /** Whether anybody would make something of them. */
@@ -44,6 +50,8 @@ function lose() {
 }
 
 function send() {
+  window.clearTimeout(timer);
+  timer = 0;
   if (!waiting.length || backlog() > MOST_BACKLOG) return;
   const batch = waiting;
   const told = {

@@ -29,7 +29,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['drive', 'Drive', 'gamepad-2'],
   ['events', 'Events', 'flag'],
   ['network', 'Network', 'activity'],
-  ['audit', 'Audit', 'square'],
+  ['audit', 'Audit', 'shield-check'],
 ]);
 const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messages tell nothing
 // What sends something is not there in a recording.

@@ -1,6 +1,6 @@
 /** The address for phones, as a code for their cameras: for who may drive alone. */
 import { html, signal, useEffect, useRef } from '../../vendor/preact.js';
-import { you } from '../store.js';
+import { isOperator } from '../store.js';
 import { Icon } from '../ui/icon.js';
 
 const address = signal('');
@@ -8,10 +8,10 @@ const open = signal(false);
 
 /** The button, where phones have an address. */
 export function PhoneButton() {
-  const role = you.value?.role;
+  const own = isOperator.value;
   useEffect(() => {
-    if (role === 'drive') ask();
-  }, [role]);
+    if (own) ask();
+  }, [own]);
   if (!address.value) return null;
   return html`<button type="button" class="phone-button" onClick=${() => (open.value = true)}>
     <svg class="icon" viewBox="0 0 24 24" aria-hidden="true" focusable="false" fill="none"

@@ -1,0 +1,101 @@
+"""A moment of a recording: where everybody was, how an event stood, what a drive had come to."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from dva_sim.core.events import Event, State
+from dva_sim.kernel.recorder import DriveLog, TrackPoint
+
+GONE = 1.0  # whoever was not seen for so long has left the site [s]
+ROUNDED = 0.0005  # pages know moments to the millisecond [s]
+_STEPS = (
+    ("detected", State.PENDING),
+    ("assigned", State.ASSIGNED),
+    ("arrived", State.ON_SCENE),
+    ("confirmed", State.CONFIRMED),
+)
+
+
+class RecordedTracks:
+    """Where everybody was.
+
+    Args:
+        tracks: By label, in order of time.
+        duration: Of the recording [s].
+    """
+
+    def __init__(self, tracks: Mapping[str, Sequence[TrackPoint]], duration: float) -> None:
+        self._tracks, self._duration = tracks, duration
+        self._times = {label: [p.time for p in track] for label, track in tracks.items()}
+
+    def places(self, now: float) -> Iterator[tuple[str, TrackPoint, float]]:
+        """Everybody who is on the site: label, where, and how fast [m/s]."""
+        for label, track in self._tracks.items():
+            index = bisect_right(self._times[label], now)
+            if index == 0:
+                continue
+            before, after = track[index - 1], track[min(index, len(track) - 1)]
+            if after is before:
+                left = now - before.time > GONE and before.time < self._duration - GONE
+                if not left:
+                    yield label, before, 0.0
+                continue
+            yield label, *_between(before, after, now)
+
+
+def event_at(event: Event, now: float) -> Event | None:
+    """An event as it stood at a moment; None if it was not known yet."""
+    times = {step: time for step, time in event.times.items() if time <= now + ROUNDED}
+    if "detected" not in times:
+        return None
+    if "closed" in times:
+        state = event.state
+    else:
+        state = [state for step, state in _STEPS if step in times][-1]
+    sent = state is not State.PENDING
+    return replace(
+        event,
+        state=state,
+        needs_containment="contained" in event.times or "act_assigned" in event.times,
+        responder=event.responder if sent else None,
+        operator=event.operator if sent else None,
+        actor=event.actor if "act_assigned" in times else None,
+        times=times,
+    )
+
+
+def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPoint, float]:
+    """Where somebody was between two points of a track, and how fast [m/s]."""
+    period = after.time - before.time
+    share = 0.0 if period <= 0.0 else (now - before.time) / period
+    x = before.x + share * (after.x - before.x)
+    y = before.y + share * (after.y - before.y)
+    turn = math.remainder(after.heading - before.heading, 2.0 * math.pi)
+    speed = math.dist((before.x, before.y), (after.x, after.y)) / period if period > 0.0 else 0.0
+    return TrackPoint(now, x, y, before.heading + share * turn, before.mode), speed
+
+
+def set_point(drive: DriveLog | None, now: float) -> tuple[float, float]:
+    """The newest command of a drive: speed [m/s] and turn rate [rad/s], as its phone made it."""
+    commands: Sequence[tuple[float, float, float]] = () if drive is None else drive.commands
+    index = bisect_right(commands, now, key=lambda command: command[0])
+    return commands[index - 1][1:] if index else (0.0, 0.0)
+
+
+def commands_hz(drive: DriveLog, now: float) -> float:
+    """Commands in the last second [1/s]."""
+    first, last = (
+        bisect_right(drive.commands, when, key=lambda command: command[0])
+        for when in (now - 1.0, now)
+    )
+    return float(last - first)
+
+
+def captured_at(drive: DriveLog, now: float) -> float | None:
+    """When the picture was taken that was on the operator's screen [s]; None before the first."""
+    index = bisect_right(drive.frames, now, key=lambda frame: frame.time)
+    return drive.frames[index - 1].captured if index else None

@@ -1,0 +1,91 @@
+"""What in a run becomes an alarm: open events, escalations, robots lost in drive, nobody left."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from phone_page import PhonePage
+
+from dva_sim.console.alarm_desk import ESCALATED_FOR, AlarmDesk
+from dva_sim.console.refusal import Refused
+
+
+def event(number: int = 1, **more: Any) -> dict[str, Any]:
+    usual = {"number": number, "kind": "gas_leak", "room": "Lab", "severity": "high"}
+    usual |= {"state": "assigned", "over": False, "reported_ms": 5000, "since_ms": 6000}
+    return usual | {"acknowledged": None} | more
+
+
+def robot(index: int, **more: Any) -> dict[str, Any]:
+    return {"i": index, "mode": "Teleoperation", "watchdog_left_s": 2.0, "stands": ""} | more
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
+    return PhonePage(monkeypatch, client="a1", bystander__count=0)
+
+
+@pytest.fixture
+def desk(page: PhonePage) -> AlarmDesk:
+    page.let(5.0)  # everybody has registered
+    return AlarmDesk(page.world.run)
+
+
+def texts(desk: AlarmDesk, *events: Any, robots: Any = (), now_ms: int = 10_000) -> list[str]:
+    return [row["text"] for row in desk.look(events, robots, now_ms)["alarms"]]
+
+
+def test_an_open_event_is_an_alarm_as_grave_as_it_is(desk: AlarmDesk) -> None:
+    (row,) = desk.look([event()], [], 10_000)["alarms"]
+
+    assert (row["text"], row["priority"], row["since_ms"]) == ("Gas leak, Lab", "high", 5000)
+    assert row["event"] == 1
+
+
+def test_what_the_dva_says_was_acknowledged_is(desk: AlarmDesk) -> None:
+    (row,) = desk.look([event(acknowledged={"label": "ana"})], [], 10_000)["alarms"]
+
+    assert (row["state"], row["seen_by"]) == ("acknowledged", "ana")
+
+
+def test_an_escalation_is_critical_for_a_minute_and_then_returned(desk: AlarmDesk) -> None:
+    over = event(state="escalated", over=True, since_ms=10_000)
+    (row,) = desk.look([over], [], 10_000)["alarms"]
+    assert (row["priority"], row["state"]) == ("critical", "unacknowledged")
+
+    later = 10_000 + round(1000 * ESCALATED_FOR)
+    (row,) = desk.look([over], [], later)["alarms"]
+    assert row["state"] == "returned"
+    desk.acknowledge(row["key"], "ana")
+    assert texts(desk, over, now_ms=later) == []
+
+
+def test_a_robot_whose_watchdog_has_stopped_it_is_lost(desk: AlarmDesk) -> None:
+    assert texts(desk, robots=[robot(0), robot(1)]) == []
+    lost = robot(0, watchdog_left_s=0.0)
+    assert texts(desk, robots=[lost]) == ["robot-1 is lost in drive: its watchdog stopped it"]
+
+
+def test_a_robot_that_waits_for_its_first_command_is_not(desk: AlarmDesk) -> None:
+    waits = robot(0, watchdog_left_s=0.0, stands="waits for the first command: ...")
+
+    assert texts(desk, robots=[waits]) == []
+
+
+def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(
+    page: PhonePage, desk: AlarmDesk
+) -> None:
+    waits = event(state="pending")
+    assert texts(desk, waits) == ["Gas leak, Lab"]  # somebody is free
+    for entry in page.world.run.dva.desk.registry.entries.values():
+        entry.silent = True
+
+    assert "nobody is left to send, and 1 wait" in texts(desk, waits)
+    rows = desk.look([event()], [], 10_000)["alarms"]
+    assert [row["state"] for row in rows if row["key"] == "nobody"] == ["returned"]
+
+
+def test_a_row_that_is_gone_is_none_to_act_on(desk: AlarmDesk) -> None:
+    with pytest.raises(Refused, match="none any more"):
+        desk.members("event 1")
