@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field
+from functools import partial
 from itertools import islice
 
 from dva_sim.kernel.clock import Clock
@@ -74,7 +75,7 @@ class AgentDevice:
     silent: bool = False
     clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
-    _has_left: bool = False
+    _life: int = 0  # what repeats itself belongs to one, and ends with it
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
@@ -92,8 +93,8 @@ class AgentDevice:
         Args:
             then: Called when the DVA has answered for the first time.
         """
-        self._register(then)
-        self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
+        self._register(then, self._life)
+        self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
 
     def register_once(
         self, on_reply: Callable[[m.Reply], object], on_failure: Callable[[], object]
@@ -102,30 +103,35 @@ class AgentDevice:
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
-                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing)
-                self.clock.every(HEARTBEAT_PERIOD, self._heartbeat)
+                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, self._life)
+                self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
             on_reply(reply)
 
         self.ask(self.dva, self._registration, answered, on_failure)
 
     def leave(self) -> None:
-        """Send nothing more, for good: the DVA finds out as of any device that falls silent."""
-        self.silent = self._has_left = True
+        """Send nothing more: the DVA finds out as of any device that falls silent."""
+        self.silent = True
+        self._life += 1
 
-    def _register(self, then: Callable[[], object]) -> None:
-        if self._has_left:
+    def come_back(self) -> None:
+        """Have a new life, and be registered nowhere as yet."""
+        self.silent = False
+
+    def _register(self, then: Callable[[], object], life: int) -> None:
+        if life != self._life:
             return
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 then()
-                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing)
+                self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, life)
             else:
                 self.tell(f"was not registered: {reply.text}", "link")
                 failed()
 
         def failed() -> None:
-            self.clock.call_after(REGISTER_AGAIN, self._register, then)
+            self.clock.call_after(REGISTER_AGAIN, self._register, then, life)
 
         self.ask(self.dva, self._registration, answered, failed)
 
@@ -353,9 +359,10 @@ class AgentDevice:
         """The name of a device for people."""
         return self.labels.get(id_tag, id_tag)
 
-    def _heartbeat(self) -> bool:
-        self.publish(HEARTBEAT, m.Heartbeat())
-        return not self._has_left
+    def _heartbeat(self, life: int) -> bool:
+        if life == self._life:
+            self.publish(HEARTBEAT, m.Heartbeat())
+        return life == self._life
 
     def _bad_message(self, error: ProtocolError) -> bytes:
         body = m.Reply(0, error.code, error.reason[:256])

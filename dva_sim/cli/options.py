@@ -47,6 +47,7 @@ def one_of(*words: str) -> Completer:
 STUDIES = names_in("experiments")
 SCENARIOS = names_in("experiments/scenarios", "experiments/scenarios/tasks")
 SITES = names_in("worlds")
+ROBOTS = names_in("agents/robots")
 
 
 MOST_SEED = 2**63 - 1

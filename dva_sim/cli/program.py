@@ -85,7 +85,9 @@ class DvaSimProgram(PanelGroup):
     panels: ClassVar[Panels] = {
         "Studies": _named(studies.demo, studies.run, studies.new, studies.register, studies.tune),
         "Results": _named(results.report, results.show, results.export, results.compare),
-        "Single runs": _named(runs.episode, runs.replay, runs.live, runs.console, runs.keys),
+        "Single runs": _named(
+            runs.episode, runs.replay, runs.live, runs.console, runs.robot, runs.keys
+        ),
         "Names, files and evidence": {
             **_named(files.list_, files.plugins, files.check, files.phone_log),
             **_named(files.schema, files.validate),

@@ -1,4 +1,4 @@
-"""The commands that play or replay one scenario: episode, replay, live, keys."""
+"""The commands that play or replay one scenario, or one robot: episode, replay, live, robot."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from dva_sim import api
 from dva_sim.cli.options import (
+    ROBOTS,
     SCENARIOS,
     Host,
     NoOpen,
@@ -278,6 +279,64 @@ def console(
     )
     with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), seed):
         ConsoleSupervisor(options, _say_at_once).run()
+
+
+def robot(
+    profile: Annotated[
+        str, Argument(metavar="PROFILE", autocompletion=ROBOTS, help="A robot by name or path.")
+    ] = "servrobot",
+    dva: Annotated[
+        str | None,
+        Option(metavar="HOST:PORT", help="Register there at once, and listen; else from the page."),
+    ] = None,
+    number: Annotated[
+        int, count("Which robot it is, which says its id and label.", least=1, most=1000)
+    ] = 1,
+    listen: Annotated[
+        int, count("Port at which it takes requests; 0: any.", metavar="PORT", most=_MOST_PORT)
+    ] = 0,
+    port: Annotated[
+        int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)
+    ] = 8765,
+    host: Annotated[
+        str, Option(metavar="HOST", help="Address of this machine to listen on.")
+    ] = "127.0.0.1",
+    keys: Annotated[Path | None, folder("Keys of the devices, as by `dva-sim keys`.")] = None,
+    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
+    no_token: Annotated[
+        bool, Option("--no-token", help="Let everybody in who reaches the page.")
+    ] = False,
+    seed: RunSeed = 1,
+    set_: Sets = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run one simulated robot over sockets, with windows in the browser.
+
+    It begins off: it is registered at any DVA, and its port opened, from its page.
+
+    Examples:
+        dva-sim robot  # the service robot; register it and open its port on the page
+        dva-sim robot pibot --dva 192.168.1.10:5600  # the model car, at a DVA elsewhere
+        dva-sim robot --number 2 --port 0  # another one beside it: robot-2
+    """
+    from dva_sim.console.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
+
+    options = RobotOptions(
+        profile=profile,
+        number=number,
+        dva=dva,
+        listen=listen,
+        port=port,
+        host=host,
+        keys=keys,
+        open=not no_open,
+        token=not no_token,
+        seed=seed,
+        changes=tuple(set_ or ()),
+    )
+    with loudness(quiet, verbose):
+        RobotSimulator(options, _say_at_once).run()
 
 
 def _say_at_once(line: str) -> None:

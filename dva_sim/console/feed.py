@@ -10,12 +10,12 @@ from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.played_run import PlayedRun
 from dva_sim.console.stands import why_stands
 from dva_sim.core.event_status import state_since
-from dva_sim.core.events import FINAL, Event
+from dva_sim.core.events import FINAL, Event, EventBook
 from dva_sim.kernel.recorder import Moment
 from dva_sim.live.parts import Rate
-from dva_sim.simulation.full.run import Run
 from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
@@ -28,14 +28,15 @@ class Feed:
 
     Args:
         run: Which.
+        book: Events of its DVA, if there is one here.
 
     Attributes:
         things: Everybody, with the number that other lines call them by.
         numbers: Those numbers, by id or name.
     """
 
-    def __init__(self, run: Run) -> None:
-        self._run = run
+    def __init__(self, run: PlayedRun, book: EventBook | None = None) -> None:
+        self._run, self._book = run, book or EventBook()
         self.things: list[Line] = []
         self.numbers: dict[str, int] = {}
         self._rates: dict[str, Rate] = {}
@@ -164,7 +165,7 @@ class Feed:
 
     def events(self) -> Line:
         """All that are open, and the last that are over."""
-        book = self._run.dva.desk.book
+        book = self._book
         over = list(book.closed.values())[-KEPT_EVENTS:]
         return {
             "k": "events",

@@ -9,6 +9,7 @@ from typing import Any
 
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
+from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.safety_checks import SafetyAudit
@@ -41,6 +42,7 @@ class ConsoleSockets:
         recorder: Told what goes wrong, and of each message.
         host: Address of this machine to listen on.
         port: Of the DVA's requests; its publications have the next one. 0: any two that are free.
+        ring: Keys of the devices; None to run without.
 
     Attributes:
         dva: Where the DVA listens, once it does.
@@ -53,10 +55,11 @@ class ConsoleSockets:
         recorder: ConsoleRecorder,
         host: str = "127.0.0.1",
         port: int = 0,
+        ring: KeyRing | None = None,
     ) -> None:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
         self.dva = ""
-        self.network = SocketNetwork(clock, None, self._tell, scenario.zeromq)
+        self.network = SocketNetwork(clock, ring, self._tell, scenario.zeromq)
 
     def _tell(self, line: str) -> None:
         self._recorder.tell(self._clock.now, "console", line, "link")

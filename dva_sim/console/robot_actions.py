@@ -151,6 +151,13 @@ class RobotActions:
             if hand.robot in stopped:
                 self.gone(client)
 
+    def press_emergency(self, robot: str) -> None:
+        """The button at the robot itself."""
+        window = self._windows.by_id[robot]
+        now = window.robot.device.clock.now
+        window.emergency = {"at_ms": round(1000 * now), "by": "its own button"}
+        window.hand.press_emergency()
+
     # --- faults ------------------------------------------------------------------------
 
     def _fault(self, _: str, line: Line, said: Said) -> None:

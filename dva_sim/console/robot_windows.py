@@ -50,7 +50,7 @@ class AlwaysListening:
     def line(self) -> Line:
         """See `RobotStation`."""
         device = self._robot.device
-        state = "off" if device.silent else "listening"
+        state = "listening" if self._robot.body.powered else "off"
         return {"state": state, "address": device.address, "dva": None, "problem": ""}
 
 

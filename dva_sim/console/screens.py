@@ -14,8 +14,8 @@ from typing import Any
 
 from dva_sim.agents.observation import FRAME, CameraFrame
 from dva_sim.agents.people.bystander import SAFE
+from dva_sim.console.played_run import PlayedRun
 from dva_sim.network.messaging import Subscription
-from dva_sim.simulation.full.run import Run
 
 Line = dict[str, Any]
 MOST_UNDER_WAY = 400  # frames of a robot
@@ -35,7 +35,7 @@ class Screens:
 
     def __init__(
         self,
-        run: Run,
+        run: PlayedRun,
         screen: str,
         numbers: dict[str, int],
         tell: Callable[[Line, int], object],

@@ -109,7 +109,7 @@ class ConsoleWorld:
             if self.sockets is not None:
                 self.sockets.close()
             raise
-        self.feed, self.lag = Feed(self.run), LagRule()
+        self.feed, self.lag = Feed(self.run, self.run.dva.desk.book), LagRule()
         self.tell: Tell = lambda *_: None
         self.show: Tell = lambda *_: None
         self.windows = self._windows()

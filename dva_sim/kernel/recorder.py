@@ -108,7 +108,7 @@ class ByHand(NamedTuple):
     Attributes:
         robot: Which, by id.
         who: The hand.
-        what: `takes`, `drives` or `lets go`.
+        what: `takes`, `drives`, `lets go`, or `stops` by the emergency button.
         time: Now [s].
     """
 

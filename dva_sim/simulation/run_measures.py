@@ -1,17 +1,23 @@
-"""Measures of the user's own: a number that a class in a file, or in a package, takes of a run."""
+"""Measures that a study names: a number that a class in a file, or in a package, takes of a run.
+
+Ours are covariates: what is known of a run beforehand, less what that is on the average.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Callable, Iterable
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, Final
 
+from dva_sim.agents.population import Population, Trait
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import FAILURES, Plugins, said, stamp_of
+from dva_sim.kernel.wording import without_unit
+from dva_sim.simulation.full.scenes import trait_off, way_off
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
@@ -37,10 +43,59 @@ class RunMeasure:
         raise NotImplementedError
 
 
+class TraitOff(RunMeasure):
+    """How far the person who drives is from the median of its population in a trait.
+
+    Args:
+        trait: As the population calls it.
+    """
+
+    def __init__(self, trait: str) -> None:
+        self._trait = trait
+        word = without_unit(trait)
+        self.about = Measure(
+            f"{without_unit(trait).replace(' ', '_')}_off",
+            f"the first operator's {word} beside the population's median, in standard deviations "
+            "of its logarithm: zero on the average of all persons",
+            title=f"the person's {word}",
+        )
+
+    def of(self, recording: Any) -> float:
+        """The same in each run of a person."""
+        return trait_off(recording.scenario, self._trait)
+
+
+class WayOff(RunMeasure):
+    """How much longer than usual the way is."""
+
+    about = Measure(
+        "way_off_m",
+        "planned way from the first robot's base to the first event, less its average over all "
+        "places where the event may begin; near walls a metre counts more",
+        title="length of the way",
+        low=-math.inf,
+    )
+
+    def of(self, recording: Any) -> float | None:
+        """The same in each run of a seed."""
+        return way_off(recording.scenario, recording.seed)
+
+
+_CUT_OFF: Final = "pace"  # at the top speed of the robot: its mean is not that of its law
+_TRAITS: Final = [
+    name
+    for name, field in Population.model_fields.items()
+    if field.annotation is Trait and name != _CUT_OFF
+]
+COVARIATES: Final[dict[str, Callable[..., RunMeasure]]] = {
+    **{TraitOff(trait).about.name: partial(TraitOff, trait) for trait in _TRAITS},
+    WayOff.about.name: WayOff,
+}
+
 PLUGINS: Final = Plugins[RunMeasure](
     kind="measure",
     base=RunMeasure,
-    shipped={},
+    shipped=COVARIATES,
     folder="experiments/measures",
     group="dva_sim.measures",
     key="measures",

@@ -36,6 +36,7 @@ COMMANDS = {
     **{name: f"{name} {NOBODY}" for name in ("run", "register", "tune", "report", "replay")},
     "phone-log": f"phone-log {NOBODY}",
     **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate")},
+    "robot": f"robot {NOBODY}",
 }
 PREFIX = "start-up: "
 REPEATS = 3

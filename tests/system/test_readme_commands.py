@@ -288,6 +288,7 @@ EXPECTED = {
     "dva-sim console -o results/mine": NOT_HERE,
     "dva-sim console --results results/mine": NOT_HERE,
     "dva-sim replay drill.mcap --console": NOT_HERE,
+    "dva-sim robot": NOT_HERE,
     "dva-sim list": Expected(
         told("req-rep-vs-pub-sub", "fire-drill", "caparica", "servrobot", "hazard_team")
     ),

@@ -296,6 +296,10 @@ class RobotController:
         point = TimedSetPoint(speed, turn_rate, now + self.limits.watchdog)
         return Decision(m.OK, set_point=point)
 
+    def press_emergency(self, now: float) -> Decision:
+        """The button at the robot itself: as an emergency that somebody sends."""
+        return self._emergency(now)
+
     def let_go(self, who: str) -> Decision:
         """The hand that drove gives the robot up; another one's word changes nothing."""
         if self.by_hand is None or self.by_hand != who:

@@ -15,7 +15,8 @@ from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
 LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
-TAKEN_BY_HAND, LET_GO, HANGS = "taken by hand", "let go", "hangs"
+TAKEN_BY_HAND, LET_GO, PRESSED = "taken by hand", "let go", "emergency pressed"
+HANGS = "hangs"
 HAND = "hand"  # whose that was is no matter of a trace
 
 
@@ -146,6 +147,8 @@ def _again(
         controller.take_by_hand(HAND, now, moving=False)
     elif happened == LET_GO:
         controller.let_go(HAND)
+    elif happened == PRESSED:
+        controller.press_emergency(now)
     elif happened == HANGS:
         controller.hang()
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.agents.robot.decision_log import LET_GO, TAKEN_BY_HAND
+from dva_sim.agents.robot.decision_log import LET_GO, PRESSED, TAKEN_BY_HAND
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.recorder import ByHand
 from dva_sim.protocol import messages as m
@@ -59,6 +59,18 @@ class ManualControl:
             robot.trace.happened(LET_GO, now)
         robot.device.tell("is driven by hand no more", "mode")
         return decision
+
+    def press_emergency(self) -> None:
+        """The button at the robot itself: it stands until somebody orders it anew."""
+        robot, now = self._robot, self._robot.device.clock.now
+        before = self._controller.mode
+        decision = self._controller.press_emergency(now)
+        self._done("", "stops", decision, now)
+        if robot.trace is not None:
+            robot.trace.happened(PRESSED, now)
+        robot.device.tell("is stopped by its own emergency button", "mode")
+        if self._controller.mode is not before:
+            robot.mode_changed("")
 
     def _done(self, who: str, what: str, decision: Decision, now: float) -> None:
         """What was decided moves the robot, and the safety audit is told."""

@@ -338,7 +338,7 @@ class RobotAgent:
         self.controller.hang()
         self.device.silent = True
         if self.controller.mode is not before:
-            self._mode_changed("")
+            self.mode_changed("")
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
@@ -431,7 +431,7 @@ class RobotAgent:
         elif is_command:
             self._log_command(message, arrived, now, decision.set_point)
         if self.controller.mode is not before:
-            self._mode_changed(message.source)
+            self.mode_changed(message.source)
         if self.controller.mission_status is not mission:
             self._publish_mission()
         self._note_holder(message, decision.code)
@@ -522,7 +522,8 @@ class RobotAgent:
             return
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
 
-    def _mode_changed(self, source: str) -> None:
+    def mode_changed(self, source: str) -> None:
+        """What it does is another thing now, by the word of a source."""
         mode = self.controller.mode
         if not self.device.silent:
             self.device.tell(f"is now in mode {mode}", "mode")
@@ -566,7 +567,7 @@ class RobotAgent:
         if self.controller.expire(now):
             if self.trace is not None:
                 self.trace.happened(LEASE_ENDS, now)
-            self._mode_changed("")
+            self.mode_changed("")
         pose = self.body.pose()
         body = m.RobotStatus(
             self.controller.mode.value,
@@ -592,4 +593,4 @@ class RobotAgent:
             self.device.tell(f"mission {status.mission_state}{why}", "mode")
             if self.trace is not None:
                 self.trace.happened(MISSION_ENDS, self.device.clock.now)
-            self._mode_changed("")
+            self.mode_changed("")

@@ -27,6 +27,7 @@ OVER_THE_LINK = (
     "stop",
     "confirm",
     "refute",
+    "robot_register",
     "phone_register",
     "phone_devices",
     "phone_permission",

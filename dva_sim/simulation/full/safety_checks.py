@@ -406,6 +406,8 @@ class SafetyAudit:
             witness.does = None
         elif done.what == "lets go":
             witness.hand, witness.allowed = None, min(witness.allowed, now)
+        elif done.what == "stops":
+            witness.stopped = max(witness.stopped, now)
         else:
             if witness.stopped > witness.ordered:
                 found.append(("S3", "obeys a hand after an emergency, before it is taken anew"))

@@ -72,8 +72,12 @@ class TeamBuilder:
         self._first_places: list[Point] = []
         self._failures: dict[str, int] = {}
 
-    def add_robot(self, number: int) -> RobotAgent:
+    def add_robot(self, number: int, registers: bool = True) -> RobotAgent:
         """The `number`-th robot, in its place; it registers and begins to work.
+
+        Args:
+            number: From 1.
+            registers: Without that it does neither by itself.
 
         Raises:
             ConfigError: the site has no base for it, or something is in its way.
@@ -101,7 +105,8 @@ class TeamBuilder:
             setup=setup,
             drive_of=stage.recorder.newest_drive.get,
         )
-        device.register(robot.start)
+        if registers:
+            device.register(robot.start)
         stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
         return robot
 

@@ -24,7 +24,7 @@
  * @typedef {{scenario: string, title: string, site: Site, things: Thing[],
  *   patterns: {name: string, title: string}[], link: LinkSetting,
  *   link_limits: Record<string, number[]>, watchdog_s: number, stale_s: number,
- *   lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer,
+ *   pages?: string[], lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer,
  *   replay?: ReplayAbout | null}} Scene
  * @typedef {{t: number, who: string, what: string, kind: string}} Mark
  * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[]}} ReplayAbout

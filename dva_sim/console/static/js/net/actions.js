@@ -12,6 +12,7 @@ const OVER_THE_LINK = [
   'stop',
   'confirm',
   'refute',
+  'robot_register',
   'phone_register',
   'phone_devices',
   'phone_permission',

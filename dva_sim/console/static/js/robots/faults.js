@@ -1,5 +1,5 @@
 /** Knobs that let things go wrong with a robot; all are undone when they are switched off. */
-import { html, useState } from '../../vendor/preact.js';
+import { html, useEffect, useState } from '../../vendor/preact.js';
 import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';
 import { Slider } from '../ui/slider.js';
@@ -33,8 +33,27 @@ export function Faults({ robot }) {
 
 /** @param {{name: string, hint: string, on: boolean, ask: object}} props */
 function Knob({ name, hint, on, ask }) {
-  return html`<label class="tick" title=${hint}><input type="checkbox" checked=${on} disabled=${!maySteer.value}
-    onInput=${(/** @type {any} */ event) => act('fault', { ...ask, on: event.currentTarget.checked })} /> ${name}</label>`;
+  const [shown, change] = useAsked(on, (wanted) => act('fault', { ...ask, on: wanted }));
+  return html`<label class="tick" title=${hint}><input type="checkbox" checked=${shown} disabled=${!maySteer.value}
+    onInput=${(/** @type {any} */ event) => change(event.currentTarget.checked)} /> ${name}</label>`;
+}
+
+/**
+ * What was asked for is shown until the world says the same, or refuses.
+ * @param {boolean} told
+ * @param {(wanted: boolean) => Promise<import('../types.js').Done>} ask
+ * @returns {[boolean, (wanted: boolean) => void]}
+ */
+function useAsked(told, ask) {
+  const [asked, set] = useState(/** @type {boolean | null} */ (null));
+  useEffect(() => {
+    if (asked === told) set(null);
+  }, [asked, told]);
+  const change = (/** @type {boolean} */ wanted) => {
+    set(wanted);
+    ask(wanted).then((done) => !done.ok && set(null));
+  };
+  return [asked ?? told, change];
 }
 
 /** @param {{robot: Thing}} props */
@@ -43,13 +62,14 @@ function Processing({ robot }) {
   const [own, set] = useState(SLOWEST_S);
   const ask = (/** @type {boolean} */ on, seconds = own) =>
     act('fault', { robot: robot.i, what: 'processing', on, ...(on ? { seconds } : {}) });
+  const [isSlow, slow] = useAsked(told !== null, (on) => ask(on));
   const change = (/** @type {number} */ seconds) => {
     set(seconds);
     if (told !== null) ask(true, seconds);
   };
   return html`<div class="processing">
-    <label class="tick" title="Each message takes its computer so long."><input type="checkbox" checked=${told !== null}
-      disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => ask(event.currentTarget.checked)} /> Slow computer</label>
+    <label class="tick" title="Each message takes its computer so long."><input type="checkbox" checked=${isSlow}
+      disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => slow(event.currentTarget.checked)} /> Slow computer</label>
     <${Slider} name="Processing time" min=${0} max=${SLOWEST_S} step=${0.1} value=${told ?? own}
       disabled=${!maySteer.value} text=${(/** @type {number} */ s) => `${s.toFixed(1)} s`} onInput=${change} />
   </div>`;

@@ -20,11 +20,12 @@ export function ManualControl({ robot }) {
     if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
   }, [connection.value, driveLost.value]);
   const may = maySteer.value;
+  const listens = windowOf(robot.i)?.station.state === 'listening';
   const limits = { max_speed_mps: robot.max_speed_mps, max_turn_rate_radps: robot.max_turn_rate_radps };
   return html`<section class="panel controls manual" aria-label="Manual control"><h2>Manual control</h2>
     <${Station} robot=${robot} />
     <div class="buttons">
-      <button type="button" class=${mine ? '' : 'go'} disabled=${!may || mine} onClick=${() => take(robot.i)}>Take manual control</button>
+      <button type="button" class=${mine ? '' : 'go'} disabled=${!may || mine || !listens} onClick=${() => take(robot.i)}>Take manual control</button>
       <button type="button" disabled=${!may || !mine} onClick=${() => act('manual_release')}>Release manual control</button>
     </div>
     <p class="hint" role="status" aria-label="Manual control">${hint(robot)}</p>
@@ -57,6 +58,7 @@ function hint(robot) {
   if (!mayDrive.value) return 'This address may only look.';
   if (!shown) return '';
   if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped: take hold again.` : 'It is in your hand. Hold to drive; whoever else asks for it is told that it is busy.';
+  if (shown.station.state !== 'listening') return 'It has to be registered and listening first.';
   if (shown.hand !== null) return 'It is in the hand of another page.';
   if (shown.mode !== 'Idle' && shown.mode !== 'Emergency') return `Only an idle robot can be taken: it is in mode ${shown.mode}.`;
   if (shown.holder) return `${shown.holder} holds it.`;

@@ -1,6 +1,6 @@
 /** All robots, each with a link to its windows; or the windows of the one that is named. */
 import { html } from '../../vendor/preact.js';
-import { robots, rowOf, rows } from '../store.js';
+import { robots, rowOf, rows, scene } from '../store.js';
 import { detail } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
 import { percentText } from '../ui/words.js';
@@ -12,8 +12,9 @@ const HEADS = ['Robot', 'Mode', 'Holder', 'Speed', 'Battery', 'Why it stands'];
 /** The page. */
 export function RobotsPage() {
   const name = detail.value;
-  if (!name) return html`<${List} />`;
-  const robot = robots.value.find((one) => one.label === name || one.id === name);
+  const only = scene.value?.pages && robots.value.length === 1;
+  if (!name && !only) return html`<${List} />`;
+  const robot = robots.value.find((one) => !name || one.label === name || one.id === name);
   return robot ? html`<${RobotPage} key=${robot.i} robot=${robot} />` : html`<${Nobody} name=${name} />`;
 }
 

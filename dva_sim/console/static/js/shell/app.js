@@ -75,16 +75,18 @@ function skip(event) {
 
 /** The pages that there are to go to. */
 function pages() {
+  const some = scene.value?.pages;
+  if (some) return PAGES.filter(([name]) => some.includes(name));
   if (isAttached.value) return PAGES.filter(([name]) => !NOT_ATTACHED.includes(name));
   if (!isPast.value) return PAGES;
-  const some = replay.value ? OF_A_RECORDING : [];
-  return shelf.value ? [...some, SHELF] : some;
+  const past = replay.value ? OF_A_RECORDING : [];
+  return shelf.value ? [...past, SHELF] : past;
 }
 
 /** The page that the address names, or the first that there is. */
 function shown() {
   const names = pages().map(([name]) => name);
-  return names.includes(page.value) ? page.value : (names[0] ?? SHELF[0]);
+  return names.includes(page.value) ? page.value : (scene.value?.pages?.[0] ?? names[0] ?? SHELF[0]);
 }
 
 function Rail() {
@@ -93,7 +95,7 @@ function Rail() {
       ([name, title, icon]) => html`<a href=${addressOf(name)}
         aria-current=${shown() === name ? 'page' : null}><${Icon} name=${icon} /><span>${title}</span></a>`,
     )}
-    ${!isPast.value && html`<${PhoneButton} /><${TourButton} />`}
+    ${!isPast.value && !scene.value?.pages && html`<${PhoneButton} /><${TourButton} />`}
   </nav>`;
 }
 

@@ -1,6 +1,6 @@
 /** Which page is shown, in the address: a reload or a sent link shows the same. */
 import { computed, signal } from '../../vendor/preact.js';
-import { robots } from '../store.js';
+import { robots, scene } from '../store.js';
 
 const PAGES = [
   ...['map', 'main', 'devices', 'robots', 'drive', 'events', 'network', 'audit'],
@@ -8,7 +8,17 @@ const PAGES = [
 ];
 const MOST_AT_ONCE = 2;
 const hash = signal(location.hash);
-window.addEventListener('hashchange', () => (hash.value = location.hash));
+window.addEventListener('hashchange', () => {
+  hash.value = location.hash;
+  goElsewhere();
+});
+goElsewhere();
+
+/** The pages of phones and guards are documents of their own, and reached from here, too. */
+function goElsewhere() {
+  const found = /^#\/(phone|guard)(\/\w+)?$/.exec(location.hash);
+  if (found) location.replace(`/${found[1]}#${found[2] ?? '/main'}`);
+}
 
 const parts = computed(() => {
   const [path, query = ''] = hash.value.replace(/^#\/?/, '').split('?');
@@ -28,7 +38,7 @@ function decoded(text) {
   }
 }
 
-export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : 'map'));
+export const page = computed(() => (PAGES.includes(parts.value.path) ? parts.value.path : (scene.value?.pages?.[0] ?? 'map')));
 
 /** The robots that are looked at or driven: those of the address, else the first. */
 export const driven = computed(() => {

@@ -1,0 +1,46 @@
+"""What a console needs of whatever runs: a whole run, or one robot alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.link.link import Link
+from dva_sim.network.messaging import Transport
+from dva_sim.simulation.full.physical_world import Field
+from dva_sim.simulation.full.stage import Stage
+from dva_sim.simulation.scenario import Scenario
+
+
+class PlayedRun(Protocol):
+    """What runs before people's eyes."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What it consists of."""
+
+    @property
+    def clock(self) -> Clock:
+        """Its time."""
+
+    @property
+    def recorder(self) -> Recorder:
+        """Told what happens."""
+
+    @property
+    def network(self) -> Transport:
+        """What carries its messages."""
+
+    @property
+    def stage(self) -> Stage:
+        """Where it takes place."""
+
+    @property
+    def field(self) -> Field:
+        """Everything that has a place."""
+
+    @property
+    def links(self) -> Mapping[str, tuple[Link, Link]]:
+        """Modelled links to each robot and back, by its id."""

@@ -1,0 +1,278 @@
+"""One simulated robot on real sockets, for anybody's DVA, with the windows that a console has.
+
+Nothing of the system is here but the robot itself, its place and its pages: who it is registered
+at, who is let drive it, and who does, is decided elsewhere.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from dva_sim.agents.observation import CameraFrame, Cameras
+from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.feed import Feed
+from dva_sim.console.lag import LagRule
+from dva_sim.console.logs import PERIOD, Logs
+from dva_sim.console.real_links import ConsoleSockets
+from dva_sim.console.recorder import ConsoleRecorder
+from dva_sim.console.robot_station import LISTENING, OwnStation
+from dva_sim.console.robot_windows import RobotWindows
+from dva_sim.console.scene import scene_of
+from dva_sim.console.screens import Screens, camera_url, topic_of
+from dva_sim.console.stands import why_stands
+from dva_sim.core.assignments import Rules
+from dva_sim.core.events import EventBook
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.network.keys import KeyRing
+from dva_sim.network.link.link import Link
+from dva_sim.network.realtime import PacedClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field
+from dva_sim.simulation.full.run import WATCH_PERIOD
+from dva_sim.simulation.full.safety_checks import SafetyAudit
+from dva_sim.simulation.full.stage import DVA, Stage, id_of
+from dva_sim.simulation.full.team import TeamBuilder
+from dva_sim.simulation.scenario import Scenario
+
+Line = dict[str, Any]
+Tell = Callable[..., object]
+
+POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
+SOON = 0.05  # from one look at what has changed to the next, real time [s]
+PAGES = "robots", "map"
+
+
+class OwnCamera(Screens):
+    """The robot's camera as its own page sees it: without a network between."""
+
+    def _subscribe(self) -> None:
+        """Nobody has to be asked for the pictures."""
+
+    def takes(self, robot: RobotAgent, now: float) -> None:
+        """A picture is taken, if somebody looks and the camera works."""
+        id_tag = robot.device.id_tag
+        if id_tag not in self._watched or robot.blind or robot.device.silent:
+            return
+        frame = CameraFrame(robot.observe(), now)
+        self._film(id_tag, frame)
+        self.arrived(id_tag, frame)
+
+
+class RobotWorld:
+    """The robot, and what of it is told.
+
+    Args:
+        scenario: Says which robot, and where it stands.
+        number: Which of its robots it is, from 1.
+        seed: Decides all luck.
+        clock: Its time; real time.
+        ring: Keys of the devices; None to run without.
+        host: Address of this machine to listen on.
+        port: Of requests; 0: any two that are free.
+
+    Attributes:
+        clock: Real time.
+        robot: The robot.
+        station: How far it has come.
+        windows: Its windows.
+        tell: Takes lines for pages, and a key for those of which the newest counts.
+        show: Takes lines for whoever draws pictures, likewise.
+
+    Raises:
+        ConfigError: the site has no place for it.
+        NetworkError: the host is not this machine.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        number: int = 1,
+        seed: int = 1,
+        *,
+        clock: PacedClock | None = None,
+        ring: KeyRing | None = None,
+        host: str = "127.0.0.1",
+        port: int = 0,
+    ) -> None:
+        self.scenario, self.seed = scenario, seed
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        self.sockets = ConsoleSockets(scenario, self.clock, self.recorder, host, ring=ring)
+        try:
+            self._place(number, host, port)
+        except DvaSimError:
+            self.sockets.close()
+            raise
+        self.tell: Tell = lambda *_: None
+        self.show: Tell = lambda *_: None
+        self.dropped: Callable[[], int] = lambda: 0
+        self.lag, self._newest = LagRule(), dict[str, Any]()
+        self.hold: Callable[[str], object] = lambda _: None
+        self.clock.on_late = self._late
+        self._watch()
+
+    @property
+    def network(self) -> SocketNetwork:
+        """What carries its messages."""
+        return self.sockets.network
+
+    @property
+    def links(self) -> Mapping[str, tuple[Link, Link]]:
+        """No link is modelled here."""
+        return {}
+
+    def _place(self, number: int, host: str, port: int) -> None:
+        """Put the robot where it begins; it is off."""
+        cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
+        self.stage = Stage(
+            *(self.scenario, self.seed, self.network, self.recorder),
+            lambda kind, number: host,
+            self.sockets.time_of_day(),
+            cameras=cameras,
+        )
+        self.field = Field(self.stage)
+        team = TeamBuilder(self.stage, self.field.world, self.field)
+        self.robot = robot = team.add_robot(number, registers=False)
+        self.field.robots[robot.device.id_tag] = robot
+        self.station = OwnStation(robot, self.network, host, port)
+        self.station.deaf = partial(self.deafen, robot.device.id_tag)
+
+    def _watch(self) -> None:
+        """Feed, windows, log, camera and audit look at the robot from now on."""
+        robot, id_tag = self.robot, self.robot.device.id_tag
+        self.feed = Feed(self)
+        self.recorder.robots = {id_tag}
+        self.audit = SafetyAudit(
+            self.recorder,
+            limits=self.scenario.robot,
+            robots=self.field.robots,
+            book=EventBook(),
+            rules=Rules(),
+            processing=max(mean_of(profile.processing_s) for profile in self.stage.robots),
+            dva=DVA,
+            place_of=self.field.place_of,
+            at_event=0.0,
+            tick=PHYSICS_TICK,
+        )
+        self.sockets.watch(self.audit)
+        about = self.feed.numbers, self.stage.labels
+        self.windows = RobotWindows(
+            self.recorder, self.field.robots, *about, self.recorder.sent_at, self._lost
+        )
+        self.windows.by_id[id_tag].station = self.station
+        self.feed.things[self.feed.numbers[id_tag]] |= self.windows.about(id_tag)
+        self.logs = Logs(
+            self.network, lambda label: id_tag if label == robot.device.label else None
+        )
+        self.logs.listen(robot.device.label, partial(self.windows.heard, id_tag), publications=True)
+        self.screens = OwnCamera(
+            self, id_of("console", 1), self.feed.numbers, lambda line, key: self.show(line, key)
+        )
+        self.clock.every(1.0 / self.scenario.camera.rate_hz, self._film)
+        self.clock.every(WATCH_PERIOD, lambda: self.audit.check(self.clock.now))
+
+    def _lost(self, robot: str, reply: bytes) -> None:
+        self.audit.sent(self.clock.now, robot, "", reply)
+
+    def deafen(self, robot: str, on: bool) -> None:
+        """The audit is told that the robot hears nothing, or hears again."""
+        (self.audit.deaf.add if on else self.audit.deaf.discard)(robot)
+
+    # --- what a console shows: see `ConsoleSubject` ------------------------------------------
+
+    def serve_cameras(self, base: str) -> None:
+        """See `ConsoleSubject`."""
+        self.robot.controller.camera_url = camera_url(base, self.robot.device.label)
+
+    def begin(self) -> None:
+        """See `ConsoleSubject`."""
+        scene = scene_of(
+            *(self.scenario, self.stage.site, (), self.feed.things),
+            name=f"robot {self.scenario.robot.profile}",
+            seed=self.seed,
+        )
+        link = {"kind": "real", "processing_s": 0.0}
+        self.tell(scene | {"link": link, "pages": PAGES})
+        self.show_scene()
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(WINDOWS, self._tell_windows)
+        self.clock.pulse(ROWS, self.tell_now)
+        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def show_scene(self) -> None:
+        """See `ConsoleSubject`."""
+        scenario = self.scenario.model_dump(mode="json")
+        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+
+    def note(self, text: str) -> None:
+        """See `ConsoleSubject`."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
+
+    # --- what is told ----------------------------------------------------------------------
+
+    def tell_now(self) -> None:
+        """How the robot is."""
+        self.lag.measured(time.monotonic(), self.clock.worst_lag())
+        clock = {
+            "factor": self.clock.factor,
+            "paused": self.clock.paused,
+            "lag_s": round(self.lag.newest, 3),
+            "given_up_s": round(self.clock.given_up, 2),
+            "held_by_lag": self.lag.held,
+        }
+        self.tell(
+            {
+                "k": "rows",
+                "t": self.feed.now_ms,
+                "clock": clock,
+                "link": {"kind": "real", "processing_s": 0.0},
+                "dropped": self.dropped(),
+                "robots": self.feed.robots(self.lag.held),
+                "people": [],
+                "order": None,
+            }
+        )
+
+    def _tell_positions(self) -> None:
+        self._tell_new(self.feed.positions())
+
+    def _tell_windows(self) -> None:
+        def stands(robot: RobotAgent) -> str:
+            if self.station.state != LISTENING:
+                return f"it is {self.station.state}"
+            return why_stands(robot, self.clock.now, self.lag.held)
+
+        for line in self.windows.lines(self.screens.watched, stands):
+            self._tell_new(line)
+
+    def _tell_news(self) -> None:
+        for line in self.feed.story():
+            self.tell(line)
+
+    def _tell_logs(self) -> None:
+        for line in self.logs.batches():
+            self.tell(line)
+
+    def _tell_new(self, line: Line) -> None:
+        said = {name: value for name, value in line.items() if name != "t"}
+        if self._newest.get(line["k"]) != said:
+            self._newest[line["k"]] = said
+            self.tell(line)
+
+    def _film(self) -> None:
+        self.screens.takes(self.robot, self.clock.now)
+
+    def _late(self, behind: float) -> None:
+        if self.lag.measured(time.monotonic(), behind):
+            self.hold(f"stopped: this machine is {behind:.2f} s behind real time")
+
+    # --- the end ----------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close all sockets; what was sent last has a moment to leave."""
+        self.sockets.close()

@@ -1,0 +1,138 @@
+"""`dva-sim robot`: one robot with its windows, at a DVA that knows nothing of it, driven by a
+client that is none of this program's.
+"""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from page_faults import faults
+from patience import PATIENCE_S
+from playwright.sync_api import Page, expect
+from programs import Program, Programs, all_gone_after
+
+from dva_sim.console.robot_station import two_free_ports
+
+# The client sends no heartbeats: a robot that takes seconds for each message would lose it.
+QUICK = "--set", "robot.processing_s=0.05"
+SPECIFICATION = Path(__file__).parents[3] / "protocol" / "README.md"
+
+
+@pytest.fixture
+def programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
+
+
+def a_dva(programs: Programs) -> str:
+    """The address of a DVA on its own."""
+    address = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
+    programs.start("live", "hands-on", "--only", "dva", "--dva", address, "--for", "600")
+    return address
+
+
+def a_robot(programs: Programs, visit, *words: str) -> tuple[Program, Page, str]:
+    """A robot, its page and the address at which it will listen."""
+    robot = programs.start("robot", *words, "--no-open", "--port", "0")
+    robot.wait_to_say("Console:", "Robot:")
+    page = visit.tab()
+    page.goto(re.findall(r"^Console: +(\S+)", robot.said, re.MULTILINE)[0])
+    expect(page.get_by_role("list", name="State")).to_be_visible()
+    return robot, page, re.findall(r"^Robot: +(\S+)", robot.said, re.MULTILINE)[0]
+
+
+def client(folder: Path) -> Path:
+    """The one in the specification: ZeroMQ and text, and nothing of this program."""
+    text = SPECIFICATION.read_text(encoding="utf-8")
+    code = re.search(r"```python\n(import re, sys, time, zmq\n.*?)```", text, re.DOTALL)
+    assert code is not None
+    file = folder / "client.py"
+    file.write_text(code[1], encoding="utf-8")
+    return file
+
+
+def state(page: Page) -> str:
+    return page.get_by_role("list", name="State").locator("[aria-current]").inner_text()
+
+
+def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_off(
+    tmp_path: Path, visit, programs: Programs
+) -> None:
+    dva = a_dva(programs)
+    robot, page, address = a_robot(programs, visit)
+    assert state(page) == "off"
+    expect(page.get_by_role("button", name="Open port")).to_be_disabled()
+    expect(page.get_by_role("button", name="Take manual control")).to_be_disabled()
+    expect(page.get_by_text("registered and listening first")).to_be_visible()
+
+    page.get_by_label("DVA").fill(dva)
+    page.get_by_role("button", name="Register").click()
+    station = page.get_by_role("status", name="Station")
+    expect(station).to_contain_text("its port is closed", timeout=1000 * PATIENCE_S)
+    page.get_by_role("button", name="Open port").click()
+    expect(station).to_contain_text(f"listening on {address}")
+    expect(page.locator(".picture-age")).to_contain_text("old")
+
+    said = subprocess.run(
+        [sys.executable, client(tmp_path), dva], capture_output=True, text=True, timeout=PATIENCE_S
+    )
+    assert "the last command was answered with code 0" in said.stdout, said.stderr
+    log = page.get_by_role("table", name="Messages")
+    expect(log).to_contain_text("StopTeleOp")
+    kinds = [row.split()[0] for row in log.locator("td.payload").all_inner_texts()]
+    assert kinds[0] == "StartTeleOp"
+    assert kinds[-1] == "StopTeleOp"
+    assert kinds.count("SetTeleOp") == 20
+    latency = page.get_by_role("table", name="Latency").get_by_role("row")
+    expect(latency.filter(has_text="Request to reply")).not_to_contain_text("–")
+    expect(latency.filter(has_text="Client to robot")).to_contain_text("–")  # no clock is shared
+
+    page.get_by_role("button", name="Take manual control").click()
+    expect(page.get_by_text("busy: held by")).to_be_visible()  # the client has gone with it
+    page.get_by_role("button", name="Switch off").click()
+    expect(station).to_contain_text("It is off")
+    assert faults(page) == []
+    page.close()
+    robot.send(signal.SIGINT)
+    assert robot.ends() == 0
+
+
+def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_meanwhile(
+    tmp_path: Path, visit, programs: Programs
+) -> None:
+    dva = a_dva(programs)
+    robot, page, _ = a_robot(programs, visit, "pibot", "--dva", dva, *QUICK)
+    robot.wait_to_say("registered at", "listening on")
+    expect(page.get_by_role("list", name="State")).to_contain_text("Idle")
+    page.get_by_role("button", name="Take manual control").click()
+    expect(page.get_by_role("status", name="Mode")).to_contain_text("Manual")
+    page.keyboard.down("ArrowUp")
+    expect(page.get_by_role("region", name="Side view")).to_contain_text("100 % PWM")
+    page.keyboard.up("ArrowUp")
+
+    other = subprocess.Popen([sys.executable, client(tmp_path), dva], stdout=subprocess.PIPE)
+    log = page.get_by_role("table", name="Messages")
+    expect(log).to_contain_text("busy: driven by hand", timeout=1000 * PATIENCE_S)
+    page.get_by_role("button", name="Emergency stop").click()
+    expect(page.get_by_role("status", name="Reason")).to_contain_text("by its own button")
+    said, _ = other.communicate(timeout=2 * PATIENCE_S)
+    assert b"answered with code 0" in said
+
+
+def test_a_dva_that_is_not_there_is_told_and_the_robot_stays_off(visit, programs) -> None:
+    nobody = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
+    _, page, _ = a_robot(programs, visit, "--set", "request.timeout_s=0.5")
+    page.get_by_label("DVA").fill("nowhere")
+    page.get_by_role("button", name="Register").click()
+    expect(page.get_by_text("should be HOST:PORT").first).to_be_visible()
+    page.get_by_label("DVA").fill(nobody)
+    page.get_by_role("button", name="Register").click()
+    told = page.get_by_role("status", name="Station")
+    expect(told).to_contain_text(f"no DVA answers at {nobody} within 1.5 s")
+    assert state(page) == "off"
+    assert [link.inner_text() for link in page.locator(".rail a").all()] == ["Map", "Robots"]
