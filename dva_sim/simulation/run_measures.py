@@ -8,15 +8,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from dva_sim.agents.population import Population, Trait
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import FAILURES, Plugins, said, stamp_of
-from dva_sim.kernel.wording import without_unit
 from dva_sim.simulation.full.scenes import trait_off, way_off
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
@@ -43,26 +41,19 @@ class RunMeasure:
         raise NotImplementedError
 
 
-class TraitOff(RunMeasure):
-    """How far the person who drives is from the median of its population in a trait.
+class CautionOff(RunMeasure):
+    """How cautious the person is who drives, beside the median of its population."""
 
-    Args:
-        trait: As the population calls it.
-    """
-
-    def __init__(self, trait: str) -> None:
-        self._trait = trait
-        word = without_unit(trait)
-        self.about = Measure(
-            f"{without_unit(trait).replace(' ', '_')}_off",
-            f"the first operator's {word} beside the population's median, in standard deviations "
-            "of its logarithm: zero on the average of all persons",
-            title=f"the person's {word}",
-        )
+    about = Measure(
+        "caution_off",
+        "the first operator's caution beside the population's median, in standard deviations of "
+        "its logarithm: zero on the average of all persons",
+        title="the person's caution",
+    )
 
     def of(self, recording: Any) -> float:
         """The same in each run of a person."""
-        return trait_off(recording.scenario, self._trait)
+        return trait_off(recording.scenario, "caution")
 
 
 class WayOff(RunMeasure):
@@ -81,15 +72,9 @@ class WayOff(RunMeasure):
         return way_off(recording.scenario, recording.seed)
 
 
-_CUT_OFF: Final = "pace"  # at the top speed of the robot: its mean is not that of its law
-_TRAITS: Final = [
-    name
-    for name, field in Population.model_fields.items()
-    if field.annotation is Trait and name != _CUT_OFF
-]
 COVARIATES: Final[dict[str, Callable[..., RunMeasure]]] = {
-    **{TraitOff(trait).about.name: partial(TraitOff, trait) for trait in _TRAITS},
-    WayOff.about.name: WayOff,
+    "caution_off": CautionOff,
+    "way_off_m": WayOff,
 }
 
 PLUGINS: Final = Plugins[RunMeasure](
