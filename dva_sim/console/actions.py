@@ -17,6 +17,7 @@ from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.room_actions import AlarmActions, RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
+from dva_sim.console.sliders import change_pattern
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import ConfigError
@@ -283,7 +284,7 @@ class Actions:
         def changed(ok: bool, text: str = "") -> None:
             said(ok, f"{label} is driven by {name} next" if ok else text)
 
-        world.change_pattern(robot, str(name), changed)
+        change_pattern(world.run, world.persons, robot, str(name), changed)
 
     def _pace(self, _: str, line: Line, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from dva_sim.agents.operator.attention import OperatorSetup
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.link import changed, read, with_link
 from dva_sim.console.real_links import TITLE
 from dva_sim.kernel.errors import ConfigError
@@ -92,3 +94,29 @@ def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
         guarded=scenario.control == "coordinated",
         topic=stage.cameras.topic,
     )
+
+
+def change_pattern(
+    run: Run,
+    persons: Sequence[PersonAgent],
+    robot: str,
+    name: str,
+    said: Callable[[bool, str], object],
+) -> None:
+    """Drive a robot by another pattern from the next drive on; a drive is stopped first."""
+    agent = run.field.robots[robot]
+
+    def change(ok: bool = True, text: str = "") -> None:
+        if agent.controller.mode is Mode.TELEOPERATION:
+            said(False, text or f"{agent.device.label} is driven: it has to be stopped first")
+            return
+        run.stage.pattern_names[robot] = name
+        agent.expect(run.stage.pattern_for(robot))
+        run.recorder.tell(run.clock.now, agent.device.label, f"is driven by {name}", "link")
+        said(True, "")
+
+    holder = next((p.robots[robot] for p in persons if robot in p.robots), None)
+    if holder is not None and holder.is_driven:
+        holder.stop("stopped", change)
+    else:
+        change()

@@ -15,29 +15,25 @@ from dva_sim.agents.observation import Cameras
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.agents.robot.controller import Mode
-from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.audited import Audited
-from dva_sim.console.decisions import about_event
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
-from dva_sim.console.logs import PERIOD, Logs
+from dva_sim.console.logs import Logs
 from dva_sim.console.phones import FIRST_SEAT, Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robot_windows import RobotWindows
 from dva_sim.console.rooms import ConsoleRooms
-from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
-from dva_sim.console.stands import why_stands
 from dva_sim.console.strangers import Strangers
+from dva_sim.console.telling import ToldWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
@@ -61,7 +57,7 @@ POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = (
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
-class ConsoleWorld:
+class ConsoleWorld(ToldWorld):
     """What runs, and what of it is told.
 
     Args:
@@ -95,6 +91,7 @@ class ConsoleWorld:
         sockets: MakeSockets | None = None,
         measured: bool = False,
     ) -> None:
+        super().__init__()
         if scenario.transport == "zeromq" and scenario.network_depth == "auto":
             # A later link may lose or delay anything: only the segments are right for all.
             scenario = scenario.model_copy(update={"network_depth": "segment"})
@@ -140,7 +137,6 @@ class ConsoleWorld:
         self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
         self.alarms = AlarmDesk(self.run)
         self.audited: Audited | None = None
-        self._events: list[Line] = []
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
         field = self.run.field
@@ -152,7 +148,6 @@ class ConsoleWorld:
         for id_tag, robot in field.robots.items():
             hears = partial(self.windows.heard, id_tag)
             self.logs.listen(robot.device.label, hears, publications=True)
-        self._newest: dict[str, Any] = {}
         self.clock.on_late = self._late
         self.hold: Callable[[str], object] = lambda _: None
 
@@ -178,31 +173,6 @@ class ConsoleWorld:
         """The robots' pictures are to be had below this URL from now on."""
         for robot in self.run.field.robots.values():
             robot.controller.camera_url = camera_url(base, robot.device.label)
-
-    def begin(self) -> None:
-        """Tell the scene, and from then on what changes."""
-        self.tell_scene()
-        self.show_scene()
-        self.clock.pulse(POSITIONS, self._tell_positions)
-        self.clock.pulse(WINDOWS, self._tell_windows)
-        self.clock.pulse(ROWS, self._tell_rows)
-        self.clock.pulse(HAZARDS, self._tell_hazards)
-        self.clock.pulse(SOON, self._tell_news)
-        self.clock.pulse(PERIOD, self._tell_logs)
-        self.clock.pulse(DEVICES, self._tell_devices)
-        self.clock.pulse(TIDY, self.recorder.tidy)
-
-    def tell_scene(self) -> None:
-        """Tell what does not change, but for where the DVA listens."""
-        run = self.run
-        scene = scene_of(
-            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
-            name=self.name,
-            seed=self.seed,
-        )
-        scene["link"] = self.sliders.line()
-        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
-        self.tell(scene)
 
     def _dva_moved(self, address: str) -> None:
         self.phones.address = address
@@ -232,14 +202,6 @@ class ConsoleWorld:
         if self.recorder.kept is not None:
             for row in rows:
                 self.recorder.kept.put("audited", plain_row(row))
-
-    def _tell_audit(self) -> None:
-        if self.audited is None:
-            return
-        keeper = self.audited.keeper
-        line = {"k": "audit", "t": self.feed.now_ms, "rows": keeper.number, "hash": keeper.head}
-        line |= {"problem": keeper.problem, "lasting": keeper.is_lasting}
-        self._tell_new(line | {"file": str(keeper.path) if keeper.is_lasting else ""}, but="t")
 
     def author(self, client: str) -> str:
         """What the person of a page is called."""
@@ -288,116 +250,12 @@ class ConsoleWorld:
         person.release(lambda *_: None)
         self.phones.retire(number, person.device)
 
-    # --- what is told ----------------------------------------------------------------------
-
-    def clock_line(self) -> Line:
-        """How time goes by."""
-        return {
-            "factor": self.clock.factor,
-            "paused": self.clock.paused,
-            "lag_s": round(self.lag.newest, 3),
-            "given_up_s": round(self.clock.given_up, 2),
-            "held_by_lag": self.lag.held,
-        }
-
-    def _tell_positions(self) -> None:
-        line = self.feed.positions()
-        line["p"] += self.strangers.positions()
-        self._tell_new(line, but="t")
-
-    def _tell_rows(self) -> None:
-        if self.strangers.come():
-            self.tell_scene()
-        self.lag.measured(time.monotonic(), self.clock.worst_lag())
-        rows: Line = {
-            "k": "rows",
-            "t": self.feed.now_ms,
-            "clock": self.clock_line(),
-            "link": self.sliders.line(),
-            "dropped": self.dropped(),
-            "server": self.dva.port.line(),
-            "robots": [*self.feed.robots(self.lag.held), *self.strangers.robots()],
-            "people": self.feed.people(),
-            "order": self.seat_lines.waiting_order(),
-        }
-        self.tell(rows)
-        self._tell_alarms(rows["robots"])
-
-    def tell_now(self) -> None:
-        """Something has changed that nobody shall wait for."""
-        self._tell_rows()
-        self._tell_seats()
-        self._tell_audit()
-
-    def _tell_windows(self) -> None:
-        def stands(robot: RobotAgent) -> str:
-            return why_stands(robot, self.clock.now, self.lag.held)
-
-        for line in self.windows.lines(self.screens.watched, stands):
-            self._tell_new(line, but="t", key=str(line["i"]))
-
-    def _tell_devices(self) -> None:
-        line = self.dva.devices(self.feed.now_ms)
-        if line is not None:
-            self.tell(line)
-
-    def _tell_logs(self) -> None:
-        for line in self.logs.batches():
-            self.tell(line)
+    # --- in somebody's hands --------------------------------------------------------------
 
     def _node_of(self, label: str) -> str | None:
         """The id of a device of the run by its label."""
         devices = self.run.stage.devices
         return next((device.id_tag for device in devices if device.label == label), None)
-
-    def _tell_hazards(self) -> None:
-        self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
-        for number, when in self.run.field.contained.items():
-            self._tell_once("contain", number, round(1000 * when))
-
-    def _tell_once(self, kind: str, number: int, when: int) -> None:
-        if self._newest.get(f"{kind} {number}") != when:
-            self._newest[f"{kind} {number}"] = when
-            self.show({"k": kind, "t": when, "n": number})
-
-    def _tell_news(self) -> None:
-        """Events, story and seats, as soon as they change; rows when a mode or holder does."""
-        self._tell_events()
-        for line in self.feed.story():
-            self.tell(line)
-        robots = self.run.field.robots.values()
-        modes = [(robot.controller.mode, robot.holder[0]) for robot in robots]
-        if self._newest.get("modes") != modes:
-            self._newest["modes"] = modes
-            self._tell_rows()
-        self._tell_seats()
-        self._tell_audit()
-
-    def _tell_events(self) -> None:
-        """Events with what was decided on them, and who decides."""
-        line = self.feed.events()
-        told = self.rooms.listener
-        self._events = line["events"] = [
-            event | about_event(told.events, told.told_at, event["number"])
-            for event in line["events"]
-        ]
-        self._tell_new(line, but="t")
-        self._tell_new(self.rooms.line(self.feed.now_ms), but="t")
-
-    def _tell_alarms(self, robots: list[Line]) -> None:
-        self._tell_new(self.alarms.look(self._events, robots, self.feed.now_ms), but="t")
-
-    def _tell_seats(self) -> None:
-        for client, line in (*self.seat_lines.lines(), *self.guards.lines()):
-            self._tell_new(line, but="t", key=client)
-
-    def _tell_new(self, line: Line, but: str, key: str = "") -> None:
-        """Tell a line unless nothing in it has changed, its time apart."""
-        said = {name: value for name, value in line.items() if name != but}
-        place = f"{line['k']} {key}"
-        if self._newest.get(place) != said:
-            self._newest[place] = said
-            self.tell(line, key)
 
     def _show_frame(self, line: Line, robot: int) -> None:
         self.show(line, robot)
@@ -411,31 +269,6 @@ class ConsoleWorld:
             self.screens.arrived(held.robot, frame)
 
         held.on_frame = on_frame
-
-    def free_seat(self, client: str) -> None:
-        """A client sits nowhere any more, and is told so."""
-        empty = {"k": "seat", "t": self.feed.now_ms, "seat": client, "phase": "free"}
-        self.tell(empty | {"order": None, "alert": "", "drives": [], "phone": None}, client)
-        self._newest.pop(f"seat {client}", None)
-
-    def change_pattern(self, robot: str, name: str, said: Callable[[bool, str], object]) -> None:
-        """Drive a robot by another pattern from the next drive on; a drive is stopped first."""
-        agent = self.run.field.robots[robot]
-
-        def change(ok: bool = True, text: str = "") -> None:
-            if agent.controller.mode is Mode.TELEOPERATION:
-                said(False, text or f"{agent.device.label} is driven: it has to be stopped first")
-                return
-            self.run.stage.pattern_names[robot] = name
-            agent.expect(self.run.stage.pattern_for(robot))
-            self.recorder.tell(self.clock.now, agent.device.label, f"is driven by {name}", "link")
-            said(True, "")
-
-        holder = next((p.robots[robot] for p in self.persons if robot in p.robots), None)
-        if holder is not None and holder.is_driven:
-            holder.stop("stopped", change)
-        else:
-            change()
 
     # --- lag -------------------------------------------------------------------------------
 

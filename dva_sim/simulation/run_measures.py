@@ -1,10 +1,13 @@
-"""Measures of the user's own: a number that a class in a file, or in a package, takes of a run."""
+"""Measures that a study names: a number that a class in a file, or in a package, takes of a run.
+
+Ours are covariates: what is known of a run beforehand, less what that is on the average.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +15,7 @@ from typing import Any, Final
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import FAILURES, Plugins, said, stamp_of
+from dva_sim.simulation.full.scenes import trait_off, way_off
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
@@ -37,10 +41,46 @@ class RunMeasure:
         raise NotImplementedError
 
 
+class CautionOff(RunMeasure):
+    """How cautious the person is who drives, beside the median of its population."""
+
+    about = Measure(
+        "caution_off",
+        "the first operator's caution beside the population's median, in standard deviations of "
+        "its logarithm: zero on the average of all persons",
+        title="the person's caution",
+    )
+
+    def of(self, recording: Any) -> float:
+        """The same in each run of a person."""
+        return trait_off(recording.scenario, "caution")
+
+
+class WayOff(RunMeasure):
+    """How much longer than usual the way is."""
+
+    about = Measure(
+        "way_off_m",
+        "planned way from the first robot's base to the first event, less its average over all "
+        "places where the event may begin; near walls a metre counts more",
+        title="length of the way",
+        low=-math.inf,
+    )
+
+    def of(self, recording: Any) -> float | None:
+        """The same in each run of a seed."""
+        return way_off(recording.scenario, recording.seed)
+
+
+COVARIATES: Final[dict[str, Callable[..., RunMeasure]]] = {
+    "caution_off": CautionOff,
+    "way_off_m": WayOff,
+}
+
 PLUGINS: Final = Plugins[RunMeasure](
     kind="measure",
     base=RunMeasure,
-    shipped={},
+    shipped=COVARIATES,
     folder="experiments/measures",
     group="dva_sim.measures",
     key="measures",

@@ -55,6 +55,7 @@ studies, 24 persons).
 """
 
 from dva_sim.statistics.bands import Band, band
+from dva_sim.statistics.control_variates import adjusted, off_zero
 from dva_sim.statistics.effect_sizes import (
     Components,
     EffectSize,
@@ -89,6 +90,7 @@ __all__ = [
     "Interval",
     "SobolIndex",
     "VarianceReduction",
+    "adjusted",
     "band",
     "components",
     "cumulative_incidence",
@@ -99,6 +101,7 @@ __all__ = [
     "holm",
     "incidence",
     "mean_interval",
+    "off_zero",
     "one_sided_test",
     "pair_correlation",
     "paired_difference",

@@ -78,6 +78,13 @@ class Planner:
         """Length of that way [m]; infinite if there is none."""
         return self._roadmap.length(_plain(start), _plain(goal))
 
+    def cost(self, start: Point, goal: Point) -> float:
+        """Length of a way before it is smoothed, a metre near a wall counting more [m].
+
+        Infinite if there is none. Of many goals of one start it is found at once.
+        """
+        return self._roadmap.cost(_plain(start), _plain(goal))
+
     def line_of_sight(self, a: Point, b: Point) -> bool:
         """Whether no wall stands between two places [m]."""
         return self._roadmap.sight.between(a, b)
@@ -163,6 +170,13 @@ class Roadmap:
         """Of the way [m]; infinite if there is none."""
         way = self.way(start, goal)
         return math.inf if way is None else float(np.hypot(*np.diff(way, axis=0).T).sum())
+
+    def cost(self, start: Point, goal: Point) -> float:
+        """Of the way, as the graph has it: the same in both directions."""
+        first, last = self._node_at(start), self._node_at(goal)
+        if first is None or last is None:
+            return math.inf
+        return float(self._field_of(first)[0][last])
 
     def _way(self, start: Point, goal: Point) -> Floats | None:
         first, last = self._node_at(start), self._node_at(goal)

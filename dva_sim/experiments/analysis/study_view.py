@@ -23,12 +23,13 @@ from dva_sim.experiments.analysis.run_grid import (
     present,
 )
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
-from dva_sim.experiments.study.parts import POINT, TUNING, Level
+from dva_sim.experiments.study.parts import POINT, TUNING, Level, multiplied
 from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.labels import brief, measure_called
-from dva_sim.statistics import Interval, band
+from dva_sim.statistics import Interval, adjusted, band, off_zero
 
 MOST_PANELS = 4
+_MOST_OFF = 5.0  # standard errors between the mean of a covariate and zero
 ROW = "row"  # name of the factor whose levels are the rows of a list
 
 
@@ -48,6 +49,7 @@ class StudyView:
             delays at which people were watched; None where nothing is known of that.
         possible: The least and the greatest value that the measure can take at all.
         averages_points: Whether the trials are points in ranges, over which means are taken.
+        covariates: What differences are adjusted for, each a product of columns.
     """
 
     part: RunGrid
@@ -60,6 +62,7 @@ class StudyView:
     outside: NDArray[np.bool_] | None = None
     possible: tuple[float, float] = (-math.inf, math.inf)
     averages_points: bool = False
+    covariates: tuple[str, ...] = ()
 
     @property
     def lines(self) -> tuple[Level, ...]:
@@ -132,9 +135,42 @@ class StudyView:
         return np.atleast_1d(self.part.where(outside, self.setting(panel, line)) > 0)
 
     def difference(self, panel: Setting, first: Level, second: Level) -> Floats:
-        """First minus second, paired by person and trial, as person means `(persons, stops)`."""
+        """First minus second, paired by person and trial, as person means `(persons, stops)`.
+
+        Where there are covariates, as values of the persons whose mean is the adjusted one.
+        """
         grid = self.values
-        return person_means(self.curve(grid, panel, first) - self.curve(grid, panel, second))
+        found = self.curve(grid, panel, first) - self.curve(grid, panel, second)
+        if not self.covariates:
+            return person_means(found)
+        beside = []
+        for covariate in self.covariates:
+            product = product_of(self.part, covariate)
+            sides = [self.curve(product, panel, line) for line in (first, second)]
+            beside.append(person_means(np.where(np.isfinite(found), sum(sides) / 2, np.nan)))
+        return adjusted(person_means(found), beside)
+
+
+def product_of(part: RunGrid, covariate: str) -> Floats:
+    """A covariate's grid: the product of its columns."""
+    return np.asarray(np.prod([part.grid(name) for name in multiplied(covariate)], axis=0))
+
+
+def covariates_of(study: Mapping[str, Any], part: RunGrid) -> tuple[list[str], list[str]]:
+    """The covariates for which the answer is adjusted, and those whose mean cannot be zero.
+
+    Nobody can prove of a column that its mean over all persons and trials is zero. One that is
+    more than five standard errors off, which happens to one in a million, is not.
+    """
+    names = list(study.get("covariates") or ())
+    off = {name: off_zero(_of_persons(part, name)) > _MOST_OFF for name in names}
+    return [n for n in names if not off[n]], [n for n in names if off[n]]
+
+
+def _of_persons(part: RunGrid, covariate: str) -> Floats:
+    """The mean over all runs of each person."""
+    by_person = np.moveaxis(product_of(part, covariate), -2, 0)
+    return person_means(by_person.reshape(1, len(by_person), -1))[:, 0]
 
 
 def factors_of(study: Mapping[str, Any]) -> list[Factor]:
@@ -276,6 +312,7 @@ def view_of(study: Mapping[str, Any], runs: Table) -> StudyView | None:
         contrast=_contrast(declared, line),
         within=within,
         averages_points=POINT in study.get("factors", {}),
+        covariates=tuple(covariates_of(study, part)[0]) if declared else (),
         smallest_effect=declared.get(f"smallest_effect_{measure.rpartition('_')[2]}")
         or declared.get("smallest_effect"),
     )

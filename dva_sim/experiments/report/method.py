@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.study.parts import POINT
-from dva_sim.kernel.wording import number
+from dva_sim.experiments.study.parts import POINT, multiplied
+from dva_sim.kernel.wording import listing, number
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
-from dva_sim.simulation.labels import measure_called
-from dva_sim.statistics import VarianceReduction, variance_reduction
+from dva_sim.simulation.labels import measure_called, measure_name
+from dva_sim.statistics import VarianceReduction, band, variance_reduction
 
 _FEW = 6  # persons: with fewer nothing can be drawn anew
 
@@ -87,11 +89,32 @@ def _usual(reading: Reading) -> list[str]:
         is_task=is_task,
         checked=CHECKED_IN_SHORT,
         alike=_alike(reading),
+        adjusted=_adjusted(reading),
         is_small=reading.persons < _FEW,
         has_points=POINT in study.get("factors", {}),
         has_reference=any(part.get("reference") for part in study.get("parts", {}).values()),
         awaits_confirmation="confirmed" in reading.runs and awaited == "confirmation",
     )
+
+
+def _adjusted(reading: Reading) -> str:
+    """What the answer is adjusted for, and what that was worth at its last level."""
+    view = reading.view
+    if view is None or view.contrast is None or not view.covariates:
+        return ""
+    plain = replace(view, covariates=())
+    ours, theirs = (
+        band(each.difference(each.panels[0], *view.contrast)[:, -1:]) for each in (view, plain)
+    )
+    ratio = float((ours.high - ours.low)[0] / (theirs.high - theirs.low)[0])
+    names = listing([" times ".join(_words(name)) for name in view.covariates])
+    if not np.isfinite(ratio) or np.array_equal(ours.mean, theirs.mean, equal_nan=True):
+        return f"{names}, but for too few persons"
+    return f"{names}; at the last level its interval is {number(ratio)} times as long as without"
+
+
+def _words(covariate: str) -> list[str]:
+    return [measure_name(name) for name in multiplied(covariate)]
 
 
 def _alike(reading: Reading) -> str:

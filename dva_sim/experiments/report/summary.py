@@ -34,6 +34,7 @@ from dva_sim.experiments.analysis.run_grid import (
 from dva_sim.experiments.analysis.sample_size import SizePlan, plans
 from dva_sim.experiments.analysis.study_view import (
     StudyView,
+    covariates_of,
     finding_of,
     keys_of,
     layout_of,
@@ -436,6 +437,11 @@ class Reading:
             found.append(f"In part {part} {told}: no contrast of this part is shown.")
         if broken := _broken(self.runs):
             found.append(f"Safety rules were broken in {broken}.")
+        for name in covariates_of(self.study, self.view.part)[1] if self.view else ():
+            found.append(
+                f"The answer is not adjusted for {name}: over these persons its mean is more than "
+                "five standard errors off zero."
+            )
         if tuning := tuning_warning(self.manifest):
             found.append(tuning)
         if self.manifest.get("versions", {}).get("dirty"):

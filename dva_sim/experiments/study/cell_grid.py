@@ -24,7 +24,7 @@ from dva_sim.experiments.study.factor_levels import (
 )
 from dva_sim.experiments.study.hashing import stable_hash
 from dva_sim.experiments.study.own_measures import names_of_own
-from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level
+from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level, multiplied
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
 from dva_sim.kernel.config_overrides import blame
@@ -34,6 +34,7 @@ from dva_sim.kernel.suggestions import listed, unknown
 from dva_sim.kernel.yaml_files import Document, KeyPath
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import AnyScenario, model_for, model_of
+from dva_sim.simulation.run_measures import COVARIATES
 
 
 def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
@@ -177,6 +178,9 @@ def refuse_unknown_measures(study: Study) -> None:
         source = _source(study, part)
         own = names_of_own(study, str(source.data.get("model", "full")))
         known = [*model_of(source).measures(), *own]
+        if measure in COVARIATES and measure not in known:
+            problem = f"{measure!r} is measured where the key 'measures' names it"
+            raise study.error(problem, path)
         if measure not in known:
             raise study.error(unknown("measure", measure, known), path)
 
@@ -196,6 +200,9 @@ def _asked_measures(study: Study) -> Iterator[tuple[KeyPath, str, str]]:
     """Where a measure is asked for, of which part, and which."""
     if study.answer is not None:
         yield ("answer", "measure"), study.answer.part, study.answer.measure
+        for number, covariate in enumerate(study.covariates):
+            for name in multiplied(covariate):
+                yield ("covariates", number), study.answer.part, name
     for name, asked in study.comparisons.items():
         yield ("comparisons", name, "measure"), asked.part, asked.measure
     if study.tuning is not None:

@@ -55,6 +55,11 @@ def says(*keys: str, not_: str = "") -> dict[str, Any]:
     }
 
 
+def multiplied(covariate: str) -> list[str]:
+    """The columns whose product a covariate is: `caution_off * way_off_m`, or one alone."""
+    return [name.strip() for name in covariate.split("*")]
+
+
 def refuse_keys_of_the_design(keys: Keys) -> Keys:
     """Persons are the study's own to choose.
 

@@ -5,6 +5,7 @@ Who finished first plays no part, so the same study stops after the same batch o
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -13,9 +14,9 @@ import numpy as np
 
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.factor_levels import factors_in_rows
-from dva_sim.experiments.study.parts import Contrast, Level, StopRule
+from dva_sim.experiments.study.parts import Contrast, Level, StopRule, multiplied
 from dva_sim.experiments.study.study import Study
-from dva_sim.statistics import Floats, band, mean_interval
+from dva_sim.statistics import Floats, adjusted, band, mean_interval
 
 _BATCH_IN_BUDGET = 2  # persons, where a budget alone ends a study
 
@@ -79,8 +80,12 @@ def _of_measure(measure: str, rows: Iterable[Row]) -> Floats:
 
 
 def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
-    """Of the paired difference at each level of `over`, all at once; the reference cancels."""
-    sides: tuple[dict[Any, float], dict[Any, float]] = ({}, {})
+    """Of the paired difference at each level of `over`, all at once; the reference cancels.
+
+    The answer's is adjusted for the covariates.
+    """
+    wanted = study.covariates if asked is study.answer else ()
+    sides: tuple[dict[Any, Row], dict[Any, Row]] = ({}, {})
     fixed = _place(study, asked)
     ranges = study.design.ranges if study.design is not None else ()
     keys = [name for name in (*study.factors, *ranges) if name != asked.factor]
@@ -91,19 +96,36 @@ def _of_contrast(study: Study, asked: Contrast, rows: Iterable[Row]) -> Floats:
         for side, level in zip(sides, asked.contrast, strict=True):
             if row[asked.factor] == level:
                 place = tuple(row.get(key) for key in keys)
-                side[place, row["person"], row["trial"]] = _number(row.get(asked.measure))
+                side[place, row["person"], row["trial"]] = row
     at = keys.index(asked.over) if asked.over is not None else None
-    means = _means(*sides, at)
-    found = band(means)
-    return np.asarray((found.high - found.low) / 2) if means.size else np.array([])
+    pairs = {run: (row, sides[1].get(run, {})) for run, row in sides[0].items()}
+    if not pairs:
+        return np.array([])
+    found = {run: _minus(asked.measure, *rows) for run, rows in pairs.items()}
+    beside = [
+        _means({run: _middle(c, *pairs[run]) + 0 * value for run, value in found.items()}, at)
+        for c in wanted
+    ]
+    means = _means(found, at)
+    seen = band(adjusted(means, beside) if beside else means)
+    return np.asarray((seen.high - seen.low) / 2)
 
 
-def _means(first: dict[Any, float], second: dict[Any, float], at: int | None) -> Floats:
-    """Mean differences `(persons, levels of over)`."""
+def _minus(measure: str, first: Row, second: Row) -> float:
+    return _number(first.get(measure)) - _number(second.get(measure))
+
+
+def _middle(covariate: str, first: Row, second: Row) -> float:
+    """What a covariate is in a pair of runs."""
+    names = multiplied(covariate)
+    return sum(math.prod(_number(row.get(name)) for name in names) for row in (first, second)) / 2
+
+
+def _means(found: Mapping[Any, float], at: int | None) -> Floats:
+    """Means `(persons, levels of over)` over the runs in which something is known."""
     pairs: dict[tuple[int, Level], list[float]] = defaultdict(list)
-    for (place, person, trial), value in first.items():
-        difference = value - second.get((place, person, trial), np.nan)
-        pairs[person, None if at is None else place[at]].append(difference)
+    for (place, person, _), value in found.items():
+        pairs[person, None if at is None else place[at]].append(value)
     persons = {who: i for i, who in enumerate(dict.fromkeys(who for who, _ in pairs))}
     levels = {level: i for i, level in enumerate(dict.fromkeys(level for _, level in pairs))}
     means = np.full((len(persons), len(levels)), np.nan)

@@ -74,7 +74,11 @@ class Study(Config):
         robustness: The answer again under other models of the persons.
         stop: When enough persons were simulated.
         budget_s: Time by the clock [s] after which no further persons are begun.
-        measures: Measures of the user's own, `mine.py:Mine`: further columns of the runs.
+        measures: Further columns of the runs: covariates of ours, such as `way_off_m`, and
+            measures of the user's own, `mine.py:Mine`.
+        covariates: Columns of the runs, or products of some, that no treatment changes and whose
+            mean over all persons and trials is zero: the answer is adjusted for what they happen
+            to be.
         record: Which episodes are kept as recordings.
         figures: Figures of one's own that its report has, such as `mine.py:Mine`.
         quick: Keys that are otherwise in the small version, which `--quick` runs.
@@ -98,6 +102,7 @@ class Study(Config):
     stop: StopRule | None = None
     budget_s: Annotated[float, Field(gt=0)] | None = None
     measures: tuple[str, ...] = ()
+    covariates: tuple[str, ...] = ()
     record: Literal["all", "worst", "sample"] | None = None
     figures: tuple[str, ...] = ()
     quick: Changes = Field(default_factory=dict)
@@ -142,7 +147,7 @@ class Study(Config):
 
     def asked(self) -> dict[str, Any]:
         """All keys that say what is run and how it is read, as JSON would hold them."""
-        unasked = () if self.measures else ("measures",)
+        unasked = [key for key in ("measures", "covariates") if not getattr(self, key)]
         return self.model_dump(mode="json", exclude={"record", "figures", *VERSIONS, *unasked})
 
     @property

@@ -159,6 +159,8 @@ def of_claims(study: Study) -> Iterator[Problem]:
     """What was declared about factors and levels that the study does not have."""
     yield from of_answer(study)
     yield from of_robustness(study)
+    if study.covariates and study.answer is None:
+        yield "the answer is adjusted for covariates; declare one", ("covariates",)
     for name, comparison in study.comparisons.items():
         yield from _faults_of_contrast(study, comparison, ("comparisons", name))
     for name in study.hypotheses:
@@ -181,6 +183,8 @@ def kept_claims(study: Study) -> Study:
         lost["answer"] = None
     if "answer" in lost or any(of_robustness(study)):
         lost["robustness"] = None
+    if "answer" in lost:
+        lost["covariates"] = ()
     lost["comparisons"] = {
         name: comparison
         for name, comparison in study.comparisons.items()

@@ -82,11 +82,7 @@ def draw_incidents(
 
 
 def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunHazard:
-    rng = streams[f"event-{number}"]
-    start = event.at_s
-    if event.latest_s is not None:
-        start = float(rng.uniform(event.at_s, event.latest_s))
-    x, y = _place(event, site, rng)
+    start, (x, y) = beginning_of(event, site, streams, number)
     hazard = make_hazard(event.kind, (x, y), start, **event.hazard)
     room = site.room_at(x, y) or ""
     detector, detected = None, start
@@ -97,6 +93,21 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunH
     return RunHazard(
         hazard.reported_as, room, start, detected, detector, hazard, event.false_alarm, hearsay
     )
+
+
+def beginning_of(
+    event: EventConfig, site: Site, streams: Streams, number: int
+) -> tuple[float, tuple[float, float]]:
+    """When [s] and where [m] an event begins.
+
+    Raises:
+        ConfigError: a room that the site does not have, or no free place.
+    """
+    rng = streams[f"event-{number}"]
+    start = event.at_s
+    if event.latest_s is not None:
+        start = float(rng.uniform(event.at_s, event.latest_s))
+    return start, _place(event, site, rng)
 
 
 def _hearsay(

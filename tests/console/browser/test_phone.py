@@ -434,6 +434,14 @@ def test_the_consoles_page_shows_the_code_to_who_may_drive(world, visits) -> Non
     expect(other.get_by_role("button", name="Phone")).to_have_count(0)
 
 
+def test_the_consoles_address_leads_to_the_phones_screens(world, visits) -> None:
+    page = visits(**SCREEN).tab()
+    page.goto(f"{world.drive}#/phone/calibration")
+    expect(page.get_by_role("heading", name="Calibration", level=1)).to_be_visible()
+    page.goto(f"{world.base}#/guard")
+    expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
+
+
 def test_who_may_drive_needs_no_second_registration(world, visits) -> None:
     hand = Hand(visits(**SCREEN), world.drive.replace("/?", "/phone?"))
     hand.go("Authentication")

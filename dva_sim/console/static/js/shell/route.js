@@ -8,7 +8,17 @@ const PAGES = [
 ];
 const MOST_AT_ONCE = 2;
 const hash = signal(location.hash);
-window.addEventListener('hashchange', () => (hash.value = location.hash));
+window.addEventListener('hashchange', () => {
+  hash.value = location.hash;
+  goElsewhere();
+});
+goElsewhere();
+
+/** The pages of phones and guards are documents of their own, and reached from here, too. */
+function goElsewhere() {
+  const found = /^#\/(phone|guard)(\/\w+)?$/.exec(location.hash);
+  if (found) location.replace(`/${found[1]}#${found[2] ?? '/main'}`);
+}
 
 const parts = computed(() => {
   const [path, query = ''] = hash.value.replace(/^#\/?/, '').split('?');
