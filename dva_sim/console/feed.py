@@ -81,6 +81,12 @@ class Feed:
         """Somebody without a place: an operator, a seat, the DVA."""
         self._number(id_tag, label, kind)
 
+    def add_other(self, id_tag: str, label: str, kind: str, more: Line) -> None:
+        """Somebody who is none of the scenario's, and may be called as one of them."""
+        number = len(self.things)
+        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
+        self.numbers[id_tag] = number
+
     # --- where everybody is ----------------------------------------------------------------
 
     def positions(self) -> Line:

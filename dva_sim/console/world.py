@@ -36,6 +36,7 @@ from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
 from dva_sim.console.stands import why_stands
+from dva_sim.console.strangers import Strangers
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
@@ -134,6 +135,7 @@ class ConsoleWorld:
             self.run, self.feed, self._persons, self.client_of, self.phones.by_client
         )
         self.guards = PlayedGuards(self.run, self.feed)
+        self.strangers = Strangers(self.run, self.feed)
         self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
         self.alarms = AlarmDesk(self.run)
         self.audited: Audited | None = None
@@ -306,9 +308,13 @@ class ConsoleWorld:
         }
 
     def _tell_positions(self) -> None:
-        self._tell_new(self.feed.positions(), but="t")
+        line = self.feed.positions()
+        line["p"] += self.strangers.positions()
+        self._tell_new(line, but="t")
 
     def _tell_rows(self) -> None:
+        if self.strangers.come():
+            self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
         rows: Line = {
             "k": "rows",
@@ -317,7 +323,7 @@ class ConsoleWorld:
             "link": self.sliders.line(),
             "dropped": self.dropped(),
             "server": self.dva.port.line(),
-            "robots": self.feed.robots(self.lag.held),
+            "robots": [*self.feed.robots(self.lag.held), *self.strangers.robots()],
             "people": self.feed.people(),
             "order": self.seat_lines.waiting_order(),
         }

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import re
 import signal
-import socket
-import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 from patience import becomes
 from programs import Program, Programs, all_gone_after
 
@@ -121,19 +120,6 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
     yield from all_gone_after(tmp_path)
 
 
-def free_port() -> int:
-    """The first of two that are free, below those that systems give out by themselves."""
-    for port in range(21_000, 30_000, 2):
-        with socket.socket() as one, socket.socket() as other:
-            try:
-                one.bind(("127.0.0.1", port))
-                other.bind(("127.0.0.1", port + 1))
-            except OSError:
-                continue
-        return port
-    raise AssertionError("no port is free")
-
-
 class Attached:
     """A console at a DVA, and what it knows."""
 
@@ -176,7 +162,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
 
     def robots() -> list[tuple[str, str]]:
         return sorted(
-            (one["label"], one["mode"]) for one in console.state()["robots"] if "x_m" in one
+            (one["label"], one.get("mode")) for one in console.state()["robots"] if "x_m" in one
         )
 
     assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
@@ -187,6 +173,10 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     assert not refused["ok"]
     assert "runs elsewhere" in refused["text"]
     assert console._ask("/api/emergency", {"robots": "all"})["text"] == "robots stop"
+
+    fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")
+    noted = console.act("event_note", event=fire, text="seen from outside")
+    assert noted["text"] == "control room has the role look; to note needs dispatch"
 
     first.process.send_signal(signal.SIGKILL)
     assert becomes(lambda: any("dva does not answer" in line for line in console.story()))
@@ -209,11 +199,16 @@ def test_a_fake_device_is_added_to_a_dva_elsewhere_and_taken_away(programs: Prog
 def test_with_keys_it_attaches_as_the_control_room_of_its_key(programs: Programs, tmp_path: Path):
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])
-    live(programs, dva, "dva", "--keys", str(keys))
+    role = "dva.control_rooms={control-room-1: dispatch}"
+    live(programs, dva, "dva", "--keys", str(keys), "--set", role)
     live(programs, dva, "world", "--keys", str(keys))
     console = Attached(programs, dva, "--keys", str(keys))
 
     assert becomes(lambda: len([r for r in console.state()["robots"] if "x_m" in r]) == 2)
+    assert becomes(lambda: console.act("room_join", name="")["text"].endswith("may dispatch"))
+    assert becomes(lambda: console.state()["events"] != [])
+    number = console.state()["events"][0]["number"]
+    assert console.act("event_note", event=number, text="seen from elsewhere")["ok"]
     assert "pretend" in console.act("fake_add", label="ghost", type="Robot")["text"]
 
 

@@ -38,6 +38,22 @@ def test_a_device_that_is_alive_and_never_answers_is_told_with_its_address(page)
     assert f"link lost: no answer at {address(page)}" in page.seat()["alert"]
 
 
+def test_a_fake_device_ends_in_a_message_and_not_in_a_hang(page):
+    """One that was added by hand, whose name breaks nothing: it is listed and never answers."""
+    assert page.ask("fake_add", label="fake/<b>robot</b>", type="Robot")["ok"]
+    listed = {one["label"]: one for one in page.ask("phone_devices")["devices"]}
+    fake = listed["fake/<b>robot</b>"]
+    assert page.ask("phone_permission", device=fake["id"], level="teleoperation")["ok"]
+    page.let(9.5)
+    told = f"fake/<b>robot</b>: link lost: no answer at {fake['address']}"
+    assert page.seat()["alert"] == told
+    done, text = page.do("start")
+    assert not done
+    assert text == "fake/<b>robot</b> was not started: gave up"
+    assert told.partition(": ")[2] in page.seat()["alert"]
+    assert page.permit()["ok"]  # and another robot can be chosen
+
+
 def test_to_start_a_dead_robot_ends_in_the_same_words(page):
     assert page.permit()["ok"]
     page.let(1.0)

@@ -64,6 +64,7 @@ class HeldRobot:
         self.phase: HeldPhase = "asking"
         self.session, self.event = 0, 0
         self._address, self._has_answered = "", False
+        self._starting: Said | None = None
         self.log: DriveLog | None = None
         self.frame: CameraFrame | None = None
         self.arrived = 0.0
@@ -229,21 +230,25 @@ class HeldRobot:
         log.taken_up = now
         self.device.recorder.drive_ordered(log)
 
-        def refused(why: str) -> None:
-            self.end("gave up")
+        self._starting = said
+
+        def refused(why: str, outcome: str = "gave up") -> None:
+            self._starting = None
+            self.end(outcome)
             said(False, f"{self.label}: {why}")
 
         def lost() -> None:
-            self.end("lost link")
-            self._unreachable()
-            attempts = self.device.attempts
-            said(False, f"{self.label}: {self._silence()} after {attempts} attempts")
+            if self._starting is said:  # else it has ended, and that is told
+                self._unreachable()
+                silence = f"{self._silence()} after {self.device.attempts} attempts"
+                refused(silence, "lost link")
 
         def waits(why: str) -> None:
             self._alert(f"{self.label} does not start yet: {why}")
 
         def begun() -> None:
             self._alert("")
+            self._starting = None
             self._begin(log)
             said(True, f"{self.label} is driven")
 
@@ -356,7 +361,10 @@ class HeldRobot:
         self._alert(f"{self.label}: {why}")
 
     def end(self, outcome: str) -> None:
-        """A drive is over, however it ended."""
+        """A drive is over, however it ended, or its start."""
+        said, self._starting = self._starting, None
+        if said is not None:
+            said(False, f"{self.label} was not started: {outcome}")
         if self._sender is not None:
             self._sender.stop()
             self._sender = None

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
+from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.seats import Answers
@@ -30,6 +31,7 @@ class AttachedActions:
             "fake_add": self._add_fake,
             "fake_remove": self._remove_fake,
             "release": lambda _, said: said(True, "released"),
+            **AttachedDecisions(system).doers,
         }
 
     def take(self, line: Line) -> None:

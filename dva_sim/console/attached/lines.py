@@ -11,13 +11,13 @@ from dva_sim.console.device_rows import link_of
 from dva_sim.console.feed import SEVERITIES
 from dva_sim.console.lag import LIMIT
 from dva_sim.console.scene import RULES, legend, site_of
+from dva_sim.console.strangers import UNKNOWN_ROBOT, row_of_stranger
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
-UNKNOWN_ROBOT: Final = {"radius_m": 0.3, "max_speed_mps": 0.5, "max_turn_rate_radps": math.pi / 6}
 AROUND: Final = 40.0  # of the first position, where no site is known [m]
 KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
 SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
@@ -101,26 +101,20 @@ def robot_row(told: ToldDevice, number: int, now: float) -> Line:
     known = status if isinstance(status, m.RobotStatus) else None
     said, since = holder if holder is not None else (None, now)
     held = said is not None and said.holder is not None
-    return {
-        "i": number,
-        "mode": known.mode if known is not None else "unknown",
-        "pattern": None,
-        "battery": None,
-        "holder": said.holder if said is not None else None,
-        "holder_label": said.label if said is not None else None,
-        "session_age_s": round(said.held_for + now - since, 1) if said and held else None,
-        "watchdog_left_s": None,
-        "stands": "",
-        "set_speed_mps": None,
-        "set_turn_rate_radps": None,
-        "queue": None,
-        "lost": None,
-        "commands_hz": None,
-        "refused": None,
-        "timeouts": None,
-        "camera": told.camera,
-        "sensors": [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors],
-    }
+    return row_of_stranger(
+        number,
+        known.mode if known is not None else "unknown",
+        holder=said.holder if said is not None else None,
+        holder_label=said.label if said is not None else None,
+        session_age_s=round(said.held_for + now - since, 1) if said and held else None,
+        camera=told.camera,
+        sensors=sensors_of(told),
+    )
+
+
+def sensors_of(told: ToldDevice) -> list[str]:
+    """What a device can measure, in words."""
+    return [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors]
 
 
 def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> Line:
@@ -149,7 +143,7 @@ def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) ->
         "holder_known": holder is not None or device.device_type != ROBOT,
         "revocable": may_revoke,
         "camera": told.camera,
-        "sensors": [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors],
+        "sensors": sensors_of(told),
     }
 
 

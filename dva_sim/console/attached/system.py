@@ -16,6 +16,7 @@ from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.told import ToldSystem
 from dva_sim.console.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.real_links import start_of_day
+from dva_sim.console.rooms import about_event
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
 from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.network.realtime import PacedClock
@@ -218,13 +219,23 @@ class AttachedSystem:
         agent, labels = self.agent, {i: t.device.label for i, t in self.told.devices.items()}
         rows = [
             lines.event_row(status, agent.told_at[number], labels, self._site, self._frame)
+            | about_event(agent, number)
             for number, status in sorted(agent.events.items())
         ]
         self._tell_new({"k": "events", "t": self.now_ms, "events": rows})
+        self._tell_new({"k": "control", "t": self.now_ms, "dispatch": self._mode(), "rooms": []})
         moments, self.recorder.timeline = self.recorder.timeline, list[Moment]()
         for time, who, what, kind in moments:
             line = {"k": "story", "t": round(1000 * time), "who": who, "what": what}
             self.tell(line | {"kind": kind})
+
+    def _mode(self) -> Line | None:
+        """Who decides, as the DVA says."""
+        status = self.agent.dispatch
+        if status is None:
+            return None
+        mode, within = status.dispatch_mode, status.decide_within
+        return {"mode": mode, "decide_within_s": within, "switched": None}
 
     def _tell_devices(self) -> None:
         if self.looked:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import zmq
+from free_ports import free_port
 from page_faults import faults
 from patience import PATIENCE_S
 from playwright.sync_api import Page, expect
@@ -271,5 +272,54 @@ def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
     expect(page.get_by_role("row", name="ghost fake")).to_be_visible()
 
     phone = visit.tab()
-    phone.goto(f"{address.partition('?')[0]}phone#authentication")
-    expect(phone.get_by_role("heading", level=1)).to_be_visible()
+    phone.goto(f"{address.partition('?')[0]}phone#/authentication")
+    phone.get_by_label("Device label").fill("phone")
+    phone.get_by_role("button", name="Register").click()
+    phone.get_by_role("button", name="Get device list").click()
+    device = phone.get_by_label("Device", exact=True)
+    ghost = device.locator("option", has_text="ghost")
+    expect(ghost).to_have_count(1)
+    device.select_option(ghost.inner_text())
+    phone.get_by_role("button", name="Get Permission Level").click()
+    expect(phone.get_by_text("Permission is held")).to_be_visible()
+    phone.evaluate("location.hash = '#/teleoperation'")
+    phone.get_by_role("button", name="Start", exact=True).click()
+    expect(phone.get_by_role("alert")).to_contain_text("ghost", timeout=SLOW)
+    expect(phone.get_by_role("button", name="Start", exact=True)).to_be_enabled()
+
+
+@pytest.fixture
+def elsewhere(programs: Programs) -> tuple[str, Program]:
+    """The address of a DVA that runs elsewhere, and its program; robots and guards know it."""
+    dva = f"127.0.0.1:{free_port()}"
+    first = programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
+    programs.start("live", "hands-on", "--only", "world", "--dva", dva, "--for", "1000")
+    return dva, first
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 360)])
+def test_an_attached_console_shows_what_messages_tell_and_the_rest_as_unknown(
+    visits, programs: Programs, elsewhere: tuple[str, Program], scheme: str, width: int
+) -> None:
+    dva, first = elsewhere
+    _, address = started(programs, "--dva", dva)
+    page = visits(width, 800, color_scheme=scheme).open(address, "devices")
+
+    robot = page.get_by_role("row", name=re.compile("robot-1"))
+    expect(robot).to_contain_text("Idle", timeout=SLOW)
+    expect(robot).to_contain_text("unknown")
+    assert faults(page) == []
+    expect(page.get_by_role("status", name="Link")).to_contain_text(f"attached to {dva}")
+    for name in ("Drive", "Network", "Robots"):
+        expect(page.get_by_role("link", name=name)).to_have_count(0)
+    page.get_by_role("link", name="Main").click()
+    expect(page.get_by_role("status", name="Server state")).to_contain_text("answers")
+    expect(page.get_by_text("is unknown here", exact=False)).to_be_visible()
+    assert faults(page) == []
+
+    first.process.kill()
+    expect(page.get_by_role("alert")).to_contain_text("does not answer", timeout=SLOW)
+    programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
+    expect(page.get_by_text("does not answer")).to_have_count(0, timeout=SLOW)
+    page.get_by_role("link", name="Devices").click()
+    expect(robot).to_contain_text("Idle", timeout=SLOW)

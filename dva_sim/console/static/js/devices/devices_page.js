@@ -1,6 +1,6 @@
 /** Who is connected, and who holds what? Devices that are not there are added here, too. */
 import { html, useState } from '../../vendor/preact.js';
-import { devices, isAttached, maySteer, rows } from '../store.js';
+import { devices, isAttached, maySteer, maySupervise, rows } from '../store.js';
 import { act } from '../net/actions.js';
 import { useTable } from '../logs/looking.js';
 import { Icon } from '../ui/icon.js';
@@ -52,7 +52,7 @@ function Row({ device }) {
     <th scope="row">${device.label}${device.fake && html` <span class="tag">fake</span>`}</th>
     <td>${device.type}</td><td>${device.id}</td><td>${device.address}</td>
     <td><${Health} device=${device} /></td>
-    <td>${device.doing ?? UNKNOWN}</td>
+    <td>${device.doing ?? (isAttached.value ? UNKNOWN : '–')}</td>
     <td class="n">${number(device.heard_s, 1)}</td><td class="n">${number(device.beats_hz, 1)}</td>
     <td class="n">${number(device.commands_hz, 1)}</td><td class="n">${number(device.refused, 0)}</td>
     <td class="n">${number(device.picture_age_s, 1)}</td>
@@ -60,7 +60,7 @@ function Row({ device }) {
     <td>${holderOf(device)}</td>
     <td>${device.level ?? (device.holder ? UNKNOWN : '–')}</td>
     <td>${endText(device)}</td>
-    <td><div class="acts">${device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value}
+    <td><div class="acts">${device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value || !maySupervise.value}
         aria-label=${`Revoke the permission for ${device.label}`} onClick=${() => act('revoke', { device: device.id })}>Revoke</button>`}
       ${device.fake && html`<button type="button" disabled=${!maySteer.value} aria-label=${`Remove ${device.label}`}
         onClick=${() => act('fake_remove', { device: device.id })}>Remove</button>`}</div></td>

@@ -41,12 +41,16 @@ export const tilts = computed(
 export const robot = computed(() => {
   const held = seat.value?.drives[0]?.i;
   const chosen = phone.value?.device ?? choices.value.device;
+  if (held === null) return { ...STRANGER, id: chosen, label: chosen };
   return robots.value.find((one) => (held === undefined ? one.id === chosen : one.i === held)) ?? null;
 });
+/** A device that the DVA knows, and that is no robot of this world: nobody draws what it sees. */
+const STRANGER = { i: -1, kind: 'robot', radius_m: 0, max_speed_mps: 0, max_turn_rate_radps: 0 };
 /** Why nothing can be stopped; empty if it can. */
 export const whyNoEmergency = computed(() => {
   if (!isKnown.value) return 'No robot yet: register first.';
-  return robot.value ? '' : 'No robot yet: choose one first.';
+  if (!robot.value) return 'No robot yet: choose one first.';
+  return robot.value.i < 0 ? 'This device is no robot of this world: nothing of it moves.' : '';
 });
 
 /** Begin, if a robot is in hand. */

@@ -21,7 +21,7 @@ export function TeleoperationScreen() {
   const held = holds.value;
   useEffect(() => {
     if (!one || !held) return undefined;
-    watch([one.i]);
+    if (one.i >= 0) watch([one.i]);
     sendCalibration();
     return () => watch([]);
   }, [one?.i, held]);
@@ -41,7 +41,7 @@ function Cockpit({ one }) {
   }, []);
   const busy = isDriving.value;
   return html`<div class="cockpit-phone">
-    <div class="surface" ...${handlers}><${CameraPicture} robot=${one} /></div>
+    <div class="surface" ...${handlers}>${one.i >= 0 && html`<${CameraPicture} robot=${one} />`}</div>
     <${Figures} one=${one} />
     <${Order} />
     <div class="below">
@@ -62,7 +62,7 @@ function Cockpit({ one }) {
  * @param {{one: import('../types.js').Thing}} props
  */
 function Figures({ one }) {
-  const drive = seat.value?.drives.find((each) => each.i === one.i);
+  const drive = seat.value?.drives.find((each) => (each.i ?? -1) === one.i);
   const [speed, turn] = drive?.command ?? [0, 0];
   const degrees = phone.value ? phone.value.radius_deg : Math.trunc((turn * 180) / Math.PI);
   const metres = phone.value ? phone.value.speed_mps : speed;

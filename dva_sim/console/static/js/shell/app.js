@@ -32,7 +32,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['network', 'Network', 'activity'],
   ['audit', 'Audit', 'square'],
 ]);
-const NOT_ATTACHED = ['robots', 'drive', 'network']; // what sends is absent where only messages are known
+const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messages tell nothing
 // What sends something is not there in a recording.
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
