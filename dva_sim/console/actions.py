@@ -129,7 +129,7 @@ class Actions:
 
     def _take(self, client: str, line: Line, said: Said) -> None:
         robots = self._robots(line)
-        number = self._seats.sit(client)
+        number = self._seats.sit(client, self._world.seat_of_order(robots))
         if number is None:
             raise Refused("all seats are taken")
         person = self._world.person(number)

@@ -38,12 +38,17 @@ class Seats:
     def __init__(self) -> None:
         self.taken: dict[str, TakenSeat] = {}
 
-    def sit(self, client: str) -> int | None:
-        """The number of the seat of a client, the lowest that is free; None: there is none."""
+    def sit(self, client: str, rather: int | None = None) -> int | None:
+        """The number of the seat of a client: its own, `rather`, or the lowest that is free.
+
+        None: there is none.
+        """
         if client in self.taken:
             return self.taken[client].number
         used = {seat.number for seat in self.taken.values()}
-        free = next((n for n in range(MOST_SEATS) if n not in used), None)
+        free = next(
+            (n for n in (rather, *range(MOST_SEATS)) if n is not None and n not in used), None
+        )
         if free is not None:
             self.taken[client] = TakenSeat(free)
         return free

@@ -239,6 +239,14 @@ class ConsoleWorld(ToldWorld):
             self._persons[place] = person
         return self._persons[number]
 
+    def seat_of_order(self, robots: Sequence[str]) -> int | None:
+        """Where nobody sits and an order waits for one of these robots: it is kept for there."""
+        for number, person in self._persons.items():
+            waits = person.order is not None and person.order.device in robots
+            if waits and not person.attended and number < FIRST_SEAT:
+                return number
+        return None
+
     def let_in(self, number: int, person: PersonAgent) -> None:
         """A phone takes part, with a seat of its own."""
         person.on_robot = self._watch_robot

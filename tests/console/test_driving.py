@@ -192,6 +192,22 @@ def test_an_order_of_the_dva_is_shown_driven_to_and_confirmed(page):
     assert page.do("start")[0]
 
 
+def test_whoever_takes_the_robot_of_an_order_that_waits_sits_where_it_waits(page):
+    """The DVA has given the order to the second seat, in which nobody sits any more."""
+    assert page.do("take", robots=[0])[0]
+    assert not page.do("take", robots=[0], client="c2")[0]
+    page.let(20.0)
+    assert page.seat()["order"]["kind"] == "fire"
+    assert page.do("release")[0]  # and declines it
+    page.let(2.0)
+    order = page.told("rows")[-1]["order"]
+    assert order["kind"] == "fire"
+
+    assert page.do("take", robots=[order["robot"]], client="c3")[0]
+    seat = [line for line in page.told("seat") if line["seat"] == "c3"][-1]
+    assert (seat["label"], seat["order"]) == ("console-2", order)
+
+
 def test_who_loses_an_order_is_told_and_may_take_the_robot_again(monkeypatch):
     page = Page(monkeypatch, dispatch__still_within_s=20)
     page.let(30.0)
