@@ -285,3 +285,29 @@ def test_who_sits_there_next_steers_without_that_phone(monkeypatch):
     assert page.do("start", client="c9")[0]
     page.let(3.0)
     assert page.robot().body.speed == pytest.approx(0.0, abs=0.01)
+
+
+def answered(monkeypatch, **robot):
+    """Times from a command to its reply [s], of a phone with the dissertation's pipeline."""
+    page = PhonePage(monkeypatch, pattern="req-rep", **robot)
+    assert page.register()["ok"]
+    assert page.permit()["ok"]
+    assert page.calibrate(pipeline="dissertation", filter=None)["ok"]
+    page.held = HeldPhone(page)
+    page.held.tilt(10.3)
+    page.let(1.0)
+    assert page.do("start")[0]
+    for n in range(30):  # what does not change is not sent again
+        page.held.tilt(8.0 + n % 2 * 4.0)
+        page.let(1.0)
+    return [trip for drive in page.world.recorder.drives for trip in drive.round_trips]
+
+
+def test_with_the_dissertations_phone_and_pibot_a_reply_takes_seconds(monkeypatch):
+    assert max(answered(monkeypatch, robot__profile="pibot", robot__processing_s=None)) > 1.0
+
+
+def test_with_the_dissertations_phone_and_the_service_robot_it_stays_below_one(monkeypatch):
+    trips = answered(monkeypatch, robot__profile="servrobot")
+    assert len(trips) > 5
+    assert max(trips) < 1.0
