@@ -5,7 +5,6 @@ A mistake in the words of a call is told in one line that says what would be rig
 
 from __future__ import annotations
 
-import gc
 import os
 import re
 import sys
@@ -171,6 +170,6 @@ def _told(problem: object, code: int) -> int:
 
 def main() -> NoReturn:
     """Entry point: `dva-sim`."""
-    # What modules define stays: to look through it for garbage takes a twelfth of loading it.
-    gc.set_threshold(20_000, 20, 20)
+    import dva_sim.kernel.rare_collection  # noqa: F401  # late: start-up
+
     sys.exit(call())

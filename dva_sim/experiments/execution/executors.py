@@ -22,6 +22,7 @@ from dva_sim.kernel.errors import ConfigError, RunsFailed
 
 P = ParamSpec("P")
 R = TypeVar("R")
+_FIRST = "dva_sim.kernel.rare_collection"  # loaded by name: only workers shall be changed by it
 _FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
@@ -120,7 +121,7 @@ class LocalProcesses(Workers):
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
         """A pool whose processes are gone when the block ends, at once if it ends in an error."""
         context = multiprocessing.get_context(_FAMILY)
-        context.set_forkserver_preload([task.__module__])
+        context.set_forkserver_preload([_FIRST, task.__module__])
         kind = ProcessPoolExecutor if task.__module__ == "__main__" else _WithoutScript
         pool = kind(min(width, self.width), context, initializer=_begin)
         self._pool = pool
