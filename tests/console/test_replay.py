@@ -9,10 +9,11 @@ import pytest
 from recordings.runs import drill, evacuation
 
 from dva_sim.console.replay.exchanges import ExchangeLog
-from dva_sim.console.replay.moments import event_at
+from dva_sim.console.replay.moments import decided_on, event_at
 from dva_sim.console.replay.player import NOBODY, Player
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.codec import decode
@@ -298,3 +299,29 @@ def test_a_window_tells_how_long_commands_were_under_way(recorded):
     line = recorded.window(drive.robot, one.time)
     assert line["one_way"]["last_ms"] == pytest.approx(1000 * (one.arrived - one.sent), abs=0.1)
     assert recorded.window(drive.robot, drive.applied[0].time - 0.01)["one_way"] is None
+
+
+def test_the_table_has_who_had_registered_by_then(recorded):
+    early, late = (recorded.devices(when)["devices"] for when in (0.0005, 80.0))
+    assert len(early) < len(late)
+    rows = {row["label"]: row for row in late}
+    assert {"robot-1", "robot-2", "guard-1", "guard-2", "operator-1"} <= rows.keys()
+    assert rows["robot-1"]["type"] == "Robot"
+    assert rows["guard-1"]["beats_hz"] == pytest.approx(0.5, abs=0.11)
+    assert 0.0 <= rows["guard-1"]["heard_s"] < 5.0
+    assert rows["robot-1"]["refused"] is None, "a recording does not hold it"
+
+
+def test_what_was_decided_is_shown_from_when_it_was():
+    facts = [
+        Fact(time=5.0, author="a", label="min_eta", action="assign", event=1),
+        Fact(time=9.0, author="b", label="Ana", role="dispatch", action="acknowledge", event=1),
+        Fact(time=12.0, author="b", label="Ana", role="dispatch", action="note", event=1, text="x"),
+        Fact(time=13.0, author="c", label="Bo", action="escalate", event=1, code=3),
+    ]
+    assert decided_on(facts, 1, 4.0)["decided"] is None
+    assert decided_on(facts, 1, 6.0)["decided"]["label"] == "min_eta"
+    assert decided_on(facts, 1, 9.0)["acknowledged"] == {"label": "Ana", "at_ms": 9000}
+    assert decided_on(facts, 1, 20.0)["note"] == "x"
+    assert decided_on(facts, 1, 20.0)["decided"]["action"] == "note", "a refusal decides nothing"
+    assert decided_on(facts, 2, 20.0)["decided"] is None

@@ -6,9 +6,12 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
+from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
+from dva_sim.protocol import messages as m
 
 GONE = 1.0  # whoever was not seen for so long has left the site [s]
 ROUNDED = 0.0005  # pages know moments to the millisecond [s]
@@ -66,6 +69,26 @@ def event_at(event: Event, now: float) -> Event | None:
         actor=event.actor if "act_assigned" in times else None,
         times=times,
     )
+
+
+def decided_on(facts: Sequence[Fact], number: int, now: float) -> dict[str, Any]:
+    """What people and the policy had decided on an event by then, where that was recorded."""
+    past = [f for f in facts if f.event == number and f.time <= now + ROUNDED and f.code == m.OK]
+    seen = next((f for f in past if f.action == "acknowledge"), None)
+    last = past[-1] if past else None
+    note = next((f.text for f in reversed(past) if f.action == "note"), None)
+    return {
+        "decisions": None,
+        "acknowledged": seen and {"label": seen.label, "at_ms": round(1000 * seen.time)},
+        "decided": last
+        and {
+            "label": last.label,
+            "action": last.action,
+            "at_ms": round(1000 * last.time),
+            "reason": last.cause,
+        },
+        "note": note,
+    }
 
 
 def _between(before: TrackPoint, after: TrackPoint, now: float) -> tuple[TrackPoint, float]:

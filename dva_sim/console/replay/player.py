@@ -56,6 +56,7 @@ class Player:
         self._offset, self._jumps, self._frames = 0.0, 0, 0
         self._watched: set[str] = set()
         self._logs: dict[str, ExchangeLog] = {}
+        self._looks_at_devices = False
         self._told: dict[str, int] = {}  # exchanges of each log that somebody looks at
         self._answers = Answers()
         self._site: TemporaryDirectory[str] | None = None
@@ -87,6 +88,7 @@ class Player:
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(FRAMES, self._show_frames)
         self.clock.pulse(LOGS, self._tell_logs)
+        self.clock.pulse(HAZARDS, self._tell_devices)
 
     def show_scene(self) -> None:
         """See `ConsoleSubject`: the site is the one in the file, whatever became of it since."""
@@ -145,6 +147,7 @@ class Player:
         self._tell_rows()
         self._tell_positions()
         self._tell_hazards()
+        self._tell_devices()
 
     def _tell_positions(self) -> None:
         if self.run is not None:
@@ -207,6 +210,10 @@ class Player:
                 self.tell(line | ({"anew": True} if anew and number == 0 else {}))
             self._told[name] = end
 
+    def _tell_devices(self) -> None:
+        if self._looks_at_devices and self.run is not None:
+            self.tell(self.run.devices(self.now))
+
     def _log(self, name: str) -> ExchangeLog:
         assert self.run is not None
         if name not in self._logs:
@@ -215,8 +222,10 @@ class Player:
             self._logs[name] = ExchangeLog(playback.recorder.traffic or (), node)
         return self._logs[name]
 
-    def _look(self, logs: Any) -> None:
+    def _look(self, logs: Any, tables: Any) -> None:
         """Pages look at these logs; those that are new to them are told from the beginning."""
+        self._looks_at_devices = isinstance(tables, list) and "devices" in tables
+        self._tell_devices()
         names = list(logs) if isinstance(logs, dict) else []
         self._told = {str(name): self._told.get(str(name), -1) for name in names}
         self._tell_logs()
@@ -229,7 +238,7 @@ class Player:
         if what == "watch":
             self._watch(line.get("robots"))
         elif what == "look":
-            self._look(line.get("logs"))
+            self._look(line.get("logs"), line.get("tables"))
         if not isinstance(number, str):
             return
         if self._answers.begin(number):

@@ -12,11 +12,13 @@ from typing import Any
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.feed import event_line
 from dva_sim.console.fields import HazardFeed
+from dva_sim.console.replay.device_table import RecordedDevices
 from dva_sim.console.replay.moments import (
     ROUNDED,
     RecordedTracks,
     captured_at,
     commands_hz,
+    decided_on,
     event_at,
     set_point,
 )
@@ -25,6 +27,7 @@ from dva_sim.console.scene import scene_of
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.recordings.reading import Opened, RecordedHazard
+from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import robot_profiles
 
 Line = dict[str, Any]
@@ -62,6 +65,7 @@ class RecordedRun:
         for drive in playback.recorder.drives:
             self._drives.setdefault(drive.robot, []).append(drive)
         self._windows: dict[str, RobotLines] = {}
+        self._devices: RecordedDevices | None = None
         self._hazards = HazardFeed(
             *(playback.site, playback.incidents, playback.surroundings, playback.contained)
         )
@@ -233,15 +237,30 @@ class RecordedRun:
             if label not in radii
         ]
 
+    def devices(self, now: float) -> Line:
+        """The table of devices."""
+        if self._devices is None:
+            self._devices = RecordedDevices(self.playback.recorder.traffic or (), DVA)
+        ids = {thing["i"]: thing["id"] for thing in self.things}
+        robots = {ids[row["i"]]: row for row in self.robots(now)}
+        doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
+        rows = self._devices.rows(now, robots, doing)
+        return {"k": "devices", "t": _ms(now), "devices": rows}
+
     def hazards(self, now: float) -> Line:
         """Where hazards are, and what they make of air and floor."""
         return self._hazards.line(_ms(now))
 
     def events(self, now: float) -> Line:
         """How the events stand."""
-        site, labels = self.playback.site, self.playback.labels
+        playback = self.playback
+        site, labels = playback.site, playback.labels
         known = (event_at(event, now) for event in self.playback.events)
-        lines = [event_line(event, site, labels) for event in known if event is not None]
+        lines = [
+            event_line(event, site, labels) | decided_on(playback.facts, event.number, now)
+            for event in known
+            if event is not None
+        ]
         return {"k": "events", "t": _ms(now), "events": lines}
 
     def story(self, now: float) -> Line:

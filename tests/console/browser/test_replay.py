@@ -173,7 +173,7 @@ def test_axe_finds_nothing_serious_and_all_fits(
     page = visits(width, 800, color_scheme=scheme).tab()
     page.goto(address("console", "--results", folder))
     choose(page, "drill.mcap")
-    for name in ("Map", "Main", "Robots", "Story", "Recordings"):
+    for name in ("Map", "Main", "Devices", "Robots", "Events", "Story", "Recordings"):
         page.get_by_role("link", name=name).click()
         expect(page.get_by_role("link", name=name)).to_have_attribute("aria-current", "page")
         assert faults(page) == []

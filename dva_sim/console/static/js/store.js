@@ -87,9 +87,9 @@ export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch',
 /** Whether it is one of the console's own, and no phone's. */
 export const isOperator = computed(() => roleIsOneOf('drive', 'dispatch', 'supervise'));
 /** Whether it is one for sending people and robots to events. */
-export const mayDispatch = computed(() => roleIsOneOf('dispatch', 'supervise'));
+export const mayDispatch = computed(() => !isPast.value && roleIsOneOf('dispatch', 'supervise'));
 /** Whether it is one for taking robots from their holders. */
-export const maySupervise = computed(() => roleIsOneOf('supervise'));
+export const maySupervise = computed(() => !isPast.value && roleIsOneOf('supervise'));
 /** @param {string[]} roles */
 const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */

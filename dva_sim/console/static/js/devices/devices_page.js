@@ -1,6 +1,6 @@
 /** Who is connected, and who holds what? Devices that are not there are added here, too. */
 import { html, useState } from '../../vendor/preact.js';
-import { devices, isAttached, maySteer, maySupervise, rows } from '../store.js';
+import { devices, isAttached, isPast, maySteer, maySupervise, rows } from '../store.js';
 import { act } from '../net/actions.js';
 import { useTable } from '../logs/looking.js';
 import { Icon } from '../ui/icon.js';
@@ -60,7 +60,7 @@ function Row({ device }) {
     <td>${holderOf(device)}</td>
     <td>${device.level ?? (device.holder ? UNKNOWN : '–')}</td>
     <td>${endText(device)}</td>
-    <td><div class="acts">${device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value || !maySupervise.value}
+    <td><div class="acts">${!isPast.value && device.holder && device.revocable !== false && html`<button type="button" disabled=${!maySteer.value || !maySupervise.value}
         aria-label=${`Revoke the permission for ${device.label}`} onClick=${() => act('revoke', { device: device.id })}>Revoke</button>`}
       ${device.fake && html`<button type="button" disabled=${!maySteer.value} aria-label=${`Remove ${device.label}`}
         onClick=${() => act('fake_remove', { device: device.id })}>Remove</button>`}</div></td>

@@ -1,6 +1,6 @@
 /** What waits for me? Alarms, events, one of them with what can be done, and how orders are given. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { connection, control, mayDispatch, maySupervise, you } from '../store.js';
+import { connection, control, isPast, mayDispatch, maySupervise, you } from '../store.js';
 import { act, ask } from '../net/actions.js';
 import { Choice, Field } from '../ui/fields.js';
 import { AlarmList } from './alarm_list.js';
@@ -19,8 +19,8 @@ export function EventsPage() {
   useEffect(keepJoining, [you.value?.client, connection.value]);
   return html`<main class="page events-page" id="main" tabindex="-1">
     <h1 class="hidden">Events</h1>
-    <div class="events-list"><${Head} /><${AlarmList} /><${EventsTable} /></div>
-    <div class="events-side"><${EventPanel} /><${Raise} /></div>
+    <div class="events-list">${!isPast.value && html`<${Head} /><${AlarmList} />`}<${EventsTable} /></div>
+    <div class="events-side"><${EventPanel} />${!isPast.value && html`<${Raise} />`}</div>
   </main>`;
 }
 

@@ -36,8 +36,10 @@ const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messag
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
   ['main', 'Main', 'list'],
+  ['devices', 'Devices', 'router'],
   ['robots', 'Robots', 'bot'],
-  ['story', 'Story', 'flag'],
+  ['events', 'Events', 'flag'],
+  ['story', 'Story', 'activity'],
 ]);
 const SHELF = /** @type {[string, string, string]} */ (['recordings', 'Recordings', 'play']);
 const BODIES = /** @type {Record<string, any>} */ ({
