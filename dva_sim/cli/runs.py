@@ -311,7 +311,7 @@ def robot(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run one simulated robot over sockets, with windows in the browser.
+    """Run one simulated robot over sockets, with its windows.
 
     It begins off: it is registered at any DVA, and its port opened, from its page.
 

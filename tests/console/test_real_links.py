@@ -54,7 +54,7 @@ def test_a_robot_is_driven_and_shown_and_no_rule_is_broken(page):
     assert page.do("emergency", robots="all", within=PATIENCE_S)[0]
     becomes(page, lambda: page.robot().controller.mode is Mode.IDLE)
     recorder = page.world.recorder
-    assert recorder.counters["messages"] > 50
+    assert recorder.messages > 50
     assert not recorder.violations
 
 
