@@ -177,7 +177,8 @@ def test_axe_finds_nothing_serious_and_all_fits(
     page.goto(address("console", "--results", folder))
     choose(page, "drill.mcap")
     for name in ("Map", "Main", "Devices", "Robots", "Events", "Story", "Recordings"):
-        page.get_by_role("link", name=name).click()
-        expect(page.get_by_role("link", name=name)).to_have_attribute("aria-current", "page")
+        link = page.get_by_role("link", name=name, exact=True)
+        link.click()
+        expect(link).to_have_attribute("aria-current", "page")
         assert faults(page) == []
         assert page.evaluate("document.documentElement.scrollWidth") <= width
