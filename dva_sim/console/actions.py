@@ -11,16 +11,16 @@ from functools import partial
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.answers import Answers, answering
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.room_actions import AlarmActions, RoomActions
-from dva_sim.console.seats import SILENT_AFTER, Answers, Seats
+from dva_sim.console.seats import SILENT_AFTER, Seats
 from dva_sim.console.sliders import change_pattern
 from dva_sim.console.tour import tour_of
 from dva_sim.console.world import ConsoleWorld
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.network.realtime import FASTEST
 
@@ -90,34 +90,19 @@ class Actions:
         elif what == "look":
             self._look(line.get("logs"), line.get("tables"))
         elif isinstance(number := line.get("id"), str):
-            self._once(number, client, str(what), line)
+            self._answers.once(number, partial(self._do, client, str(what), line), self._tell)
 
-    def _once(self, number: str, client: str, what: str, line: Line) -> None:
-        if not self._answers.begin(number):
-            known = self._answers.given[number]
-            if known is not None:
-                self._tell(known)
-            return
-        said: Said = partial(self._said, number)
+    def _do(self, client: str, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)
         if do is None:
-            said(False, f"no action {what!r}")
-            return
-        try:
-            if self._world.audited is not None:
-                said = self._world.audited.answered(what, client, line, said)
-            do(client, line, said)
-        except (Refused, ConfigError) as error:
-            said(False, str(error))
-
-    def _said(self, number: str, ok: bool, text: str, **more: Any) -> None:
-        answer = {"k": "done", "id": number, "ok": ok, "text": text, **more}
-        self._answers.end(number, answer)
-        self._tell(answer)
-        self._world.tell_now()
+            raise Refused(f"no action {what!r}")
+        if self._world.audited is not None:
+            said = self._world.audited.answered(what, client, line, said)
+        answering(partial(do, client, line), said)
 
     def _tell(self, answer: Line) -> None:
         self._world.tell({**answer, "t": self._world.feed.now_ms})
+        self._world.tell_now()
 
     # --- seats -----------------------------------------------------------------------------
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from dva_sim.console.answers import Answers
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.robot_world import RobotWorld
-from dva_sim.console.seats import Answers
-from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.errors import ConfigError
 
 Line = dict[str, Any]
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
@@ -73,31 +73,17 @@ class RobotDesk:
             if isinstance(logs, dict):
                 self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
         elif isinstance(number := line.get("id"), str):
-            self._once(number, client, str(what), line)
+            self._answers.once(number, partial(self._do, client, str(what), line), self._tell)
 
-    def _once(self, number: str, client: str, what: str, line: Line) -> None:
-        if not self._answers.begin(number):
-            known = self._answers.given[number]
-            if known is not None:
-                self._tell(known)
-            return
-        said = partial(self._said, number)
+    def _do(self, client: str, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)
-        try:
-            if do is None:
-                raise Refused(f"a robot that runs alone does not know {what!r}")
-            do(client, line, said)
-        except (Refused, DvaSimError) as error:
-            said(False, str(error))
-
-    def _said(self, number: str, ok: bool, text: str, **more: Any) -> None:
-        answer = {"k": "done", "id": number, "ok": ok, "text": text, **more}
-        self._answers.end(number, answer)
-        self._tell(answer)
-        self._world.tell_now()
+        if do is None:
+            raise Refused(f"a robot that runs alone does not know {what!r}")
+        do(client, line, said)
 
     def _tell(self, answer: Line) -> None:
         self._world.tell({**answer, "t": self._world.feed.now_ms})
+        self._world.tell_now()
 
     def _emergency(self, _: str, line: Line, said: Said) -> None:
         self._hands.stop(self._world.field.robots)

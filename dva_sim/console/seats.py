@@ -7,7 +7,6 @@ wants must come again and again while it holds on: who falls silent is stopped.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 SILENT_AFTER = 0.3  # without a word while something is held: it is let go [s]
 MOST_SEATS = 16
@@ -80,29 +79,3 @@ class Seats:
         for client in late:
             self.taken[client].holds = False
         return late
-
-
-class Answers:
-    """What was answered to actions by their id, so that one said twice is done once.
-
-    Attributes:
-        given: The answers, as lines; None while one is still to come.
-    """
-
-    MOST = 1000
-
-    def __init__(self) -> None:
-        self.given: dict[str, dict[str, Any] | None] = {}
-
-    def begin(self, number: str) -> bool:
-        """Whether an action is new."""
-        if number in self.given:
-            return False
-        self.given[number] = None
-        if len(self.given) > self.MOST:
-            del self.given[next(iter(self.given))]
-        return True
-
-    def end(self, number: str, answer: dict[str, Any]) -> None:
-        """An action has come to its end."""
-        self.given[number] = answer

@@ -6,12 +6,14 @@ import socket
 
 import pytest
 
+from dva_sim.console.answers import Answers
 from dva_sim.console.lag import GOOD_FOR, LIMIT, LagRule
 from dva_sim.console.link import changed, read
 from dva_sim.console.pipes import MOST_WAITING, LineOutbox, LinePipe
-from dva_sim.console.seats import MOST_SEATS, SILENT_AFTER, Answers, Seats
+from dva_sim.console.refusal import Refused
+from dva_sim.console.seats import MOST_SEATS, SILENT_AFTER, Seats
 from dva_sim.console.tour import FAR, LEAST, tour_of
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import build, load
@@ -53,14 +55,43 @@ def test_who_holds_on_and_says_nothing_is_told_of_once():
     assert seats.silent(20.0) == []
 
 
-def test_an_action_is_new_once_and_answers_are_forgotten_in_time():
+def test_an_action_is_done_once_and_answered_as_often_as_it_is_said():
+    answers, done, told = Answers(), [], []
+
+    def do(said):
+        done.append(1)
+        said(True, "done", more=3)
+
+    for _ in range(3):
+        answers.once("1", do, told.append)
+    assert done == [1]
+    assert told == [{"k": "done", "id": "1", "ok": True, "text": "done", "more": 3}] * 3
+
+
+def test_who_asks_again_before_there_is_an_answer_is_told_with_it():
+    answers, waiting, told = Answers(), [], []
+    answers.once("1", waiting.append, told.append)
+    answers.once("1", waiting.append, told.append)
+    assert told == []
+    (said,) = waiting
+    said(True, "at last")
+    assert [answer["text"] for answer in told] == ["at last"]
+
+
+@pytest.mark.parametrize("error", [Refused("no"), ConfigError("no"), DvaSimError("no")])
+def test_what_is_refused_is_the_answer(error):
+    def do(said):
+        raise error
+
+    answers, told = Answers(), []
+    answers.once("1", do, told.append)
+    assert told == [{"k": "done", "id": "1", "ok": False, "text": "no"}]
+
+
+def test_answers_are_forgotten_in_time():
     answers = Answers()
-    assert answers.begin("1")
-    assert not answers.begin("1")
-    answers.end("1", {"ok": True})
-    assert answers.given["1"] == {"ok": True}
-    for number in range(2, Answers.MOST + 10):
-        answers.begin(str(number))
+    for number in range(Answers.MOST + 10):
+        answers.once(str(number), lambda said: said(True, ""), lambda _: None)
     assert len(answers.given) == Answers.MOST
 
 

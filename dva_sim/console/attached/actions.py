@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
+from dva_sim.console.answers import Answers
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.refusal import Refused, Said
-from dva_sim.console.seats import Answers
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -41,27 +41,16 @@ class AttachedActions:
             tables = line.get("tables")
             self._system.looked = isinstance(tables, list) and "devices" in tables
         elif isinstance(number, str):
-            self._once(number, what, line)
+            self._answers.once(number, partial(self._do, what, line), self._tell)
 
-    def _once(self, number: str, what: str, line: Line) -> None:
-        if not self._answers.begin(number):
-            known = self._answers.given[number]
-            if known is not None:
-                self._system.tell(known)
-            return
-        said = partial(self._said, number)
+    def _do(self, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)
-        try:
-            if do is None:
-                raise Refused(NOT_HERE)
-            do(line, said)
-        except Refused as error:
-            said(False, str(error))
+        if do is None:
+            raise Refused(NOT_HERE)
+        do(line, said)
 
-    def _said(self, number: str, ok: bool, text: str, **more: Any) -> None:
-        answer = {"k": "done", "id": number, "ok": ok, "text": text, **more}
-        self._answers.end(number, answer)
-        self._system.tell(answer | {"t": self._system.now_ms})
+    def _tell(self, answer: Line) -> None:
+        self._system.tell({**answer, "t": self._system.now_ms})
 
     def _emergency(self, line: Line, said: Said) -> None:
         """Each robot is told by a connection of its own; who does not answer is named."""

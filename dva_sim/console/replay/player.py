@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from dva_sim.console.answers import Answers
+from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
-from dva_sim.console.seats import Answers
-from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import FASTEST, PacedClock
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import pack
@@ -239,27 +240,22 @@ class Player:
             self._watch(line.get("robots"))
         elif what == "look":
             self._look(line.get("logs"), line.get("tables"))
-        if not isinstance(number, str):
-            return
-        if self._answers.begin(number):
-            self._answers.end(number, self._answer(number, str(what), line))
-        if (answer := self._answers.given[number]) is not None:
-            self.tell({**answer, "t": round(1000 * self.now)})
+        if isinstance(number, str):
+            self._answers.once(number, partial(self._do, str(what), line), self._tell)
 
-    def _answer(self, number: str, what: str, line: Line) -> Line:
+    def _do(self, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)
-        ok, text = False, NOBODY
-        if do is not None:
-            try:
-                ok, text = True, do(line)
-            except (ValueError, DvaSimError) as error:
-                text = str(error)
-        return {"k": "done", "id": number, "ok": ok, "text": text}
+        if do is None:
+            raise Refused(NOBODY)
+        said(True, do(line))
+
+    def _tell(self, answer: Line) -> None:
+        self.tell({**answer, "t": round(1000 * self.now)})
 
     def _pace(self, line: Line) -> str:
         factor, paused = line.get("factor"), line.get("paused")
         if factor is not None and not SLOWEST <= factor <= FASTEST:
-            raise ValueError(f"factor should be a number from {SLOWEST:g} to {FASTEST:g}")
+            raise Refused(f"factor should be a number from {SLOWEST:g} to {FASTEST:g}")
         if paused is False and self.now >= self._duration:
             self._go_to(0.0)
         self.clock.pace(factor, paused)
@@ -278,7 +274,7 @@ class Player:
 
     def _open(self, line: Line) -> str:
         if self.shelf is None:
-            raise ValueError("there are no other recordings")
+            raise Refused("there are no other recordings")
         path = self.shelf.find(str(line.get("name")))
         self.run = RecordedRun(read_recording(path), path.name)
         self._watched.clear()

@@ -1,6 +1,6 @@
 /** The windows of one robot: what it hears, how its wheels turn, and hands on it. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { isPast, maySteer, modeOf } from '../store.js';
+import { isPast, mayDrive, modeOf } from '../store.js';
 import { stopRobots } from '../net/actions.js';
 import { watch } from '../net/sockets.js';
 import { CameraPicture } from '../drive/camera.js';
@@ -47,7 +47,7 @@ function Head({ robot }) {
     ${!isPast.value && html`<span class="soft">${left === null ? 'watchdog off' : `watchdog ${left.toFixed(1)} s`}</span>`}
     <span class="gap"></span>
     <a href="#/robots">All robots</a>
-    ${!isPast.value && html`<button type="button" class="stop-one" disabled=${!maySteer.value}
+    ${!isPast.value && html`<button type="button" class="stop-one" disabled=${!mayDrive.value}
       onClick=${() => stopRobots([robot.i])}><${Icon} name="octagon-x" />Stop ${robot.label}</button>
     <${Reasons} robot=${robot} />`}
   </header>`;
