@@ -146,14 +146,14 @@ def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> FloorPartition:
 
 def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
     """Connected parts of the floor within each block of a lattice."""
-    from scipy import ndimage
+    from dva_sim.worlds.scipy_parts import label  # late: start-up
 
     labels = np.full(floor.shape, NOWHERE, np.int16)
     found = 0
     rows, columns = (_cuts(length, resolution) for length in floor.shape)
     for top, bottom in itertools.pairwise(rows):
         for left, right in itertools.pairwise(columns):
-            part, count = ndimage.label(floor[top:bottom, left:right])
+            part, count = label(floor[top:bottom, left:right])
             labels[top:bottom, left:right][part > 0] = part[part > 0] + (found - 1)
             found += count
     return labels

@@ -85,10 +85,10 @@ class OccupancyGrid:
         Outside of the grid counts as not free. Measured to the near edge of that cell,
         exactly so along the axes.
         """
-        from scipy import ndimage
+        from dva_sim.worlds.scipy_parts import distance_transform_edt  # late: start-up
 
         free = np.pad(self.cells == FREE, 1)
-        distance = ndimage.distance_transform_edt(free)[1:-1, 1:-1] - 0.5
+        distance = distance_transform_edt(free)[1:-1, 1:-1] - 0.5
         room: NDArray[np.float64] = np.maximum(distance, 0) * self.resolution
         return room
 
@@ -98,9 +98,9 @@ class OccupancyGrid:
 
     def reachable(self, clearance: float) -> NDArray[np.bool_]:
         """The largest connected part of the cells with at least `clearance` [m] of room."""
-        from scipy import ndimage
+        from dva_sim.worlds.scipy_parts import label  # late: start-up
 
-        labels, count = ndimage.label((self.clearance >= clearance) & (self.cells == FREE))
+        labels, count = label((self.clearance >= clearance) & (self.cells == FREE))
         if not count:
             return np.zeros(self.cells.shape, bool)
         sizes = np.bincount(labels.ravel())
@@ -110,9 +110,9 @@ class OccupancyGrid:
 
     def floor(self, clearance: float) -> NDArray[np.bool_]:
         """The connected free cells around `reachable`, up to the walls."""
-        from scipy import ndimage
+        from dva_sim.worlds.scipy_parts import label  # late: start-up
 
-        labels, _ = ndimage.label(self.cells == FREE)
+        labels, _ = label(self.cells == FREE)
         rows, columns = np.nonzero(self.reachable(clearance))
         if not len(rows):
             return np.zeros(self.cells.shape, bool)

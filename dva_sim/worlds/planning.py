@@ -150,7 +150,7 @@ class Roadmap:
 
     def _connect(self) -> object:
         """Eight neighbours, where their free discs overlap: then nothing is between them."""
-        from scipy.sparse import csr_array
+        from dva_sim.worlds.scipy_parts import csr_array  # late: start-up
 
         number = np.arange(self._room.size).reshape(self._room.shape)
         free = self._room >= self._clearance
@@ -193,7 +193,7 @@ class Roadmap:
 
     def _field(self, goal: int) -> tuple[Floats, NDArray[np.int32]]:
         """Cost from every node to `goal`, and each node's next one on the way there."""
-        from scipy.sparse.csgraph import dijkstra
+        from dva_sim.worlds.scipy_parts import dijkstra  # late: start-up
 
         costs, towards = dijkstra(
             self._graph, directed=False, indices=goal, return_predecessors=True
