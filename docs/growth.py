@@ -25,7 +25,7 @@ from typing import Any
 
 SIZES: dict[str, tuple[int, ...]] = {
     "robots": (1, 10, 100, 1000),
-    "guards": (1, 10, 100, 200),
+    "guards": (1, 10, 100, 300),
     "bystanders": (1, 10, 100, 300),
     "devices": (100, 1_000, 10_000),
     "rows": (100, 1_000, 10_000, 100_000),

@@ -12,12 +12,13 @@ import argparse
 import hashlib
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+
+from other_version import end_with_signals, output, version
 
 import dva_sim
 from dva_sim.experiments.execution.scheduling import run_job
@@ -67,19 +68,13 @@ def told_by(root):
     """The lines that the version in a folder prints."""
     environment = os.environ | {"PYTHONPATH": str(root), "PYTHONHASHSEED": "0"}
     program = [sys.executable, str(root / "tests/same_bytes.py")]
-    return subprocess.check_output(program, env=environment, text=True, cwd=root).splitlines()
+    return output(program, env=environment, cwd=root).splitlines()
 
 
 def compare(commit):
     """Tell every line that differs; the exit code."""
-    with tempfile.TemporaryDirectory() as folder:
-        other = Path(folder) / "other"
-        git = ["git", "-C", str(ROOT), "worktree"]
-        subprocess.check_call([*git, "add", "--quiet", "--detach", str(other), commit])
-        try:
-            theirs, ours = told_by(other), told_by(ROOT)
-        finally:
-            subprocess.check_call([*git, "remove", "--force", str(other)])
+    with version(commit) as other:
+        theirs, ours = told_by(other), told_by(ROOT)
     different = [line for line in theirs if line not in ours]
     for line in different:
         print(f"not the same as in {commit}: {line.split(':')[0]}")
@@ -91,6 +86,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--against", metavar="COMMIT")
     asked = parser.parse_args()
+    end_with_signals()
     if asked.against:
         sys.exit(compare(asked.against))
     for line in digests():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ SNAP = 1.5  # how far to look for a planning cell around a start or goal [m]
 ROUNDS = 20  # of smoothing
 SPARE = 0.30  # on top of the clearance: so near to a wall may a rounded corner get [m]
 KEPT_FIELDS, KEPT_PATHS, KEPT_MAPS = 256, 2048, 4
+KEPT_NODES = 2**24  # of all kept fields together, 12 bytes each
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -131,7 +132,8 @@ class Roadmap:
         self.around = lru_cache(KEPT_MAPS)(self._around)
         self.way = lru_cache(KEPT_PATHS)(self._way)
         self.length = lru_cache(KEPT_PATHS)(self._length)
-        self._field_of = lru_cache(KEPT_FIELDS)(self._field)
+        kept = min(KEPT_FIELDS, max(1, KEPT_NODES // self._room.size))
+        self._field_of = lru_cache(kept)(self._field)
 
     def _around(self, discs: tuple[Disc, ...]) -> Roadmap:
         """The same floor with some things standing on it."""
@@ -148,7 +150,7 @@ class Roadmap:
             np.minimum(here, np.maximum(gaps, 0.0), out=here)
         return Roadmap(self._grid, self._clearance, self.sight, room)
 
-    def _connect(self) -> object:
+    def _connect(self) -> Any:
         """Eight neighbours, where their free discs overlap: then nothing is between them."""
         from dva_sim.worlds.scipy_parts import csr_array  # late: start-up
 
@@ -164,7 +166,7 @@ class Roadmap:
             pairs.append(np.stack([number[here][joined], number[there][joined]]))
             costs.append((length * price)[joined])
         (a, b), cost = np.concatenate(pairs, axis=1), np.concatenate(costs)
-        return csr_array((cost, (a, b)), shape=(free.size, free.size))
+        return _both_ways(csr_array((cost, (a, b)), shape=(free.size, free.size)))
 
     def _length(self, start: Point, goal: Point) -> float:
         """Of the way [m]; infinite if there is none."""
@@ -195,9 +197,7 @@ class Roadmap:
         """Cost from every node to `goal`, and each node's next one on the way there."""
         from dva_sim.worlds.scipy_parts import dijkstra  # late: start-up
 
-        costs, towards = dijkstra(
-            self._graph, directed=False, indices=goal, return_predecessors=True
-        )
+        costs, towards = dijkstra(self._graph, indices=goal, return_predecessors=True)
         return costs, towards
 
     def _node_at(self, point: Point) -> int | None:
@@ -263,6 +263,25 @@ class Roadmap:
             good = new >= np.minimum(0.9 * room[these], self._clearance + SPARE)
             points[these[good]] = moved[good]
         return points
+
+
+def _both_ways(graph: Any) -> Any:
+    """A graph whose edges are given in one direction each, with both.
+
+    Once for all searches, each of which would turn the graph around again otherwise. Edges of a
+    node keep the order in which an undirected search looks at them, which decides between ways
+    of the same cost: those that are given before those that are turned around.
+    """
+    from scipy.sparse import csr_array
+
+    back = graph.T.tocsr()
+    sizes = np.diff(graph.indptr), np.diff(back.indptr)
+    rows = [np.repeat(np.arange(graph.shape[0]), size) for size in sizes]
+    order = np.argsort(np.concatenate(rows), kind="stable")
+    to = np.concatenate([graph.indices, back.indices])[order].astype(np.int32)
+    starts = np.r_[0, np.cumsum(sizes[0] + sizes[1])].astype(np.int32)
+    costs = np.concatenate([graph.data, back.data])[order]
+    return csr_array((costs, to, starts), shape=graph.shape)
 
 
 def _price(room: Floats) -> Floats:

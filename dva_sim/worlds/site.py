@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -178,6 +178,12 @@ class Site(FloorPlan):
         x, y = self.grid.to_xy(cell // columns + jitter[0], cell % columns + jitter[1]).tolist()
         return x, y
 
+    def free_middles(self, clearance: float) -> Floats:
+        """Middles `(n, 2)` [m] of all cells that `sample_free` chooses from."""
+        columns = self.grid.cells.shape[1]
+        cells = self.kept((clearance, None), lambda: self._free_cells(clearance, None))
+        return self.grid.to_xy(cells // columns + 0.5, cells % columns + 0.5)
+
     def _free_cells(self, clearance: float, room: str | None) -> NDArray[np.int64]:
         """Flat indices of the cells that `sample_free` chooses from."""
         grid = self.grid
@@ -211,11 +217,15 @@ def _side(a: Floats, b: Floats) -> frozenset[tuple[float, ...]]:
 # A bare map does not say where on earth it is: the campus in Monte de Caparica.
 DEFAULT_FRAME = GeoFrame(38.6612, -9.2058)
 DESKS = 2  # operator desks on a bare map
-BASE_SPACING = 1.5  # between the bases placed on a bare map [m]
+BASE_SPACING = 1.5  # between places that are not drawn [m]
+PASSED_BY = 0.5  # radius that must fit at them on a plan: more than the doors have, mostly [m]
+AT_RANDOM = 100  # tries, before what is left is looked at cell by cell
 DETECTOR_SPACING = {"smoke": 8.0, "gas": 10.0, "water": 11.0}  # lattice on a bare map [m]
 
 
-def map_site(path: str | Path, seed: int, robots: int, guards: int) -> Site:
+def map_site(
+    path: str | Path, seed: int, robots: int, guards: int, radius: float = FOOTPRINT
+) -> Site:
     """A bare ROS map as a site: bases and posts placed by `seed` on known, reachable floor.
 
     The walls are the border of the largest area that a robot can reach.
@@ -225,21 +235,49 @@ def map_site(path: str | Path, seed: int, robots: int, guards: int) -> Site:
         seed: Chooses the places; robot 1 stands at the same place however many there are.
         robots: Number of robot bases.
         guards: Number of guard posts.
+        radius: Of the largest robot [m].
 
     Raises:
-        ConfigError: the map is missing or not valid, or no robot fits anywhere.
+        ConfigError: the map is missing or not valid, or has no room for so many.
     """
-    return _map_site(resources.find(str(path), "worlds").resolve(), seed, robots, guards)
+    file = resources.find(str(path), "worlds").resolve()
+    return _map_site(file, seed, robots, guards, max(radius, FOOTPRINT))
 
 
 @lru_cache(maxsize=64)
-def _map_site(path: Path, seed: int, robots: int, guards: int) -> Site:
-    bare, streams = _bare_map(path), Streams(seed)
-    bases = _scatter(bare, streams, "robot-base", robots, FOOTPRINT)
-    posts = _scatter(bare, streams, "guard-post", guards, FOOTPRINT)
-    desks = _scatter(bare, streams, "operator-desk", DESKS, FOOTPRINT)
-    # The copy shares the grid and the cache of free cells: they depend on the map alone.
-    return replace(bare, robot_bases=bases, guard_posts=posts, operator_desks=desks)
+def _map_site(path: Path, seed: int, robots: int, guards: int, radius: float) -> Site:
+    bare = _bare_map(path)
+    desks = _scatter(bare, Streams(seed), "operator-desk", DESKS, FOOTPRINT)
+    return replace(_settled(bare, seed, robots, guards, radius), operator_desks=desks)
+
+
+def with_places(site: Site, seed: int, robots: int, guards: int, radius: float = FOOTPRINT) -> Site:
+    """A site with a base for each robot and a post for each guard, however few are drawn.
+
+    Args:
+        site: Where.
+        seed: Chooses the places that are not drawn; who stands where does not depend on how
+            many more there are of the same kind.
+        robots: Number of robots.
+        guards: Number of guards.
+        radius: Of the largest robot [m].
+
+    Raises:
+        ConfigError: not so many fit; the message tells how many do.
+    """
+    if robots <= len(site.robot_bases) and guards <= len(site.guard_posts):
+        return site
+    return _settled(site, seed, robots, guards, max(radius, PASSED_BY))
+
+
+@lru_cache(maxsize=64)
+def _settled(site: Site, seed: int, robots: int, guards: int, radius: float) -> Site:
+    streams, bases, posts = Streams(seed), site.robot_bases, site.guard_posts
+    bases += _scatter(site, streams, "robot-base", robots, radius, bases, posts)
+    person = min(radius, PASSED_BY)
+    posts += _scatter(site, streams, "guard-post", guards, person, posts, bases)
+    # The copy shares the grid and the cache of free cells: they depend on the plan alone.
+    return replace(site, robot_bases=bases, guard_posts=posts)
 
 
 @lru_cache(maxsize=4)
@@ -262,20 +300,82 @@ def _bare_map(path: Path) -> Site:
 
 
 def _scatter(
-    site: Site, streams: Streams, what: str, count: int, radius: float
+    site: Site,
+    streams: Streams,
+    what: str,
+    count: int,
+    radius: float,
+    drawn: Sequence[Pose] = (),
+    others: Sequence[Pose] = (),
 ) -> tuple[Pose, ...]:
-    """Places apart from each other; each has a stream of its own."""
-    places: list[Pose] = []
-    for number in range(1, count + 1):
+    """So many more places than are drawn, apart from all there are; each has its own stream.
+
+    Raises:
+        ConfigError: not so many fit.
+    """
+    apart = max(BASE_SPACING, 2.5 * radius)
+    places = _Places(site, radius + 2 * site.grid.resolution, apart, (*drawn, *others))
+    found: list[Pose] = []
+    for number in range(len(drawn) + 1, count + 1):
         rng = streams.fresh(f"site/{what}-{number}")
-        for _ in range(100):
-            x, y = site.sample_free(rng, radius + 2 * site.grid.resolution)
-            if all(np.hypot(x - p.x, y - p.y) >= BASE_SPACING for p in places):
-                break
-        else:
-            raise ConfigError(f"map {site.name!r} has no room for {count} {what}s")
-        places.append(Pose(x, y, float(rng.uniform(-np.pi, np.pi))))
-    return tuple(places)
+        place = places.draw(rng)
+        if place is None:
+            kind, fit = what.partition("-")[0], number - 1
+            raise ConfigError(
+                f"site {site.name!r} has room for {fit} {kind}{'s' * (fit != 1)}, "
+                f"the scenario has {count}"
+            )
+        found.append(Pose(*place, float(rng.uniform(-np.pi, np.pi))))
+    return tuple(found)
+
+
+class _Places:
+    """Free places apart from each other, until none is left.
+
+    Args:
+        site: Where.
+        clearance: Radius that must fit at each [m].
+        apart: The least distance between two [m].
+        taken: Places that are taken already.
+    """
+
+    def __init__(self, site: Site, clearance: float, apart: float, taken: Iterable[Pose]) -> None:
+        self._site, self._clearance, self._apart = site, clearance, apart
+        self._taken = np.array([(pose.x, pose.y) for pose in taken]).reshape(-1, 2)
+        self._left: Floats | None = None  # middles `(n, 2)` of free cells, once they are few
+
+    def draw(self, rng: np.random.Generator) -> tuple[float, float] | None:
+        """One more place [m], which is taken then; None if there is none."""
+        place = self._at_random(rng) if self._left is None else None
+        if place is None:
+            place = self._of_those_left(rng)
+        if place is not None:
+            self._taken = np.vstack([self._taken, place])
+            if self._left is not None:
+                self._left = self._left[self._are_free(self._left, place)]
+        return place
+
+    def _at_random(self, rng: np.random.Generator) -> tuple[float, float] | None:
+        for _ in range(AT_RANDOM):
+            place = self._site.sample_free(rng, self._clearance)
+            if self._are_free(self._taken, place).all():
+                return place
+        return None
+
+    def _of_those_left(self, rng: np.random.Generator) -> tuple[float, float] | None:
+        if self._left is None:
+            self._left = self._site.free_middles(self._clearance)
+            for place in self._taken.tolist():
+                self._left = self._left[self._are_free(self._left, place)]
+        if not len(self._left):
+            return None
+        x, y = self._left[rng.integers(len(self._left))].tolist()
+        return x, y
+
+    def _are_free(self, points: Floats, place: Sequence[float]) -> NDArray[np.bool_]:
+        """Which points `(n, 2)` are far enough from a place [m]."""
+        free: NDArray[np.bool_] = np.hypot(*(points - place).T) >= self._apart
+        return free
 
 
 def _lattice(grid: OccupancyGrid, reached: NDArray[np.bool_]) -> tuple[Detector, ...]:

@@ -19,7 +19,6 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ sys.path.insert(1, str(ROOT / "tests"))
 from benchmarks import runner, startup  # noqa: E402
 from benchmarks.cases import CASES, RATIOS  # noqa: E402
 from benchmarks.counting import FOLDER, Callgrind, Nothing, available, pinned  # noqa: E402
+from other_version import end_with_signals, output, version  # noqa: E402
 
 REPEATS = 5
 GIT = ["git", "-C", str(ROOT)]
@@ -41,18 +41,6 @@ def parent() -> str:
     return "HEAD" if changed else "HEAD~1"
 
 
-@contextmanager
-def version(commit: str) -> Iterator[Path]:
-    """A commit as a folder."""
-    with tempfile.TemporaryDirectory() as folder:
-        other = Path(folder) / "other"
-        subprocess.check_call([*GIT, "worktree", "add", "--quiet", "--detach", str(other), commit])
-        try:
-            yield other
-        finally:
-            subprocess.check_call([*GIT, "worktree", "remove", "--force", str(other)])
-
-
 def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Figures:
     """What cases cost in the version of a folder."""
     with tempfile.TemporaryDirectory() as folder:
@@ -61,7 +49,7 @@ def figures(root: Path, names: Sequence[str], counter: str, repeats: int) -> Fig
         under = Callgrind.words(Path(folder)) if counter == Callgrind.name else []
         program = [sys.executable, runner.__file__, counter, str(repeats), str(into), *names]
         environment = pinned() | {"PYTHONPATH": str(root), FOLDER: folder}
-        subprocess.run([*under, *program], env=environment, cwd=root, check=True)
+        output([*under, *program], env=environment, cwd=root)
         return {told["case"]: told for told in runner.read(into)}
 
 
@@ -141,7 +129,7 @@ def echo(root: Path) -> str:
     """A command over sockets beside a bare echo; by the clock, since both wait for each other."""
     program = [sys.executable, str(ROOT / "tests/benchmarks/echo.py"), "compare"]
     environment = pinned() | {"PYTHONPATH": f"{root}{os.pathsep}{ROOT / 'tests'}"}
-    return subprocess.check_output(program, env=environment, text=True, cwd=root).strip()
+    return output(program, env=environment, cwd=root).strip()
 
 
 def main() -> int:
@@ -150,6 +138,7 @@ def main() -> int:
     parser.add_argument("--against", metavar="COMMIT", default="")
     parser.add_argument("--only", metavar="WORD", default="")
     asked = parser.parse_args()
+    end_with_signals()
     counter, why = available()
     against = asked.against or parent()
     print(f"Python {platform.python_version()} ({platform.python_compiler()}), {sys.executable}")

@@ -16,6 +16,7 @@ from typing import Any
 
 import synthetic_study as synthetic
 from benchmarks.counting import FOLDER, Callgrind, Perf
+from other_version import RUNNING
 
 NOBODY = "no-such-name"
 COMMANDS = {
@@ -56,7 +57,8 @@ def started(words: list[str], environment: Mapping[str, str]) -> tuple[int, floa
         RuntimeError: it crashed.
     """
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
-    with subprocess.Popen(words, env=environment, **pipes) as process:
+    with subprocess.Popen(words, env=environment, start_new_session=True, **pipes) as process:
+        RUNNING.append(process)
         assert process.stderr is not None
         said = process.stderr.read().decode()
         _, status, used = os.wait4(process.pid, 0)

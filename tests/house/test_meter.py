@@ -2,12 +2,18 @@
 
 import os
 import platform
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from benchmarks import cases, counting, meter, runner, startup
 from typer.main import get_command
 
 from dva_sim.cli import app
+
+TESTS = Path(__file__).parents[1]
 
 
 @pytest.mark.skipif(platform.system() != "Linux", reason="perf_event_open is Linux's")
@@ -70,3 +76,28 @@ def test_a_ratio_is_told_where_both_its_cases_were_measured():
     }
     assert list(meter.ratios(found)) == [f"{next(iter(meter.RATIOS))}: 3.00"]
     assert list(meter.ratios({above: found[above]})) == []
+
+
+ASKING = """
+import subprocess, sys
+from other_version import end_with_signals, output, version
+
+end_with_signals()
+with version("HEAD") as folder:
+    assert (folder / "Makefile").exists()
+    output([sys.executable, "-c", "import sys, time; print(1, file=sys.stderr); time.sleep(600)"])
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_meter_that_is_stopped_leaves_no_folder_and_no_program_behind(tmp_path, number):
+    environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONPATH": str(TESTS)}
+    words = [sys.executable, "-c", ASKING]
+    with subprocess.Popen(words, env=environment, stderr=subprocess.PIPE, text=True) as meter:
+        assert meter.stderr is not None
+        assert meter.stderr.readline() == "1\n"  # what it asked for runs
+        assert len(list(tmp_path.iterdir())) == 1
+        meter.send_signal(number)
+        assert meter.stderr.read() == ""  # which ends when nobody holds the pipe any more
+    assert meter.returncode == 128 + number
+    assert not list(tmp_path.iterdir())

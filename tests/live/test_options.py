@@ -25,7 +25,7 @@ from dva_sim.live import supervisor
         (["--dva", "127.0.0.1:65535"], "should be HOST:PORT"),
         (["--for", "-1"], "--for '-1' should be a number above 0"),
         (["--for", "nan"], "--for 'nan' should be a number above 0"),
-        (["--set", "robot.count=9"], "--set robot.count=9: site 'caparica' has 3 robot bases"),
+        (["--set", "robot.count=900"], "--set robot.count=900: site 'caparica' has room for 2"),
         (["--record", "/dev/null"], "recording should end in .mcap, not 'null'; a folder for"),
         (["--record", "run.mcp"], "recording should end in .mcap, not 'run.mcp'; a folder for"),
         (["--record", "no/run.mcap"], "folder 'no' for the recording does not exist"),

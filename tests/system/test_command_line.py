@@ -128,7 +128,7 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
         (["run", "req-rep-vs-pub-sub", "--set", "link.trace_up=no.up"], "no.up: trace cannot be"),
         (["run", "req-rep-vs-pub-sub", "--set", "link.trace_up=bad.up"], "bad.up:2:1: should be"),
         (["run", "req-rep-vs-pub-sub", "--set", "site.map=no.yaml"], "'no.yaml' not found"),
-        (["run", "req-rep-vs-pub-sub", "--set", "robot.count=9"], "has 3 robot bases"),
+        (["run", "req-rep-vs-pub-sub", "--set", "robot.count=900"], "has room for 2"),
         (["run", "req-rep-vs-pub-sub", "--set", "watchdog"], "should be key=value"),
         (["report", "."], "holds no finished results"),
         (["episode", "drive-to-event", "--video", "film.avi"], "should end in .gif or .mp4"),

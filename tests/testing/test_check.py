@@ -106,7 +106,7 @@ def test_the_place_tells_the_kind_where_the_keys_do_not(check, here):
         ("robot:\n  count: 1\n  profile: tank\n", "3:3: robot.profile 'tank' is unknown; known:"),
         ("horizon_s: 5\noperator:\n  population: crowd\n", "3:3: operator.population 'crowd'"),
         ("events:\n- {kind: fire, room: Attic}\n", "2:16: site 'caparica' has no room 'Attic'"),
-        ("horizon_s: 5\nrobot: {count: 9}\n", "2:9: site 'caparica' has 3 robot bases"),
+        ("horizon_s: 5\nrobot: {count: 900}\n", "2:9: site 'caparica' has room for 2"),
         ("link:\n  trace_up: no.up\n", "2:3: 'no.up': trace cannot be read"),
         ("site:\n  map: no.yaml\n", "2:3: site 'no.yaml' not found"),
         ("horizon_s: 5\nsite: {name: campus, map: m.yaml}\n", "2:1: site: site.map and site.name"),
@@ -145,10 +145,10 @@ def test_a_mistake_is_told_in_one_line_at_its_place(check, text, said):
 
 
 def test_a_study_is_checked_with_its_scenarios(check):
-    study = "question: what?\nfactors:\n  robot.count: [1, 9]\nparts: {a: {scenario: s.yaml}}\n"
+    study = "question: what?\nfactors:\n  robot.count: [1, 900]\nparts: {a: {scenario: s.yaml}}\n"
     code, lines = check("study.yaml", study__yaml=study, s__yaml="horizon_s: 5\n")
     assert code == 1
-    assert lines[0].startswith("study.yaml:3:3: site 'caparica' has 3 robot bases")
+    assert lines[0].startswith("study.yaml:3:3: site 'caparica' has room for 2")
     code, lines = check("study.yaml", s__yaml="horizon_s: 5\nlink: {los: 1}\n")
     assert code == 1
     assert lines[0].startswith("s.yaml:2:8: unknown key 'link.los'")

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.line_of_sight import Sight
 from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
 from dva_sim.worlds.planning import Disc, Planner
-from dva_sim.worlds.site import DEFAULT_FRAME, Site, load_site, map_site
+from dva_sim.worlds.site import DEFAULT_FRAME, FOOTPRINT, Site, load_site, map_site
 
 MAPS = Path(__file__).parents[1] / "data"
 
@@ -167,3 +169,17 @@ def test_who_stands_on_the_line_of_a_wall_up_to_rounding_is_behind_it_for_nobody
         assert sight.from_point(on_line, np.array([[13.1, side]])).all()
     assert not sight.between((13.1, 23.0), (13.1, 24.001))
     assert not sight.from_point((13.1, 23.0), np.array([[13.1, 24.001]])).any()
+
+
+@pytest.mark.parametrize("name", ["caparica", "office-block"])
+def test_a_search_finds_the_costs_and_the_ways_of_an_undirected_one_among_equal_ways_too(name):
+    roadmap = Planner(load_site(name), FOOTPRINT)._roadmap
+    count = roadmap._graph.shape[0]
+    rows = np.repeat(np.arange(count), np.diff(roadmap._graph.indptr))
+    there = roadmap._graph.indices > rows  # each edge once
+    ends = rows[there], roadmap._graph.indices[there]
+    once = csr_array((roadmap._graph.data[there], ends), shape=(count, count))
+    for goal in np.random.default_rng(1).choice(np.unique(rows), 5).tolist():
+        found = roadmap._field(goal)
+        known = dijkstra(once, directed=False, indices=goal, return_predecessors=True)
+        assert all(map(np.array_equal, found, known))

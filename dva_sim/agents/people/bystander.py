@@ -208,7 +208,7 @@ def draw_places(
         if all(math.dist(first, other) >= APART for other in taken):
             break
     else:
-        raise ConfigError(f"site {site.name!r} has no room for {len(taken) + 1} people")
+        raise ConfigError(f"site {site.name!r} has no place left for another bystander")
     return [first, *(_draw(site, rng, rooms, areas) for _ in range(count - 1))]
 
 

@@ -124,17 +124,27 @@ def _hearsay(
 
 
 def _place(event: EventConfig, site: Site, rng: np.random.Generator) -> tuple[float, float]:
-    """A free place in the event's room; without one, in some room that is watched for its kind."""
+    """A free place in the event's room; without one, in some room that is watched for its kind.
+
+    Where bases are everywhere it is the place that was found to be farthest from them.
+    """
     kind = find_hazard(event.kind)
     rooms: list[str | None] = [event.room] if event.room else _watched_rooms(kind, site)
     bases = [*site.robot_bases, *site.guard_posts]
+    farthest, place = -math.inf, None
     for _ in range(TRIES):
         x, y = site.sample_free(rng, REACHABLE, rooms[int(rng.integers(len(rooms)))])
+        if not site.is_free(x, y, CLEARANCE):
+            continue
         gap = min((math.dist((x, y), (b.x, b.y)) for b in bases), default=math.inf)
-        if site.is_free(x, y, CLEARANCE) and (event.room is not None or gap >= FAR_ENOUGH):
+        if event.room is not None or gap >= FAR_ENOUGH:
             return x, y
-    where = f"in room {event.room!r}" if event.room else f"{FAR_ENOUGH:g} m from all bases"
-    raise ConfigError(f"site {site.name!r} has no free place for a {kind.title} {where}")
+        if gap > farthest:
+            farthest, place = gap, (x, y)
+    if place is None:
+        where = f" in room {event.room!r}" if event.room else ""
+        raise ConfigError(f"site {site.name!r} has no free place for a {kind.title}{where}")
+    return place
 
 
 def _watched_rooms(kind: type[Hazard], site: Site) -> list[str | None]:

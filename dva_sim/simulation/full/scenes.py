@@ -15,7 +15,7 @@ from dva_sim.simulation.full.hazards import beginning_of
 from dva_sim.simulation.full.stage import planner_of
 from dva_sim.simulation.scenario import Scenario, population, robot_profiles, site_of
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.site import Site
+from dva_sim.worlds.site import Site, load_site
 
 SCENES = 5000
 """Beginnings over which the average is taken: about a second of CPU time, once in a process."""
@@ -39,13 +39,15 @@ def way_off(scenario: Scenario, seed: int) -> float | None:
     """By how much the way from the first robot's base to the first event is longer than usual [m].
 
     As it is planned, a metre near a wall counting more. None where the way is not left to chance
-    in this manner: without events or robots, on a bare map, whose bases are drawn for each run, and
-    where the way is given.
+    in this manner: without events or robots, where the way is given, and where bases are chosen
+    for each run, as on a bare map or for more robots than a plan has bases.
     """
     is_drawn = scenario.events and scenario.robot.count and scenario.robot.way_m is None
     if not is_drawn or scenario.site.map is not None:
         return None
     site = site_of(scenario, seed)
+    if site is not load_site(scenario.site.name, scenario.site.options):
+        return None
     planner = planner_of(site, robot_profiles(scenario)[0].drive_spec().radius)
     event = scenario.events[0].model_dump_json()
     usual = site.kept(("usual way", planner, event), lambda: _usual_way(scenario, site, planner))

@@ -18,19 +18,16 @@ from dva_sim.agents.operator.strategies import Reach
 from dva_sim.core.registry import CONTROL_ROOM, DETECTOR, GUARD, OPERATOR, ROBOT
 from dva_sim.core.roles import ControlRoomRole
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.messaging import Transport
 from dva_sim.network.patterns import Pattern, load_pattern
 from dva_sim.protocol.exchange import NOON
 from dva_sim.simulation.scenario import Scenario, request_timeout_s, robot_profiles, site_of
-from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import FOOTPRINT, Site
 
 DVA = "02:00:00:00:00:01"
-_ANYWHERE = "robot", "guard"  # whose scenario has a key `way_m`
 _ROOMS = {
     "dva": 0,
     "robot": 1,
@@ -195,20 +192,6 @@ class Stage:
 def planner_of(site: Site, radius: float) -> Planner:
     """Ways through a site for what has a radius [m]; the same site is planned for once."""
     return Planner(site, radius)
-
-
-def place_of(places: tuple[Pose, ...], number: int, what: str, site: Site) -> Pose:
-    """The place of the `number`-th of something.
-
-    Raises:
-        ConfigError: the site has not so many.
-    """
-    if number > len(places):
-        problem = f"site {site.name!r} has {len(places)} {what}s, the scenario needs more"
-        word = what.partition(" ")[0]
-        more = f"; {word}.way_m lets {word}s begin elsewhere" if word in _ANYWHERE else ""
-        raise ConfigError(problem + more)
-    return places[number - 1]
 
 
 def middle_of(site: Site, room: str) -> tuple[float, float]:

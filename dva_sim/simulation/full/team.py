@@ -29,7 +29,7 @@ from dva_sim.agents.robot.sensors import make_ports, sources_of
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.hazards import RunHazards
-from dva_sim.simulation.full.stage import DVA, Stage, place_of
+from dva_sim.simulation.full.stage import DVA, Stage
 from dva_sim.simulation.scenario import bystander_profile, guard_profile
 from dva_sim.worlds.bodies import GRIP, RobotBody
 from dva_sim.worlds.geo import Pose
@@ -80,7 +80,7 @@ class TeamBuilder:
             registers: Without that it does neither by itself.
 
         Raises:
-            ConfigError: the site has no base for it, or something is in its way.
+            ConfigError: there is no place so far from the event, or something is in its way.
         """
         stage, config = self._stage, self._stage.scenario.robot
         profile = stage.robots[number - 1]
@@ -166,7 +166,7 @@ class TeamBuilder:
         """The `number`-th guard, at its post; it registers and is on duty.
 
         Raises:
-            ConfigError: the site has no post for it.
+            ConfigError: there is no place so far from the event, or something is in its way.
         """
         stage, hazards = self._stage, self._hazards
         post = self._start("guard", number)
@@ -243,7 +243,11 @@ class TeamBuilder:
         stage = self._stage
         starts = (*stage.site.guard_posts, *stage.site.robot_bases)
         taken = [*((pose.x, pose.y) for pose in starts), *self._first_places]
-        places = draw_places(stage.site, stage.streams[f"{name}/places"], PLACES, taken)
+        try:
+            places = draw_places(stage.site, stage.streams[f"{name}/places"], PLACES, taken)
+        except ConfigError as error:
+            found = len(self._first_places)
+            raise ConfigError(f"{error}; {found} bystanders found one") from None
         self._first_places.append(places[0])
         return places
 
@@ -263,16 +267,14 @@ class TeamBuilder:
         """Where the `number`-th robot begins and is charged, or the `number`-th guard waits.
 
         Raises:
-            ConfigError: there is no such place.
+            ConfigError: there is no place so far from the event as it is to begin.
         """
         scenario, site = self._stage.scenario, self._stage.site
         if kind == "robot":
-            way, places, what = scenario.robot.way_m, site.robot_bases, "robot base"
+            way, places = scenario.robot.way_m, site.robot_bases
         else:
-            way, places, what = scenario.guard.way_m, site.guard_posts, "guard post"
-        if way is None:
-            return place_of(places, number, what, site)
-        return self._away(f"{kind}-{number}", way)
+            way, places = scenario.guard.way_m, site.guard_posts
+        return places[number - 1] if way is None else self._away(f"{kind}-{number}", way)
 
     def _away(self, label: str, length: float) -> Pose:
         """A place so far [m] from the event, looking along the way there."""
@@ -288,7 +290,10 @@ class TeamBuilder:
                 self._taken.append((pose.x, pose.y))
                 return pose
         problem = f"site {site.name!r} has no place {length:g} m from the event for {label}"
-        raise ConfigError(f"{problem}; the longest way tried was {longest:.0f} m")
+        if longest < length:
+            raise ConfigError(f"{problem}; the longest way tried was {longest:.0f} m")
+        without = f"without {label.partition('-')[0]}.way_m they begin anywhere"
+        raise ConfigError(f"{problem}; {len(self._taken)} of the team found one; {without}")
 
     def _is_free(self, pose: Pose) -> bool:
         here = pose.x, pose.y

@@ -54,7 +54,7 @@ class RobotConfig(Config):
         sensors: What they carry; left out: as their profile says.
         charge: Share of the battery's capacity that they begin with.
         way_m: They begin at places from which the way to the first event is so long, rather than
-            at the site's bases.
+            at the site's bases. Those for whom the site has no base begin where it is free.
     """
 
     profile: Annotated[str | Annotated[tuple[str, ...], Field(min_length=1)], Key("robot")] = (
@@ -119,7 +119,7 @@ class GuardConfig(Config):
     """
 
     profile: str = "guard"
-    count: Annotated[int, Field(ge=0, le=200), AlsoCalled("guards", "n_guards"), Key("guards")] = 0
+    count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("guards", "n_guards"), Key("guards")] = 0
     mobilisation_s: Annotated[
         Positive | None, Key("time until the guard sets out", stated=False)
     ] = None

@@ -37,7 +37,7 @@ from dva_sim.simulation.scenario.parts import (
     RobotConfig,
     SiteConfig,
 )
-from dva_sim.worlds.site import Site, load_site, map_site
+from dva_sim.worlds.site import FOOTPRINT, Site, load_site, map_site, with_places
 
 NEWER = (
     ("pattern_options",),
@@ -141,11 +141,20 @@ def pattern_of(scenario: Scenario) -> Pattern:
 
 
 def site_of(scenario: Scenario, seed: int) -> Site:
-    """The site a scenario plays on; a bare map places its bases by `seed`."""
-    if scenario.site.map is None:
-        return load_site(scenario.site.name, scenario.site.options)
-    team = max(1, scenario.robot.count), max(1, scenario.guard.count)
-    return map_site(scenario.site.map, seed, robots=team[0], guards=team[1])
+    """The site a scenario plays on; bases and posts that it has not are placed by `seed`.
+
+    Raises:
+        ConfigError: the site cannot be read, or has no room for so many.
+    """
+    robot, guard = scenario.robot, scenario.guard
+    radius = max((each.radius_m for each in robot_profiles(scenario)), default=FOOTPRINT)
+    if scenario.site.map is not None:
+        team = max(1, robot.count), max(1, guard.count)
+        return map_site(scenario.site.map, seed, *team, radius)
+    site = load_site(scenario.site.name, scenario.site.options)
+    at_bases = robot.count if robot.way_m is None else 0
+    at_posts = guard.count if guard.way_m is None else 0
+    return with_places(site, seed, at_bases, at_posts, radius)
 
 
 def robot_profiles(scenario: Scenario) -> list[RobotProfile]:

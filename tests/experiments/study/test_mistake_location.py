@@ -40,9 +40,8 @@ def complaint_of_study(folder, *settings):
             "pattern 'pubsub' is unknown; did you mean 'pub-sub'?",
         ),
         (
-            "robot.count=9",
-            "site 'caparica' has 3 robot bases, the scenario needs more; "
-            "robot.way_m lets robots begin elsewhere",
+            "robot.count=900",
+            "site 'caparica' has room for 2",
         ),
         ("link.jitter_s=9", "link: jitter_s 9 is above delay_s 0"),
         ("phone.filter=medain", "filter 'medain' is unknown; did you mean 'median'?"),
@@ -85,7 +84,7 @@ def test_a_mistake_of_the_file_itself_stays_there_whatever_is_set(tmp_path):
     ("setting", "told"),
     [
         ("robots=2", "unknown key 'robots'; did you mean 'robot.count'?"),
-        ("robot.count=20", "site 'caparica' has 3 robot bases"),
+        ("robot.count=800", "site 'caparica' has room for 2"),
         ("link.delay_s=-1", "should be at least 0, not -1"),
         ("robot.count=0", "nobody can respond: robot.count and guard.count are 0"),
         ("dva.supervisors=[operator-7]", "operator 'operator-7' is unknown; known: operator-1"),
@@ -102,7 +101,7 @@ def test_a_mistake_in_a_setting_of_an_episode_is_told_at_that_setting(tmp_path, 
 
 def test_what_a_scenario_cannot_place_is_told_at_its_key(tmp_path):
     path = tmp_path / "many.yaml"
-    path.write_text("description: many\nrobot:\n  count: 20\n")
-    told = r"many\.yaml:3:3: site 'caparica' has 3 robot bases"
+    path.write_text("description: many\nrobot:\n  count: 800\n")
+    told = r"many\.yaml:3:3: site 'caparica' has room for 2"
     with pytest.raises(ConfigError, match=told), mistakes_of(str(path), [], 1):
         played(EpisodeRequest(str(path)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import measures, simulate
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import Scenario
+from dva_sim.worlds.site import load_site
 
 GUARD_ALONE = {"robot": {"count": 0}, "operator": {"count": 0}}
 
@@ -55,6 +57,59 @@ def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person()
 def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is() -> None:
     with pytest.raises(ConfigError, match="no place 500 m from the event for guard-1"):
         Run(drill(guard={"count": 1, "way_m": 500.0}, **GUARD_ALONE), 1)
+
+
+def test_more_robots_and_guards_than_a_plan_has_places_begin_apart_wherever_it_is_free() -> None:
+    run = Run(drill(robot={"count": 30}, guard={"count": 20}), 1)
+    site, bases, posts = run.stage.site, run.stage.site.robot_bases, run.stage.site.guard_posts
+    assert (len(bases), len(posts)) == (30, 20)
+    drawn = load_site("caparica")
+    assert bases[:3] == drawn.robot_bases
+    assert posts[: len(drawn.guard_posts)] == drawn.guard_posts
+    found = (*bases[3:], *posts[len(drawn.guard_posts) :])
+    assert all(site.is_free(pose.x, pose.y, 0.5) for pose in found)
+    for pose in found:
+        gaps = (math.dist((pose.x, pose.y), (p.x, p.y)) for p in (*bases, *posts) if p != pose)
+        assert min(gaps) >= 1.5
+
+
+def test_a_robot_begins_at_the_same_place_however_many_more_there_are() -> None:
+    few, many = (Run(drill(robot={"count": count}), 1).stage.site for count in (5, 40))
+    assert many.robot_bases[:5] == few.robot_bases
+
+
+def test_another_seed_has_other_places_for_robots_without_a_base_of_their_own() -> None:
+    one, other = (Run(drill(robot={"count": 5}), seed).stage.site for seed in (1, 2))
+    assert one.robot_bases[:3] == other.robot_bases[:3]
+    assert one.robot_bases[3:] != other.robot_bases[3:]
+
+
+def test_more_robots_than_fit_are_refused_with_how_many_do() -> None:
+    told = r"site 'caparica' has room for (\d+) robots, the scenario has 900"
+    with pytest.raises(ConfigError, match=told) as refused:
+        Run(drill(robot={"count": 900}), 1)
+    found = re.search(told, str(refused.value))
+    assert found is not None
+    most = int(found[1])
+    assert len(Run(drill(robot={"count": most}), 1).field.robots) == most
+    with pytest.raises(ConfigError, match=f"has room for {most} robots"):
+        Run(drill(robot={"count": most + 1}), 1)
+
+
+def test_more_bystanders_than_fit_are_refused_with_how_many_found_a_place() -> None:
+    with pytest.raises(ConfigError, match=r"another bystander; \d+ bystanders found one"):
+        Run(drill(bystander={"count": 1000}, **GUARD_ALONE, guard={"count": 1}), 1)
+
+
+def test_who_finds_no_place_so_far_from_the_event_is_told_with_how_many_did() -> None:
+    with pytest.raises(ConfigError, match=r"for robot-\d+; \d+ of the team found one"):
+        Run(drill(robot={"count": 60, "way_m": 9.0}), 1)
+
+
+def test_a_fire_breaks_out_as_far_from_everybody_as_can_be_where_robots_are_everywhere() -> None:
+    run = Run(drill(robot={"count": 100}), 1)
+    place = run.field.incidents[0].hazard.position
+    assert min(math.dist(place, (b.x, b.y)) for b in run.stage.site.robot_bases) > 1.0
 
 
 def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their_profile() -> None:

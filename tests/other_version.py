@@ -1,0 +1,57 @@
+"""Another version of the program as a folder, and programs that end with the one that asked."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+RUNNING: list[subprocess.Popen[Any]] = []
+"""What ends with this program; each leads a session of its own."""
+
+
+@contextmanager
+def version(commit: str) -> Iterator[Path]:
+    """The files of a commit in a folder of their own, of which Git knows nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        packed = subprocess.check_output(["git", "-C", str(ROOT), "archive", commit])
+        with tarfile.open(fileobj=io.BytesIO(packed)) as files:
+            files.extractall(folder, filter="data")
+        yield Path(folder)
+
+
+def output(words: Sequence[str], **options: Any) -> str:
+    """What a program prints; it ends with this one, and so do those that it started.
+
+    Raises:
+        subprocess.CalledProcessError: it failed.
+    """
+    pipes = {"stdout": subprocess.PIPE, "text": True, "start_new_session": True}
+    with subprocess.Popen(words, **pipes, **options) as program:
+        RUNNING.append(program)
+        told, _ = program.communicate()
+    if program.returncode:
+        raise subprocess.CalledProcessError(program.returncode, list(words))
+    return str(told)
+
+
+def end_with_signals() -> None:
+    """From now on Ctrl-C and SIGTERM end all programs that run, and leave no folder behind."""
+    signal.signal(signal.SIGINT, _end)
+    signal.signal(signal.SIGTERM, _end)
+
+
+def _end(number: int, _: object) -> None:
+    for program in RUNNING:
+        if program.poll() is None:
+            os.killpg(program.pid, signal.SIGKILL)
+    sys.exit(128 + number)
