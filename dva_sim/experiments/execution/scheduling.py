@@ -35,6 +35,7 @@ LIMIT_S = 600.0
 _LOOK_S = 5.0  # how often workers are looked after while none of them answers
 _AHEAD = 2  # chunks handed out for each worker, so that none of them has to wait
 _CHUNK_S = 1.0  # CPU time that a chunk should take
+_SEED_S = 5.0  # and how long it may take until the runs of a random seed are parted
 _LONGEST_CHUNK = 64
 GRACE = 1.5  # times the limit: then the whole process ends, if nothing else helps
 INSIST = 1.0  # pause before a run that took no notice is told again [s]
@@ -113,7 +114,11 @@ def _scalar(value: Any) -> Any:
 
 
 class _Pace:
-    """How long a chunk should be: about a second, so that little is lost and progress is seen."""
+    """How long a chunk should be: about a second, so that little is lost and progress is seen.
+
+    Runs of one random seed plan the same ways to the same places, and a process plans each once:
+    they stay together, unless workers would wait for each other at the end.
+    """
 
     def __init__(self) -> None:
         self._runs, self._cost_s = 0, 0.0
@@ -124,12 +129,16 @@ class _Pace:
         self._cost_s += sum(outcome.cost_s for outcome in outcomes)
 
     def chunk(self, waiting: deque[StudyJob], workers: Workers) -> list[StudyJob]:
-        """The next few jobs: fewer towards the end, so that the workers finish together."""
+        """The next jobs: fewer towards the end, so that the workers finish together."""
         if workers.is_here or not self._runs:
             return [waiting.popleft()]
-        rate = self._runs / max(self._cost_s, 1e-9)
-        most = min(rate * _CHUNK_S, _LONGEST_CHUNK, len(waiting) // (4 * workers.width))
-        return [waiting.popleft() for _ in range(max(1, int(most)))]
+        rate, width, left = self._runs / max(self._cost_s, 1e-9), workers.width, len(waiting)
+        usual = min(rate * _CHUNK_S, _LONGEST_CHUNK, left // (4 * width))
+        most = max(usual, min(rate * _SEED_S, _LONGEST_CHUNK, left // width))
+        chunk = [waiting.popleft()]
+        while waiting and len(chunk) + 1 <= (most if waiting[0].seed == chunk[-1].seed else usual):
+            chunk.append(waiting.popleft())
+        return chunk
 
 
 def _together(
