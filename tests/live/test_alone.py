@@ -42,8 +42,10 @@ def test_an_address_of_the_dva_has_a_host_and_a_port(capsys, words):
 
 @pytest.mark.parametrize("only", [[], ["--only", "world"]])
 def test_what_the_site_has_no_place_for_is_told_at_its_setting_before_anything_starts(capsys, only):
-    assert call(["live", "drive-to-event", *only, "--set", "robot.count=9"]) == 2
-    assert capsys.readouterr().err.startswith("error: --set robot.count=9: site 'caparica' has 3")
+    assert call(["live", "drive-to-event", *only, "--set", "robot.count=900"]) == 2
+    assert capsys.readouterr().err.startswith(
+        "error: --set robot.count=900: site 'caparica' has room for 2"
+    )
 
 
 def test_a_host_that_is_not_this_machine_is_told_at_once(capsys):
