@@ -47,10 +47,8 @@ from dva_sim.worlds.maps import RosMap
 from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
 
 _COUNTS: Final = {
-    "robots, the scenario": ("robot", "count"),
-    "robot, the scenario": ("robot", "count"),
-    "guards, the scenario": ("guard", "count"),
-    "guard, the scenario": ("guard", "count"),
+    "robots of the scenario": ("robot", "count"),
+    "guards of the scenario": ("guard", "count"),
     "another bystander": ("bystander", "count"),
     "without robot.way_m": ("robot", "way_m"),
     "without guard.way_m": ("guard", "way_m"),

@@ -272,7 +272,7 @@ def _both_ways(graph: Any) -> Any:
     node keep the order in which an undirected search looks at them, which decides between ways
     of the same cost: those that are given before those that are turned around.
     """
-    from scipy.sparse import csr_array
+    from dva_sim.worlds.scipy_parts import csr_array  # late: start-up
 
     back = graph.T.tocsr()
     sizes = np.diff(graph.indptr), np.diff(back.indptr)

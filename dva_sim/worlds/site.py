@@ -320,11 +320,9 @@ def _scatter(
         rng = streams.fresh(f"site/{what}-{number}")
         place = places.draw(rng)
         if place is None:
-            kind, fit = what.partition("-")[0], number - 1
-            raise ConfigError(
-                f"site {site.name!r} has room for {fit} {kind}{'s' * (fit != 1)}, "
-                f"the scenario has {count}"
-            )
+            kind = what.partition("-")[0]
+            fit = f"{number - 1} {kind}s of the scenario's {count}"
+            raise ConfigError(f"site {site.name!r} has room for {fit}")
         found.append(Pose(*place, float(rng.uniform(-np.pi, np.pi))))
     return tuple(found)
 

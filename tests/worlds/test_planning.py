@@ -177,7 +177,7 @@ def test_a_search_finds_the_costs_and_the_ways_of_an_undirected_one_among_equal_
     count = roadmap._graph.shape[0]
     rows = np.repeat(np.arange(count), np.diff(roadmap._graph.indptr))
     there = roadmap._graph.indices > rows  # each edge once
-    ends = rows[there], roadmap._graph.indices[there]
+    ends = rows[there].astype(np.int32), roadmap._graph.indices[there]
     once = csr_array((roadmap._graph.data[there], ends), shape=(count, count))
     for goal in np.random.default_rng(1).choice(np.unique(rows), 5).tolist():
         found = roadmap._field(goal)

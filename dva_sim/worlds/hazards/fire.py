@@ -296,7 +296,7 @@ class FireField(SolvedField):
         super().__init__(fire, site)
         self._sight, self._fire = Sight(site.walls), fire
         self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
-        self._known: tuple[March | None, float, float, bool, bool] = None, 0.0, 0.0, False, False
+        self._known: tuple[March | None, float, float, bool] = None, 0.0, 0.0, False
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
@@ -373,15 +373,11 @@ class FireField(SolvedField):
         if self.room == NOWHERE or time <= self._start:
             return False
         march, age = self.march(time)
-        known, since, until, hazy, at_end = self._known
+        known, since, until, hazy = self._known
         if march is not known or not since <= age < until:
-            after, ended = march.after(age), (known, until)
-            since, until = march.ages[after - 1], march.ages[after]
-            follows = ended == (march, since)
-            at_start = at_end if follows else self._is_hazy(march.states[after - 1])
-            at_end = self._is_hazy(march.states[after])
-            hazy = at_start or at_end
-            self._known = march, since, until, hazy, at_end
+            after = march.after(age)
+            hazy = self._is_hazy(march.states[after - 1]) or self._is_hazy(march.states[after])
+            self._known = march, march.ages[after - 1], march.ages[after], hazy
         return hazy
 
     def _is_hazy(self, state: Floats) -> bool:

@@ -85,7 +85,7 @@ def test_another_seed_has_other_places_for_robots_without_a_base_of_their_own() 
 
 
 def test_more_robots_than_fit_are_refused_with_how_many_do() -> None:
-    told = r"site 'caparica' has room for (\d+) robots, the scenario has 900"
+    told = r"site 'caparica' has room for (\d+) robots of the scenario's 900"
     with pytest.raises(ConfigError, match=told) as refused:
         Run(drill(robot={"count": 900}), 1)
     found = re.search(told, str(refused.value))
