@@ -77,7 +77,8 @@ def measured(name: str, counter: str, root: Path, environment: Mapping[str, str]
         def words() -> list[str]:
             out = tempfile.mkdtemp(dir=folder)
             asked = COMMANDS[name].format(root=root, results=results, out=out)
-            return [sys.executable, "-m", "dva_sim.cli", *asked.split()]
+            # Without -P the version in the current folder would be started, whoever is measured.
+            return [sys.executable, "-P", "-m", "dva_sim.cli", *asked.split()]
 
         instructions: float | None = None
         try:

@@ -62,6 +62,15 @@ def test_the_start_of_every_command_is_measured():
     assert set(get_command(app).list_commands(None)) <= commands
 
 
+def test_the_start_of_the_version_in_a_folder_is_measured_wherever_one_stands(tmp_path):
+    (tmp_path / "dva_sim").mkdir()
+    (tmp_path / "dva_sim/__init__.py").touch()
+    (tmp_path / "dva_sim/cli.py").write_text("raise SystemExit('this is another version')")
+    environment = counting.pinned() | {"PYTHONPATH": str(tmp_path)}
+    told = startup.measured("--help", counting.Nothing.name, tmp_path, environment)
+    assert told["error"] == "this is another version"
+
+
 def test_a_case_whose_process_dies_is_told_as_a_crash(tmp_path, monkeypatch):
     monkeypatch.setitem(cases.CASES, "dies", cases.Case("run", lambda: os._exit(7)))
     runner.in_a_copy("dies", counting.Nothing.name, 0, tmp_path / "told")
