@@ -110,7 +110,7 @@ def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_
     robot.wait_to_say("registered at", "listening on")
     expect(page.get_by_role("list", name="State")).to_contain_text("Idle")
     page.get_by_role("button", name="Take manual control").click()
-    expect(page.get_by_role("status", name="Mode")).to_contain_text("Manual")
+    expect(page.get_by_role("status", name="Manual control")).to_contain_text("in your hand")
     page.keyboard.down("ArrowUp")
     expect(page.get_by_role("region", name="Side view")).to_contain_text("100 % PWM")
     page.keyboard.up("ArrowUp")

@@ -52,16 +52,14 @@ def opened(visit: Any, address: str, robot: str = "robot-1") -> Page:
 
 def take(page: Page) -> None:
     """Take it in hand, again and again where this machine is late: robots are held then."""
-    button, mode = (
-        page.get_by_role("button", name="Take manual control"),
-        page.get_by_role("status", name="Mode"),
-    )
+    button = page.get_by_role("button", name="Take manual control")
+    hint = page.get_by_role("status", name="Manual control")
 
     def is_taken() -> bool:
         if button.is_enabled():
             button.click()
         page.wait_for_timeout(200)
-        return "Manual" in mode.inner_text()
+        return "in your hand" in hint.inner_text()
 
     assert becomes(is_taken)
 

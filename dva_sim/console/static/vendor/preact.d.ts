@@ -8,6 +8,7 @@ export function batch<T>(run: () => T): T;
 export function html(strings: TemplateStringsArray, ...values: unknown[]): any;
 export function render(node: unknown, where: Element): void;
 export function useEffect(run: () => void | undefined | (() => void), inputs?: unknown[]): void;
+export function useLayoutEffect(run: () => void | undefined | (() => void), inputs?: unknown[]): void;
 export function useMemo<T>(make: () => T, inputs: unknown[]): T;
 export function useRef<T>(first: T): { current: T };
 export function useState<T>(first: T): [T, (next: T | ((old: T) => T)) => void];

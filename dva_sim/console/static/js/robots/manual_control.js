@@ -1,5 +1,5 @@
 /** Drive the robot at the robot itself: no message, no session, the same limits and watchdog. */
-import { html, useEffect } from '../../vendor/preact.js';
+import { html, useEffect, useLayoutEffect } from '../../vendor/preact.js';
 import { connection, mayDrive, maySteer } from '../store.js';
 import { act, driveLost } from '../net/actions.js';
 import { DriveSliders } from '../drive/drive_sliders.js';
@@ -15,7 +15,8 @@ import { isInHand, myHand, windowOf } from './window.js';
 /** @param {{robot: Thing}} props */
 export function ManualControl({ robot }) {
   const mine = isInHand(robot.i);
-  useEffect(() => (mine ? steering() : undefined), [mine]);
+  // Not after the next frame: once the page says that it is in hand, a key counts.
+  useLayoutEffect(() => (mine ? steering() : undefined), [mine]);
   useEffect(() => {
     if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
   }, [connection.value, driveLost.value]);
