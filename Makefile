@@ -11,12 +11,12 @@ DEMO := results/demo
 .DEFAULT_GOAL := help
 .PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak check same-bytes bench goals clean
 
-# Two processes share the tests. Compiled files are kept whatever a shell says: without them each
-# run compiles all tests again, for half a minute.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --halves
+# Compiled files are kept whatever a shell says: without them each program that a test starts
+# compiles all modules again.
+export PYTHONDONTWRITEBYTECODE =
 
-# Pages are drawn by several processes of the browser already: these tests share nothing.
-BROWSER := $(BIN)/python -m pytest tests/console/browser
+# A file of tests runs in one process; as many share the files as there are cores, and one more.
+PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 help:  ## say what can be made
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -37,9 +37,9 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 	@$(PYTEST) -m "not system and not soak and not browser"
 
 test-all: $(DEV)  ## all tests
-	@echo "Running those in a browser, then all others ..."
-	@$(BROWSER)
-	@$(PYTEST) -m "not browser"
+	@echo "Running the tests, those in a browser as well ..."
+	@$(BIN)/python tests/chromium.py
+	@$(PYTEST)
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
 	@$(PYTEST) -m contract
@@ -48,7 +48,8 @@ test-system: $(DEV)  ## programs as users start them, with real processes, socke
 	@$(PYTEST) -m system
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
-	@$(BROWSER)
+	@$(BIN)/python tests/chromium.py
+	@$(PYTEST) tests/console/browser
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"

@@ -1,13 +1,17 @@
 """What holds for all tests: how they are shared between processes, and how many may be skipped."""
 
+import os
 import signal
 
-from halves import pytest_addoption, pytest_configure
+import pytest
 from hypothesis import settings
 from searching import search
 from skips import pytest_sessionfinish
 
-__all__ = ["pytest_addoption", "pytest_configure", "pytest_sessionfinish"]
+__all__ = ["pytest_sessionfinish"]
+
+DEAR = "browser", "live", "system"
+"""Folders whose files take long: they come first, so that all processes end at the same time."""
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # As for a command that a script starts with `&`: then nothing that is started here would hear
@@ -16,3 +20,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 settings.register_profile("search", search())
 settings.load_profile("search")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: a test often waits for a program or a page."""
+    return (os.cpu_count() or 1) + 1
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: not set(DEAR).intersection(item.path.parts))

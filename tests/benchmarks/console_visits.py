@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -12,9 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import pytest
 from patience import PATIENCE_S, becomes
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 REAL = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
 FAKE = (str(Path(__file__).parents[1] / "console" / "fake_world.py"),)
@@ -102,19 +100,6 @@ def console(folder: Path, *words: str, program: Sequence[str] = REAL) -> Iterato
     finally:
         process.terminate()
         process.wait(PATIENCE_S)
-
-
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """The system's own."""
-    path = shutil.which("chromium")
-    if path is None:
-        pytest.skip("it is measured in Chromium: apt-get install chromium")
-    with sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu"]
-        browser = playwright.chromium.launch(executable_path=path, args=arguments)
-        yield browser
-        browser.close()
 
 
 def visit(browser: Browser, address: str, **options: Any) -> Page:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +43,7 @@ class ControlRoomDesk:
     def dispatch_lines(self) -> list[Line]:
         """What pages are told again and again."""
         control = {"k": "control", "dispatch": self.mode, "rooms": list(self.rooms.values())}
-        now = time.monotonic()
+        now = self.t
         alarms = {
             "k": "alarms",
             "alarms": self.alarms.rows(now),
@@ -68,7 +67,7 @@ class ControlRoomDesk:
             row | {"decisions": 0, "acknowledged": None} | self.decided.get(row["number"], {})
             for row in (*events["events"], *self.raised)
         ]
-        self.alarms.update([self._condition(row) for row in rows], time.monotonic())
+        self.alarms.update([self._condition(row) for row in rows], self.t)
         return {"k": "events", "events": rows}
 
     @staticmethod
@@ -204,10 +203,10 @@ class ControlRoomDesk:
     def do_alarm_shelve(self, asked: Line) -> str:
         """Not now."""
         for key in self.alarms.members(asked["alarm"]):
-            self.alarms.shelve(key, asked["for_s"], self._who(asked), time.monotonic())
+            self.alarms.shelve(key, asked["for_s"], self._who(asked), self.t)
         return "shelved"
 
     def do_alarm_unshelve(self, asked: Line) -> str:
         """Now."""
-        self.alarms.unshelve(asked["alarm"], time.monotonic())
+        self.alarms.unshelve(asked["alarm"], self.t)
         return "back"

@@ -10,6 +10,7 @@ import argparse
 import io
 import json
 import math
+import os
 import select
 import signal
 import socket
@@ -397,9 +398,9 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
             pass
 
     def run(self) -> None:
-        """Until nobody listens any more."""
-        ticks, due = 0, time.monotonic()
-        while True:
+        """Until nobody listens any more, or who started it is gone: a test that was killed."""
+        ticks, due, parent = 0, time.monotonic(), os.getppid()
+        while os.getppid() == parent:
             if not self.listen(max(0.0, due - time.monotonic())):
                 return
             if time.monotonic() < due:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -12,15 +11,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from chromium import chromium
 from patience import PATIENCE_S, becomes
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-MISSING = "these tests need Chromium: apt-get install chromium (make test leaves them out)"
 CUT = "ERR_INCOMPLETE_CHUNKED_ENCODING"  # a camera's stream has ended with its world
 FAKE = Path(__file__).parents[1] / "fake_world.py"
 
-expect.set_options(timeout=1000 * PATIENCE_S / 4)
+MOMENT_MS = 1000 * PATIENCE_S / 2
+expect.set_options(timeout=MOMENT_MS)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -102,17 +101,11 @@ def own_world(tmp_path: Path) -> Iterator[Callable[..., tuple[World, Callable[[]
         yield start
 
 
-@pytest.fixture(scope="module")  # while Playwright is there, no other test has asyncio
-def chromium() -> Iterator[Browser]:
+@pytest.fixture(scope="module", name="browser")  # while it runs, no other test has asyncio
+def _browser() -> Iterator[Browser]:
     """The system's own."""
-    path = next((found for name in NAMES if (found := shutil.which(name))), None)
-    if path is None:
-        pytest.exit(MISSING, returncode=1)
-    with sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu"]
-        browser = playwright.chromium.launch(executable_path=path, args=arguments)
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 class Visit:
@@ -146,13 +139,14 @@ class Visit:
 
 
 @pytest.fixture
-def visits(chromium: Browser) -> Iterator[Callable[..., Visit]]:
+def visits(browser: Browser) -> Iterator[Callable[..., Visit]]:
     """As many browsers as are asked for; none may have complained in the end."""
     made: list[Visit] = []
 
     def visit(width: int = 1280, height: int = 800, **options: Any) -> Visit:
         size: Any = {"width": width, "height": height}
-        made.append(Visit(chromium.new_context(viewport=size, **options)))
+        made.append(Visit(browser.new_context(viewport=size, **options)))
+        made[-1].context.set_default_timeout(MOMENT_MS)
         return made[-1]
 
     yield visit

@@ -74,9 +74,9 @@ def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(
                          f"{world.base}api/state") == "refused"  # fmt: skip
 
 
-def test_a_page_says_so_when_the_world_has_ended(own_world, chromium) -> None:
+def test_a_page_says_so_when_the_world_has_ended(own_world, browser) -> None:
     world, end = own_world(*SMALL)
-    page = chromium.new_context().new_page()
+    page = browser.new_context().new_page()
     page.goto(f"{world.drive}#/map")
     expect(page.get_by_role("region", name="Map")).to_be_visible()
     end()

@@ -1,0 +1,43 @@
+"""The system's Chromium; `python tests/chromium.py` says whether there is one."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from playwright.sync_api import Browser, sync_playwright
+
+NAMES = "chromium-headless-shell", "chromium", "chromium-browser", "google-chrome"
+"""Dearest last: the first draws the same pages with a quarter less of the processors."""
+
+MISSING = (
+    "tests in a browser need Chromium: apt-get install chromium-headless-shell "
+    "(make test leaves them out)"
+)
+
+
+def installed() -> str:
+    """Where it is.
+
+    Raises:
+        SystemExit: nowhere.
+    """
+    path = next((found for name in NAMES if (found := shutil.which(name))), None)
+    if path is None:
+        raise SystemExit(MISSING)
+    return path
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """It runs, without a screen. No asyncio is possible meanwhile."""
+    with sync_playwright() as playwright:
+        arguments = ["--no-sandbox", "--disable-gpu"]
+        browser = playwright.chromium.launch(executable_path=installed(), args=arguments)
+        yield browser
+        browser.close()
+
+
+if __name__ == "__main__":
+    installed()
