@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.answers import Answers, answering
+from dva_sim.console.answers import BYE, Answers, answering
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
@@ -26,8 +26,6 @@ from dva_sim.network.realtime import FASTEST
 
 Line = dict[str, Any]
 
-
-BYE = "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
 

@@ -9,8 +9,8 @@ from typing import Any, Final
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.refusal import Refused, Said
-from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.console.refusal import Refused, Said, unanswered
+from dva_sim.console.rooms import ConsoleRoom, why
 from dva_sim.console.seats import Seats
 from dva_sim.console.takeover import Takeover
 from dva_sim.console.world import ConsoleWorld
@@ -171,7 +171,7 @@ class RoomActions:
 
         device.connect(robot)
         wish = m.PermissionRequest(robot, "missions")
-        device.ask(device.dva, wish, granted, lambda: said(False, NO_ANSWER))
+        device.ask(device.dva, wish, granted, partial(unanswered, said))
 
     @staticmethod
     def _follow(room: ConsoleRoom, robot: str, session: int) -> None:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from dva_sim.console.refusal import Said
-from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.console.refusal import Said, unanswered
+from dva_sim.console.rooms import ConsoleRoom, why
 from dva_sim.protocol import messages as m
 
 AGAIN: Final = 0.5  # while a robot is brought to a standstill, or the policy was quicker [s]
@@ -53,7 +53,7 @@ class Takeover:
             self._room.agent.ask(m.Revoke(self._robot, self._reason), self._revoked, self._lost)
 
     def _lost(self) -> None:
-        self._said(False, NO_ANSWER)
+        unanswered(self._said)
 
     def _revoked(self, reply: m.Reply) -> None:
         if reply.code != m.OK:

@@ -17,7 +17,7 @@ from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.audited import Audited
+from dva_sim.console.audited import Audited, name_of_page
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
@@ -196,7 +196,6 @@ class ConsoleWorld(ToldWorld):
         self.audited = Audited(keeper, self.author, self._named)
         self.run.dva.on_fact = self.audited.decided
         keeper.on_rows = self._audit_written
-        self.clock.watch(keeper.fileno(), keeper.take)
 
     def _audit_written(self, rows: Sequence[AuditRow]) -> None:
         if self.recorder.kept is not None:
@@ -212,7 +211,7 @@ class ConsoleWorld(ToldWorld):
         seat = next((n for n, who in self.client_of.items() if who == client), None)
         if seat is not None:
             return self._persons[seat].device.label
-        return f"page {client.partition('-')[0]}" if client != "rest" else "program"
+        return name_of_page(client)
 
     def _named(self, device: str) -> str:
         """The name of a device by its id, or of things by their numbers."""

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
-from dva_sim.console.answers import Answers
+from dva_sim.console.answers import BYE, Answers, answering
 from dva_sim.console.attached.decisions import AttachedDecisions
-from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.attached.pages import AttachedPages
+from dva_sim.console.refusal import Refused, Said, unanswered
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -20,18 +20,18 @@ class AttachedActions:
     """Does what lines of the web process ask for.
 
     Args:
-        system: To which the console is attached.
+        pages: Of the system to which the console is attached.
     """
 
-    def __init__(self, system: AttachedSystem) -> None:
-        self._system, self._answers = system, Answers()
+    def __init__(self, pages: AttachedPages) -> None:
+        self._pages, self._system, self._answers = pages, pages.system, Answers()
         self._doers: Mapping[str, Callable[[Line, Said], object]] = {
             "emergency": self._emergency,
             "revoke": self._revoke,
             "fake_add": self._add_fake,
             "fake_remove": self._remove_fake,
-            "release": lambda _, said: said(True, "released"),
-            **AttachedDecisions(system).doers,
+            "release": self._release,
+            **AttachedDecisions(self._system, pages.people).doers,
         }
 
     def take(self, line: Line) -> None:
@@ -39,7 +39,7 @@ class AttachedActions:
         what, number = str(line.get("do", "")), line.get("id")
         if what == "look":
             tables = line.get("tables")
-            self._system.looked = isinstance(tables, list) and "devices" in tables
+            self._pages.looked = isinstance(tables, list) and "devices" in tables
         elif isinstance(number, str):
             self._answers.once(number, partial(self._do, what, line), self._tell)
 
@@ -47,17 +47,24 @@ class AttachedActions:
         do = self._doers.get(what)
         if do is None:
             raise Refused(NOT_HERE)
-        do(line, said)
+        said = self._pages.audited.answered(what, str(line.get("client")), line, said)
+        answering(partial(do, line), said)
 
     def _tell(self, answer: Line) -> None:
-        self._system.tell({**answer, "t": self._system.now_ms})
+        self._pages.tell({**answer, "t": self._system.now_ms})
+
+    def _release(self, line: Line, said: Said) -> None:
+        """Nothing is in hand; but a page may be gone for good."""
+        if str(line["id"]).startswith(BYE):
+            self._pages.people.leave(str(line.get("client")))
+        said(True, "released")
 
     def _emergency(self, line: Line, said: Said) -> None:
         """Each robot is told by a connection of its own; who does not answer is named."""
         system, wanted = self._system, line.get("robots", "all")
         robots = system.robots()
         if isinstance(wanted, list):
-            robots = [i for i in robots if system.number_of(i) in wanted]
+            robots = [i for i in robots if system.numbers.get(i) in wanted]
         if not robots:
             raise Refused("the DVA has listed no robot")
         left, deaf = set(robots), list[str]()
@@ -66,8 +73,10 @@ class AttachedActions:
             left.discard(robot)
             if not ok:
                 deaf.append(system.label_of(robot))
-            if not left:
-                said(not deaf, f"no answer of {', '.join(deaf)}" if deaf else "robots stop")
+            if not left and deaf:
+                unanswered(said, f"no answer of {', '.join(deaf)}")
+            elif not left:
+                said(True, "robots stop")
 
         for robot in robots:
             ok, failed = partial(ended, robot, True), partial(ended, robot, False)
@@ -82,8 +91,7 @@ class AttachedActions:
             done = f"the permission for {self._system.label_of(robot)} is revoked"
             said(reply.code == m.OK, reply.text or done)
 
-        failed = partial(said, False, "the DVA does not answer")
-        self._system.agent.ask(m.Revoke(robot), answered, failed)
+        self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, said))
 
     def _add_fake(self, line: Line, said: Said) -> None:
         if self._system.options.keys is not None:

@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.refusal import NO_ANSWER, Refused, Said, unanswered
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -22,21 +23,24 @@ class AttachedDecisions:
 
     Args:
         system: To which the console is attached.
+        people: Who is at the pages.
     """
 
-    def __init__(self, system: AttachedSystem) -> None:
-        self._system = system
+    def __init__(self, system: AttachedSystem, people: AttachedPeople) -> None:
+        self._system, self._people = system, people
         self.doers: Mapping[str, Callable[[Line, Said], object]] = {
             "room_join": self._join,
             "event_raise": self._raise,
             **dict.fromkeys(DECISIONS, self._decide),
         }
 
-    def _join(self, _: Line, said: Said) -> None:
-        """All who decide here share the console's own control room."""
+    def _join(self, line: Line, said: Said) -> None:
+        """All who decide here share the console's own control room, each by an own name."""
         if not self._system.answers:
-            raise Refused("the DVA does not answer")
-        said(True, f"you are {self._system.device.label}, and may {self._system.role}")
+            raise Refused(NO_ANSWER)
+        name = str(line.get("name", "")).strip()[:64]
+        name = self._people.join(str(line.get("client")), str(line.get("role", "look")), name)
+        said(True, f"you are {name}, and may {self._system.role}")
 
     def _raise(self, line: Line, said: Said) -> None:
         place = self._system.place_of(line["x_m"], line["y_m"])
@@ -54,7 +58,7 @@ class AttachedDecisions:
             more = answer_of(reply, lambda device: device in robots()) if ok else {}
             said(ok, done if ok else words, **more)
 
-        self._system.agent.ask(body, answered, partial(said, False, "the DVA does not answer"))
+        self._system.agent.ask(body, answered, partial(unanswered, said))
 
     def _seen(self, event: int) -> int | None:
         """How many decisions on an event are known here."""
