@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
-from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
 from dva_sim.console.refusal import Refused, Said, unanswered
@@ -45,7 +44,7 @@ class RoomActions:
         self.doers: Mapping[str, Doer] = {
             "room_join": self._join,
             "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self._decide),
+            **dict.fromkeys(DECISIONS, self.decide),
             "mission": self._mission,
             "take_over": self._take_over,
         }
@@ -91,7 +90,8 @@ class RoomActions:
 
     # --- events -----------------------------------------------------------------------------
 
-    def _decide(self, client: str, line: Line, said: Said) -> None:
+    def decide(self, client: str, line: Line, said: Said) -> None:
+        """Decide on an event."""
         body, done = decision_of(line, self._device, self._rooms.decisions)
         self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
 
@@ -213,44 +213,3 @@ class RoomActions:
             Takeover(room, robot, reason, event, seat.device.id_tag, take, ended).begin()
 
         self._room(client, line, said, begin)
-
-
-class AlarmActions:
-    """Does what people ask for about alarms.
-
-    Args:
-        world: In which.
-        rooms: Whose devices tell the DVA that an event was seen.
-    """
-
-    def __init__(self, world: ConsoleWorld, rooms: RoomActions) -> None:
-        self._world, self._desk, self._rooms = world, world.alarms, rooms
-        self.doers: Mapping[str, Doer] = {
-            "alarm_acknowledge": self._acknowledge,
-            "alarm_shelve": self._shelve,
-            "alarm_unshelve": self._unshelve,
-        }
-
-    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
-        """What an open event is behind is acknowledged at the DVA, all else here."""
-        keys = self._desk.members(line["alarm"])
-        events = self._desk.by_event(keys)
-        for key in keys:
-            if key not in events:
-                self._desk.acknowledge(key, self._world.author(client))
-        if not events:
-            said(True, "seen")
-            return
-        answers = Gathered(len(events), said)
-        for number in events.values():
-            asked = line | {"do": "event_acknowledge", "event": number}
-            self._rooms.doers["event_acknowledge"](client, asked, answers)
-
-    def _shelve(self, client: str, line: Line, said: Said) -> None:
-        keys = self._desk.members(line["alarm"])
-        self._desk.shelve(keys, line["for_s"], self._world.author(client))
-        said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
-
-    def _unshelve(self, client: str, line: Line, said: Said) -> None:
-        self._desk.unshelve(self._desk.members(line["alarm"]))
-        said(True, "back in the list")

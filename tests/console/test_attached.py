@@ -80,7 +80,7 @@ def test_an_event_is_shown_as_the_dva_tells_it():
     )
     row = lines.event_row(status, 100.0, {ROBOT: "robot-1"}, None, HERE)
     assert (row["state"], row["severity"], row["over"]) == ("on scene", "critical", False)
-    assert (row["x_m"], row["y_m"], row["room"]) == (1.0, 2.0, "")
+    assert (row["x_m"], row["y_m"], row["room"]) == (1.0, 2.0, "unknown room")
     assert (row["reported_ms"], row["since_ms"]) == (80_000, 95_000)
     assert row["assigned"] == ["robot-1"]
 

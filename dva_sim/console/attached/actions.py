@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
+from dva_sim.console.alarm_actions import AlarmActions, Doer
 from dva_sim.console.answers import BYE, Answers, answering
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
@@ -25,13 +26,17 @@ class AttachedActions:
 
     def __init__(self, pages: AttachedPages) -> None:
         self._pages, self._system, self._answers = pages, pages.system, Answers()
-        self._doers: Mapping[str, Callable[[Line, Said], object]] = {
+        decisions = AttachedDecisions(self._system, pages.people)
+        alarms = AlarmActions(pages.alarms, pages.people.author, self._acknowledge)
+        self._decide = decisions.decide
+        self._doers: Mapping[str, Doer] = {
             "emergency": self._emergency,
             "revoke": self._revoke,
             "fake_add": self._add_fake,
             "fake_remove": self._remove_fake,
             "release": self._release,
-            **AttachedDecisions(self._system, pages.people).doers,
+            **decisions.doers,
+            **alarms.doers,
         }
 
     def take(self, line: Line) -> None:
@@ -47,19 +52,25 @@ class AttachedActions:
         do = self._doers.get(what)
         if do is None:
             raise Refused(NOT_HERE)
-        said = self._pages.audited.answered(what, str(line.get("client")), line, said)
-        answering(partial(do, line), said)
+        client = str(line.get("client", ""))
+        said = self._pages.audited.answered(what, client, line, said)
+        answering(partial(do, client, line), said)
+
+    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
+        """An alarm is seen that an event is behind: a decision like any other."""
+        said = self._pages.audited.answered("event_acknowledge", client, line, said)
+        self._decide(client, line, said)
 
     def _tell(self, answer: Line) -> None:
         self._pages.tell({**answer, "t": self._system.now_ms})
 
-    def _release(self, line: Line, said: Said) -> None:
+    def _release(self, client: str, line: Line, said: Said) -> None:
         """Nothing is in hand; but a page may be gone for good."""
         if str(line["id"]).startswith(BYE):
-            self._pages.people.leave(str(line.get("client")))
+            self._pages.people.leave(client)
         said(True, "released")
 
-    def _emergency(self, line: Line, said: Said) -> None:
+    def _emergency(self, _: str, line: Line, said: Said) -> None:
         """Each robot is told by a connection of its own; who does not answer is named."""
         system, wanted = self._system, line.get("robots", "all")
         robots = system.robots()
@@ -82,7 +93,7 @@ class AttachedActions:
             ok, failed = partial(ended, robot, True), partial(ended, robot, False)
             system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
 
-    def _revoke(self, line: Line, said: Said) -> None:
+    def _revoke(self, _: str, line: Line, said: Said) -> None:
         robot = str(line.get("device"))
         if robot not in self._system.robots():
             raise Refused(f"the DVA has listed no robot {robot}")
@@ -93,13 +104,13 @@ class AttachedActions:
 
         self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, said))
 
-    def _add_fake(self, line: Line, said: Said) -> None:
+    def _add_fake(self, _: str, line: Line, said: Said) -> None:
         if self._system.options.keys is not None:
             raise Refused(
                 "with keys nobody can pretend to be a device: it would need one of its own"
             )
         self._system.fakes.add(line, said)
 
-    def _remove_fake(self, line: Line, said: Said) -> None:
+    def _remove_fake(self, _: str, line: Line, said: Said) -> None:
         label = self._system.fakes.remove(line.get("device"))
         said(True, f"{label} speaks no more: the DVA takes it from its list within some seconds")

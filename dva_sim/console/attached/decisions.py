@@ -16,6 +16,7 @@ from dva_sim.console.refusal import NO_ANSWER, Refused, Said, unanswered
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
+Doer = Callable[[str, Line, Said], object]
 
 
 class AttachedDecisions:
@@ -28,25 +29,26 @@ class AttachedDecisions:
 
     def __init__(self, system: AttachedSystem, people: AttachedPeople) -> None:
         self._system, self._people = system, people
-        self.doers: Mapping[str, Callable[[Line, Said], object]] = {
+        self.doers: Mapping[str, Doer] = {
             "room_join": self._join,
             "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self._decide),
+            **dict.fromkeys(DECISIONS, self.decide),
         }
 
-    def _join(self, line: Line, said: Said) -> None:
+    def _join(self, client: str, line: Line, said: Said) -> None:
         """All who decide here share the console's own control room, each by an own name."""
         if not self._system.answers:
             raise Refused(NO_ANSWER)
         name = str(line.get("name", "")).strip()[:64]
-        name = self._people.join(str(line.get("client")), str(line.get("role", "look")), name)
+        name = self._people.join(client, str(line.get("role", "look")), name)
         said(True, f"you are {name}, and may {self._system.role}")
 
-    def _raise(self, line: Line, said: Said) -> None:
+    def _raise(self, _: str, line: Line, said: Said) -> None:
         place = self._system.place_of(line["x_m"], line["y_m"])
         self._ask(*report_of(line, place), said)
 
-    def _decide(self, line: Line, said: Said) -> None:
+    def decide(self, _: str, line: Line, said: Said) -> None:
+        """Decide on an event."""
         self._ask(*decision_of(line, self._device, self._seen), said)
 
     def _ask(self, body: m.Body, done: str, said: Said) -> None:

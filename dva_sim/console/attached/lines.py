@@ -19,6 +19,7 @@ from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
 AROUND: Final = 40.0  # of the first position, where no site is known [m]
+UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
 KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
 SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
 
@@ -165,7 +166,7 @@ def event_row(
         "y_m": round(y, 2),
         "latitude_deg": status.position.latitude,
         "longitude_deg": status.position.longitude,
-        "room": site.room_at(x, y) if site is not None else "",
+        "room": site.room_at(x, y) if site is not None else UNKNOWN_ROOM,
         "severity": next(name for least, name in SEVERITIES if status.severity >= least),
         "severity_value": round(status.severity, 2),
         "state": status.event_state.replace("_", " "),

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.attached import lines
+from dva_sim.console.attached.alarm_facts import ToldFacts
 from dva_sim.console.attached.audit import AttachedAudit
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
@@ -35,6 +37,7 @@ class AttachedPages:
     Attributes:
         looked: Whether somebody looks at the table of devices.
         people: Who is at the pages.
+        alarms: What wants somebody to act.
         audited: Keeps who did what.
     """
 
@@ -44,6 +47,7 @@ class AttachedPages:
         self.show: Tell = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked, self.people = False, AttachedPeople()
+        self.alarms = AlarmDesk(ToldFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
         self._answers, self._newest, self._is_shown = False, dict[str, Any](), False
@@ -68,6 +72,7 @@ class AttachedPages:
         clock.call_after(FIRST_SCENE, self._tell_scene)
         clock.pulse(POSITIONS, self._tell_positions)
         clock.pulse(ROWS, self._tell_rows)
+        clock.pulse(ROWS, self._tell_alarms)
         clock.pulse(SOON, self._tell_news)
         clock.pulse(DEVICES, self._tell_devices)
 
@@ -111,6 +116,13 @@ class AttachedPages:
                 "order": None,
             }
         )
+
+    def _tell_alarms(self) -> None:
+        """As long as it is not known how events stand, alarms stay as they are."""
+        system, now_ms = self.system, self.system.now_ms
+        is_known = system.is_told and system.answers
+        known = self.alarms.look(self._events(), [], now_ms) if is_known else None
+        self._tell_new(known or self.alarms.hold(now_ms))
 
     def _robots(self) -> list[Line]:
         now, numbers = self.clock.now, self.system.numbers

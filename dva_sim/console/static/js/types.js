@@ -59,7 +59,7 @@
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
  *   people: {i: number, doing: string}[], order?: Order | null, server?: Server}} Rows
  * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
- *   own?: boolean}} Server
+ *   own?: boolean, role?: string}} Server
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard
