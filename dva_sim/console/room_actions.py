@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
-from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.refusal import Refused, Said, unanswered
-from dva_sim.console.rooms import ConsoleRoom, why
+from dva_sim.console.missions import inspection_of, send_on_mission
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.rooms import ConsoleRoom
 from dva_sim.console.seats import Seats
 from dva_sim.console.takeover import Takeover
 from dva_sim.console.world import ConsoleWorld
@@ -17,9 +17,6 @@ from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
 Doer = Callable[[str, Line, Said], object]
-
-ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
-UNDER_WAY: Final = ("under_way", "waiting", "replanning")
 
 
 class RoomActions:
@@ -141,54 +138,12 @@ class RoomActions:
         if status is None:
             raise Refused(f"there is no event {line['event']}")
         robot = self._robot(line["robot"])
-        body = m.Inspect(status.event_id, status.kind, status.position)
-        self._room(client, line, said, partial(self._send, robot=robot, body=body, said=said))
+        label, body = self._world.run.stage.labels[robot], inspection_of(status)
 
-    def _send(self, room: ConsoleRoom, robot: str, body: m.Inspect, said: Said) -> None:
-        device, label = room.device, room.device.label_of(robot)
+        def send(room: ConsoleRoom) -> None:
+            send_on_mission(room.device, robot, label, body, said)
 
-        def granted(reply: m.Reply) -> None:
-            if not isinstance(reply.content, m.Permission):
-                said(False, f"{label}: {why(reply)}")
-                return
-            session = reply.content.session
-
-            def refused(text: str) -> None:
-                give_back(device, robot, session)
-                said(False, f"{label}: {text}")
-
-            def begun() -> None:
-                self._follow(room, robot, session)
-                said(True, f"{label} goes to event {body.event_id} by itself")
-
-            start(
-                *(device, robot, body, lambda: session),
-                wanted=lambda: True,
-                begun=begun,
-                refused=refused,
-                lost=lambda: refused("it does not answer"),
-            )
-
-        device.connect(robot)
-        wish = m.PermissionRequest(robot, "missions")
-        device.ask(device.dva, wish, granted, partial(unanswered, said))
-
-    @staticmethod
-    def _follow(room: ConsoleRoom, robot: str, session: int) -> None:
-        """Ask how a mission stands until it is over; then the robot is given back."""
-        device = room.device
-
-        def answered(reply: m.Reply) -> None:
-            status = reply.content
-            if isinstance(status, m.MissionStatus) and status.mission_state in UNDER_WAY:
-                device.clock.call_after(ASK_PERIOD, ask)
-            else:
-                give_back(device, robot, session)
-
-        def ask() -> None:
-            device.ask(robot, m.GetMissionStatus(), answered, session=session)
-
-        device.clock.call_after(ASK_PERIOD, ask)
+        self._room(client, line, said, send)
 
     def _take_over(self, client: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
@@ -210,6 +165,6 @@ class RoomActions:
                 said(ok, text, **more)
 
             event = self._rooms.event_of(robot)
-            Takeover(room, robot, reason, event, seat.device.id_tag, take, ended).begin()
+            Takeover(room.agent, robot, reason, event, seat.device.id_tag, take, ended).begin()
 
         self._room(client, line, said, begin)

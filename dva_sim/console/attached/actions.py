@@ -45,6 +45,9 @@ class AttachedActions:
         if what == "look":
             tables = line.get("tables")
             self._pages.looked = isinstance(tables, list) and "devices" in tables
+        elif what == "watch":
+            robots = line.get("robots")
+            self._pages.sensors.watch(robots if isinstance(robots, list) else [])
         elif isinstance(number, str):
             self._answers.once(number, partial(self._do, what, line), self._tell)
 

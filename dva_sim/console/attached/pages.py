@@ -13,6 +13,7 @@ from dva_sim.console.attached import lines
 from dva_sim.console.attached.alarm_facts import ToldFacts
 from dva_sim.console.attached.audit import AttachedAudit
 from dva_sim.console.attached.people import AttachedPeople
+from dva_sim.console.attached.sensing import ToldSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.decisions import about_event, dispatch_line
@@ -38,6 +39,7 @@ class AttachedPages:
         looked: Whether somebody looks at the table of devices.
         people: Who is at the pages.
         alarms: What wants somebody to act.
+        sensors: Those that somebody looks at.
         audited: Keeps who did what.
     """
 
@@ -47,6 +49,7 @@ class AttachedPages:
         self.show: Tell = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked, self.people = False, AttachedPeople()
+        self.sensors = ToldSensors(system.device, system.told, system.id_of)
         self.alarms = AlarmDesk(ToldFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard

@@ -159,6 +159,10 @@ class AttachedSystem:
         """Whether a device was added by hand, here."""
         return id_tag in self.fakes.devices
 
+    def id_of(self, number: int) -> str | None:
+        """The id of a device that pages know by a number; None: there is none."""
+        return next((i for i, known in self.numbers.items() if known == number), None)
+
     def label_of(self, id_tag: str) -> str:
         """What a device calls itself."""
         told = self.told.devices.get(id_tag)
