@@ -27,7 +27,8 @@
  *   pages?: string[], lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer,
  *   replay?: ReplayAbout | null}} Scene
  * @typedef {{t: number, who: string, what: string, kind: string}} Mark
- * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[]}} ReplayAbout
+ * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[],
+ *   audit: boolean}} ReplayAbout
  * @typedef {{name: string, bytes: number, part: string, person: number | null,
  *   trial: number | null, levels: unknown[], values: unknown[]}} ShelfEntry
  * @typedef {{folder: string, question: string, report: boolean, factors: string[],

@@ -1,6 +1,6 @@
 /** One event: how it stands, whom the policy would send, and all that can be done about it. */
 import { html, useRef, useState } from '../../vendor/preact.js';
-import { isAttached, mayDispatch, maySteer, maySupervise, robots, rowOf, selection, thingNamed } from '../store.js';
+import { isAttached, mayDispatch, maySteer, maySupervise, modeOf, robots, rowOf, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { worldNow } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -89,10 +89,14 @@ function Doing({ event }) {
 const sentTo = (event) =>
   event.assigned.filter((who) => ['robot', 'guard'].includes(thingNamed(who)?.kind ?? ''));
 
+/** A robot that could go though the policy would not send it, as it needs nobody who drives. */
+const idleRobot = () =>
+  robots.value.find((robot) => modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder)?.label ?? '';
+
 /** @param {{event: SiteEvent, off: boolean, tell: (text: string) => void}} props */
 function Sending({ event, off, tell }) {
   const guard = nearestGuard.value;
-  const robot = nearestRobot.value;
+  const robot = nearestRobot.value || idleRobot();
   const send = async () => {
     const done = await assignTo(event, guard);
     tell(done.ok ? done.text : '');
