@@ -85,3 +85,13 @@ def test_only_what_the_dva_permits_is_shown(
         page.let(5.0)
         known = {name for name, value in readings(page).items() if value != "unknown"}
         assert known == {"temperature"}
+
+
+def test_whoever_looks_before_the_sensors_are_known_gets_their_values_too(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with attached(monkeypatch, tmp_path) as page:
+        page.until(lambda: page.world.robot().device.id_tag in page.system.numbers)
+        assert readings(page) == {}
+        look(page, robot_1(page))
+        page.until(lambda: readings(page) and "unknown" not in readings(page).values())

@@ -78,6 +78,7 @@ class AttachedPages:
         clock.pulse(ROWS, self._tell_alarms)
         clock.pulse(SOON, self._tell_news)
         clock.pulse(DEVICES, self._tell_devices)
+        clock.pulse(DEVICES, self.sensors.go_on)
 
     # --- what is told ----------------------------------------------------------------------
 

@@ -109,11 +109,17 @@ class ToldSensors:
     ) -> None:
         self._device, self._told, self._id_of = device, told, id_of
         self._watches: dict[str, SensorWatch] = {}
+        self._looked: list[int] = []
 
     def watch(self, numbers: list[int]) -> None:
         """Somebody looks at these robots now, and at no others."""
+        self._looked = numbers[:MOST]
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Begin where it has become known by now which sensors a robot has; end what is over."""
         known = self._told.devices
-        wanted = [id_tag for id_tag in map(self._id_of, numbers[:MOST]) if id_tag in known]
+        wanted = [id_tag for id_tag in map(self._id_of, self._looked) if id_tag in known]
         for id_tag in [one for one in self._watches if one not in wanted]:
             self._watches.pop(id_tag).end()
         for id_tag in wanted:

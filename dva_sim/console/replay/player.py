@@ -109,13 +109,15 @@ class Player:
 
     def close(self) -> None:
         """Leave nothing behind."""
+        self.audit.close()
         if self._site is not None:
             self._site.cleanup()
             self._site = None
 
     def _site_files(self, run: RecordedRun) -> Path:
         """Where the site of a recording lies as files, as long as it is played."""
-        self.close()
+        if self._site is not None:
+            self._site.cleanup()
         self._site = TemporaryDirectory(prefix="dva-sim-")
         folder, files = Path(self._site.name), pack(run.playback.site)
         for name, data in files.items():
@@ -295,4 +297,3 @@ def playing(player: Player) -> Iterator[Player]:
         yield player
     finally:
         player.close()
-        player.audit.close()

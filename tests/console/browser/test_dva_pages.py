@@ -387,7 +387,7 @@ def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
     assert verify(audit).is_ended
 
 
-def test_whom_the_dva_lets_look_alone_is_offered_no_decision(
+def test_whom_the_dva_lets_look_alone_reads_sensors_and_is_offered_no_decision(
     programs: Programs, elsewhere: tuple[str, Program], visit
 ) -> None:
     dva, _ = elsewhere
@@ -397,3 +397,7 @@ def test_whom_the_dva_lets_look_alone_is_offered_no_decision(
     expect(page.get_by_role("region", name="Alarms")).to_contain_text("Fire", timeout=SLOW)
     expect(page.get_by_role("button", name=re.compile("^Seen"))).to_have_count(0)
     expect(page.get_by_role("button", name="Take over")).to_have_count(0)
+    page.get_by_role("link", name="Map").click()
+    page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
+    card = page.get_by_role("complementary", name="What is chosen")
+    expect(card).to_contain_text(re.compile(r"temperature \d"), timeout=SLOW)
