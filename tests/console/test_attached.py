@@ -94,6 +94,11 @@ def test_what_is_no_address_is_refused(dva):
         AttachOptions(dva=dva).check()
 
 
+def test_an_audit_log_that_cannot_be_kept_is_told_before_anything_starts():
+    with pytest.raises(ConfigError, match=r"should end in \.sqlite"):
+        AttachOptions(dva="127.0.0.1:5600", audit=Path("log.txt")).check()
+
+
 def test_without_a_key_each_console_has_an_id_of_its_own():
     options = AttachOptions(dva="127.0.0.1:5600")
     assert options.own_id(None) != options.own_id(None)
