@@ -249,6 +249,7 @@ def console(
             keys=keys,
             scenario=scenario,
             changes=changes,
+            audit=audit,
             host=host,
             port=port,
             token=not no_token,

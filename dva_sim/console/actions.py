@@ -11,12 +11,13 @@ from functools import partial
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.answers import Answers, answering
+from dva_sim.console.alarm_actions import AlarmActions
+from dva_sim.console.answers import BYE, Answers, answering
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
-from dva_sim.console.room_actions import AlarmActions, RoomActions
+from dva_sim.console.room_actions import RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Seats
 from dva_sim.console.sliders import change_pattern
 from dva_sim.console.tour import tour_of
@@ -26,8 +27,6 @@ from dva_sim.network.realtime import FASTEST
 
 Line = dict[str, Any]
 
-
-BYE = "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
 
@@ -70,7 +69,9 @@ class Actions:
             **self._at_robots.doers,
             **GuardActions(world).doers,
             **self._rooms.doers,
-            **AlarmActions(world, self._rooms).doers,
+            **AlarmActions(
+                world.alarms, world.author, self._rooms.doers["event_acknowledge"]
+            ).doers,
             **world.dva.doers,
         }
 

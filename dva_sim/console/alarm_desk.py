@@ -1,10 +1,13 @@
-"""What in a run wants somebody to act, as alarms, and what people at pages do about them."""
+"""What wants somebody to act, as alarms, and what people at pages do about them.
+
+What is shown is a run, or a system elsewhere: both tell the same few facts (`AlarmFacts`).
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.alarms import AlarmCondition, Alarms
@@ -18,19 +21,59 @@ ESCALATED_FOR: Final = 60.0  # so long an escalation counts as lasting, time of 
 OUTDOORS: Final = "outdoors"
 
 
+class AlarmFacts(Protocol):
+    """What can become an alarm, beside the events that pages are told of."""
+
+    def lost(self, robots: Sequence[Line]) -> Iterable[tuple[str, str]]:
+        """The labels of robots that are lost in drive, by the rows that pages get, and why."""
+
+    def is_somebody_free(self) -> bool:
+        """Whether a guard or a robot could be sent somewhere."""
+
+
+class RunFacts:
+    """Those of a run.
+
+    Args:
+        run: Which.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def lost(self, robots: Sequence[Line]) -> Iterator[tuple[str, str]]:
+        """Robots that their watchdog has stopped."""
+        labels = self._run.stage.labels
+        by_row = {n: labels[robot] for n, robot in enumerate(self._run.field.robots)}
+        for row in robots:
+            driven = row["mode"] == Mode.TELEOPERATION.value and row["watchdog_left_s"] == 0.0
+            if driven and "first command" not in row["stands"]:
+                yield by_row.get(row["i"], str(row["i"])), "its watchdog stopped it"
+
+    def is_somebody_free(self) -> bool:
+        """Whether somebody whom the DVA hears was sent nowhere."""
+        desk = self._run.dva.desk
+        return any(
+            entry.device.device_type in (ROBOT, GUARD)
+            and not entry.silent
+            and entry.device.id_tag not in desk.orders.engaged
+            for entry in desk.registry.entries.values()
+        )
+
+
 class AlarmDesk:
     """The alarms of a console.
 
     Args:
-        run: In which.
+        facts: Of what is shown.
         clock: Real time [s]: what people can bear does not hang on the pace of a run.
 
     Attributes:
         alarms: What decides.
     """
 
-    def __init__(self, run: Run, clock: Callable[[], float] | None = None) -> None:
-        self._run, self._clock = run, clock or (lambda: time.monotonic())
+    def __init__(self, facts: AlarmFacts, clock: Callable[[], float] | None = None) -> None:
+        self._facts, self._clock = facts, clock or (lambda: time.monotonic())
         self.alarms = Alarms()
         self._since: dict[str, int] = {}
 
@@ -41,8 +84,19 @@ class AlarmDesk:
             one._replace(since_ms=one.since_ms or self._from(one.key, now_ms)) for one in found
         ]
         self._since = {one.key: one.since_ms for one in timed}
+        self.alarms.update(timed, self._clock())
+        return self._line(now_ms)
+
+    def _from(self, key: str, now_ms: int) -> int:
+        return self._since.get(key, now_ms)
+
+    def hold(self, now_ms: int) -> Line:
+        """Nothing is known of what has changed: the alarms stay as they are, but for shelves."""
+        self.alarms.go_on(self._clock())
+        return self._line(now_ms)
+
+    def _line(self, now_ms: int) -> Line:
         now = self._clock()
-        self.alarms.update(timed, now)
         return {
             "k": "alarms",
             "t": now_ms,
@@ -53,33 +107,16 @@ class AlarmDesk:
             "left_out": self.alarms.left_out,
         }
 
-    def _from(self, key: str, now_ms: int) -> int:
-        return self._since.get(key, now_ms)
-
-    def _lost(self, robots: Iterable[Line]) -> Iterator[AlarmCondition]:
+    def _lost(self, robots: Sequence[Line]) -> Iterator[AlarmCondition]:
         """Robots that are driven and hear nothing."""
-        labels = self._run.stage.labels
-        numbers = {robot: n for n, robot in enumerate(self._run.field.robots)}
-        by_row = {n: labels[robot] for robot, n in numbers.items()}
-        for row in robots:
-            driven = row["mode"] == Mode.TELEOPERATION.value and row["watchdog_left_s"] == 0.0
-            if driven and "first command" not in row["stands"]:
-                label = by_row.get(row["i"], str(row["i"]))
-                text = f"{label} is lost in drive: its watchdog stopped it"
-                yield AlarmCondition(f"lost {label}", "robot lost", "high", "", text)
+        for label, why in self._facts.lost(robots):
+            text = f"{label} is lost in drive: {why}"
+            yield AlarmCondition(f"lost {label}", "robot lost", "high", "", text)
 
     def _nobody(self, events: Iterable[Line]) -> Iterator[AlarmCondition]:
         """Events wait, and nobody is free to go."""
-        desk = self._run.dva.desk
         waits = sum(1 for event in events if event["state"] == "pending")
-        entries = desk.registry.entries.values()
-        free = any(
-            entry.device.device_type in (ROBOT, GUARD)
-            and not entry.silent
-            and entry.device.id_tag not in desk.orders.engaged
-            for entry in entries
-        )
-        if waits and not free:
+        if waits and not self._facts.is_somebody_free():
             text = f"nobody is left to send, and {waits} wait"
             yield AlarmCondition("nobody", "nobody left to send", "high", "", text)
 

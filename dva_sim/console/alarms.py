@@ -115,6 +115,10 @@ class Alarms:
                 self._raise(condition, now, known)
             else:
                 self._go_on(known, condition, now)
+        self.go_on(now)
+
+    def go_on(self, now: float) -> None:
+        """Time goes by: shelves end, and so may a flood."""
         self._unshelve_the_due(now)
         self._look_for_a_flood(now)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.kernel.errors import DvaSimError
 
 Line = dict[str, Any]
+
+BYE: Final = "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
 
 
 class Answers:

@@ -10,14 +10,15 @@ import queue
 import socket
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import (
     BEGIN,
     END,
@@ -113,6 +114,12 @@ class AuditKeeper:
         """`then` is told when all that was put so far is on the disk, or why it is not yet."""
         self._asked.put((None, then))
 
+    def line(self, now_ms: int) -> dict[str, Any]:
+        """How the log stands, for pages."""
+        stands = {"rows": self.number, "hash": self.head, "problem": self.problem}
+        where = {"lasting": self.is_lasting, "file": str(self.path) if self.is_lasting else ""}
+        return {"k": "audit", "t": now_ms, **stands, **where}
+
     # --- in the world's thread ------------------------------------------------------------------
 
     def fileno(self) -> int:
@@ -180,3 +187,29 @@ class AuditKeeper:
         self._done.append((rows, waiting, problem))
         with suppress(BlockingIOError):  # then it is awake already
             self._wakes.send(b"!")
+
+
+@contextmanager
+def auditing(
+    path: Path | None, clock: PacedClock, about: Mapping[str, Any], say: Callable[[str], object]
+) -> Iterator[AuditKeeper]:
+    """Keep who does what, and say in the end by which hash that can be held against.
+
+    Args:
+        path: See `AuditKeeper`.
+        clock: Of what is shown.
+        about: What is told of it in the first row.
+        say: Prints a line.
+
+    Raises:
+        ConfigError: the file cannot be used, or its chain is broken.
+    """
+    keeper = AuditKeeper(path, lambda: clock.now, about)
+    clock.watch(keeper.fileno(), keeper.take)
+    try:
+        yield keeper
+    finally:
+        clock.unwatch(keeper.fileno())
+        keeper.close()
+        if keeper.is_lasting:
+            say(f"{keeper.path} written: {keeper.number} rows, the last {keeper.head}")

@@ -34,6 +34,7 @@ DECISIONS: Final = frozenset(
     ]
 )
 STOPS: Final = frozenset(["stop", "emergency", "release", "guard_leave"])
+DONE, REFUSED = "done", "refused"
 _HEAD: Final = frozenset(["id", "do", "client", "role", "robots", "robot", "event", "reason"])
 SECRET: Final = frozenset(["server", "port"])
 
@@ -45,7 +46,12 @@ class Audited:
         keeper: Of the file.
         author: What the person of a page is called.
         label: The name of a device, by its id.
+
+    Attributes:
+        noted: Actions whose end is noted here; of all others the DVA tells.
     """
+
+    noted: frozenset[str] = ACTIONS
 
     def __init__(
         self,
@@ -68,8 +74,9 @@ class Audited:
             raise Refused(f"{self.keeper.problem}; nothing is done until it can be")
 
         def told(ok: bool, text: str, /, **more: Any) -> None:
-            if what in ACTIONS:
-                self._note(what, client, line, ok, text)
+            if what in self.noted:
+                outcome = more.get("outcome", DONE if ok else REFUSED)
+                self._note(what, client, line, outcome, text)
             if what in STOPS:
                 said(ok, text, **more)
                 return
@@ -84,7 +91,7 @@ class Audited:
 
         return told
 
-    def _note(self, what: str, client: str, line: Line, ok: bool, text: str) -> None:
+    def _note(self, what: str, client: str, line: Line, outcome: str, text: str) -> None:
         robots = line.get("robots") or ([line["robot"]] if "robot" in line else [])
         named = robots if isinstance(robots, str) else ", ".join(map(str, robots))
         details = {k: v for k, v in line.items() if k not in _HEAD | SECRET}
@@ -96,7 +103,7 @@ class Audited:
                 event=line.get("event"),
                 subject=self._label(named),
                 cause=str(line.get("reason", "")),
-                outcome="done" if ok else "refused",
+                outcome=outcome,
                 text=text,
                 details=details,
             )
@@ -130,10 +137,15 @@ class Audited:
             event=fact.event,
             subject=(fact.device and self._label(fact.device)) or "",
             cause=fact.cause,
-            outcome="done" if ok else "refused",
+            outcome=DONE if ok else REFUSED,
             text=": ".join(text for text in said if text),
             details=details,
         )
+
+
+def name_of_page(client: str) -> str:
+    """What somebody is called of whom nothing is known but the page."""
+    return f"page {client.partition('-')[0]}" if client != "rest" else "program"
 
 
 def _short(value: Any) -> Any:

@@ -14,7 +14,7 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.phone_input import samples_of, settings_of
 from dva_sim.console.phone_seat import PhoneSeat
 from dva_sim.console.phones import TYPES
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.refusal import NO_ANSWER, Refused, Said
 from dva_sim.console.seats import Seats
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.protocol import messages as m
@@ -215,9 +215,6 @@ class PhoneActions:
         phone.calibrate(settings)
         later = " from the next drive on" if phone.driven is not None else ""
         said(True, f"calibrated{later}{kept}")
-
-
-NO_ANSWER = "the DVA does not answer"
 
 
 def _identity(line: Line) -> tuple[str, str, str]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
+
+UNKNOWN: Final = "unknown"  # outcome of what may have been done or not: nobody has answered
+NO_ANSWER: Final = "the DVA does not answer"
 
 
 class Said(Protocol):
@@ -10,6 +13,11 @@ class Said(Protocol):
 
     def __call__(self, ok: bool, text: str, /, **more: Any) -> object:
         """Told whether it was done, what there is to say of it, and what was asked for."""
+
+
+def unanswered(said: Said, text: str = NO_ANSWER) -> None:
+    """Tell that nobody has answered, so that one cannot know whether it was done."""
+    said(False, text, outcome=UNKNOWN)
 
 
 class Refused(Exception):

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Final
+from typing import Any
 
-from dva_sim.agents.operator.handheld import Gathered
-from dva_sim.agents.operator.steps import give_back, start
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.missions import inspection_of, send_on_mission
 from dva_sim.console.refusal import Refused, Said
-from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.console.rooms import ConsoleRoom
 from dva_sim.console.seats import Seats
 from dva_sim.console.takeover import Takeover
 from dva_sim.console.world import ConsoleWorld
@@ -18,9 +17,6 @@ from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
 Doer = Callable[[str, Line, Said], object]
-
-ASK_PERIOD: Final = 3.0  # from one question how a mission stands to the next [s]
-UNDER_WAY: Final = ("under_way", "waiting", "replanning")
 
 
 class RoomActions:
@@ -45,7 +41,7 @@ class RoomActions:
         self.doers: Mapping[str, Doer] = {
             "room_join": self._join,
             "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self._decide),
+            **dict.fromkeys(DECISIONS, self.decide),
             "mission": self._mission,
             "take_over": self._take_over,
         }
@@ -91,7 +87,8 @@ class RoomActions:
 
     # --- events -----------------------------------------------------------------------------
 
-    def _decide(self, client: str, line: Line, said: Said) -> None:
+    def decide(self, client: str, line: Line, said: Said) -> None:
+        """Decide on an event."""
         body, done = decision_of(line, self._device, self._rooms.decisions)
         self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
 
@@ -141,54 +138,12 @@ class RoomActions:
         if status is None:
             raise Refused(f"there is no event {line['event']}")
         robot = self._robot(line["robot"])
-        body = m.Inspect(status.event_id, status.kind, status.position)
-        self._room(client, line, said, partial(self._send, robot=robot, body=body, said=said))
+        label, body = self._world.run.stage.labels[robot], inspection_of(status)
 
-    def _send(self, room: ConsoleRoom, robot: str, body: m.Inspect, said: Said) -> None:
-        device, label = room.device, room.device.label_of(robot)
+        def send(room: ConsoleRoom) -> None:
+            send_on_mission(room.device, robot, label, body, said)
 
-        def granted(reply: m.Reply) -> None:
-            if not isinstance(reply.content, m.Permission):
-                said(False, f"{label}: {why(reply)}")
-                return
-            session = reply.content.session
-
-            def refused(text: str) -> None:
-                give_back(device, robot, session)
-                said(False, f"{label}: {text}")
-
-            def begun() -> None:
-                self._follow(room, robot, session)
-                said(True, f"{label} goes to event {body.event_id} by itself")
-
-            start(
-                *(device, robot, body, lambda: session),
-                wanted=lambda: True,
-                begun=begun,
-                refused=refused,
-                lost=lambda: refused("it does not answer"),
-            )
-
-        device.connect(robot)
-        wish = m.PermissionRequest(robot, "missions")
-        device.ask(device.dva, wish, granted, lambda: said(False, NO_ANSWER))
-
-    @staticmethod
-    def _follow(room: ConsoleRoom, robot: str, session: int) -> None:
-        """Ask how a mission stands until it is over; then the robot is given back."""
-        device = room.device
-
-        def answered(reply: m.Reply) -> None:
-            status = reply.content
-            if isinstance(status, m.MissionStatus) and status.mission_state in UNDER_WAY:
-                device.clock.call_after(ASK_PERIOD, ask)
-            else:
-                give_back(device, robot, session)
-
-        def ask() -> None:
-            device.ask(robot, m.GetMissionStatus(), answered, session=session)
-
-        device.clock.call_after(ASK_PERIOD, ask)
+        self._room(client, line, said, send)
 
     def _take_over(self, client: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
@@ -210,47 +165,6 @@ class RoomActions:
                 said(ok, text, **more)
 
             event = self._rooms.event_of(robot)
-            Takeover(room, robot, reason, event, seat.device.id_tag, take, ended).begin()
+            Takeover(room.agent, robot, reason, event, seat.device.id_tag, take, ended).begin()
 
         self._room(client, line, said, begin)
-
-
-class AlarmActions:
-    """Does what people ask for about alarms.
-
-    Args:
-        world: In which.
-        rooms: Whose devices tell the DVA that an event was seen.
-    """
-
-    def __init__(self, world: ConsoleWorld, rooms: RoomActions) -> None:
-        self._world, self._desk, self._rooms = world, world.alarms, rooms
-        self.doers: Mapping[str, Doer] = {
-            "alarm_acknowledge": self._acknowledge,
-            "alarm_shelve": self._shelve,
-            "alarm_unshelve": self._unshelve,
-        }
-
-    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
-        """What an open event is behind is acknowledged at the DVA, all else here."""
-        keys = self._desk.members(line["alarm"])
-        events = self._desk.by_event(keys)
-        for key in keys:
-            if key not in events:
-                self._desk.acknowledge(key, self._world.author(client))
-        if not events:
-            said(True, "seen")
-            return
-        answers = Gathered(len(events), said)
-        for number in events.values():
-            asked = line | {"do": "event_acknowledge", "event": number}
-            self._rooms.doers["event_acknowledge"](client, asked, answers)
-
-    def _shelve(self, client: str, line: Line, said: Said) -> None:
-        keys = self._desk.members(line["alarm"])
-        self._desk.shelve(keys, line["for_s"], self._world.author(client))
-        said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
-
-    def _unshelve(self, client: str, line: Line, said: Said) -> None:
-        self._desk.unshelve(self._desk.members(line["alarm"]))
-        said(True, "back in the list")

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.decisions import dispatch_line
-from dva_sim.console.refusal import Said
+from dva_sim.console.refusal import Said, unanswered
 from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.core.roles import Roles
 from dva_sim.protocol import messages as m
@@ -26,7 +27,6 @@ MOST_ROOMS: Final = 250
 RESTS: Final = FORGET_AFTER + 60.0  # from the end of one until its id is given out again [s]
 JOINED_WITHIN: Final = 30.0  # a person is told by then whether the DVA knows the device [s]
 LOOK: Final = 0.05  # from one look whether it does to the next [s]
-NO_ANSWER: Final = "the DVA does not answer"
 
 
 @dataclass
@@ -67,7 +67,7 @@ class ConsoleRoom:
             more = then(reply) if ok and then is not None else {}
             said(ok, done if ok else why(reply), **more)
 
-        self.agent.ask(body, answered, lambda: said(False, NO_ANSWER))
+        self.agent.ask(body, answered, partial(unanswered, said))
 
 
 def why(reply: m.Reply) -> str:
@@ -129,7 +129,7 @@ class ConsoleRooms:
                 room.registered = True
                 said(True, f"you are {room.device.label}, and may {status.role}")
             elif clock.now >= ends:
-                said(False, NO_ANSWER)
+                unanswered(said)
             return not room.registered and clock.now < ends
 
         room.agent.start()

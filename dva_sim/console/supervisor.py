@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
 from dva_sim.console.actions import Actions
-from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audit_keeper import auditing
 from dva_sim.console.children import ChildFailed
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.processes import ConsoleProcesses
@@ -74,7 +75,8 @@ class ConsoleSupervisor:
             world.recorder.kept.is_own = lambda _: True
             keep_run(world.run, world.recorder)
         try:
-            with self._audited(world):
+            with auditing(options.audit, world.clock, self._about(world), self._say) as audit:
+                world.keep_audit(audit)
                 yield
         finally:
             self._processes.end()
@@ -88,20 +90,9 @@ class ConsoleSupervisor:
             if lost is not None and sys.exc_info()[0] is None:
                 raise DvaSimError(lost)
 
-    @contextmanager
-    def _audited(self, world: ConsoleWorld) -> Iterator[None]:
-        """Keep who does what, and say in the end by which hash that can be held against."""
+    def _about(self, world: ConsoleWorld) -> dict[str, Any]:
         options = self._options
-        about = {"scenario": options.scenario, "seed": world.seed, "links": options.links}
-        keeper = AuditKeeper(options.audit, lambda: world.clock.now, about)
-        world.keep_audit(keeper)
-        try:
-            yield
-        finally:
-            world.clock.unwatch(keeper.fileno())
-            keeper.close()
-            if keeper.is_lasting:
-                self._say(f"{keeper.path} written: {keeper.number} rows, the last {keeper.head}")
+        return {"scenario": options.scenario, "seed": world.seed, "links": options.links}
 
     def _run(self, world: ConsoleWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:

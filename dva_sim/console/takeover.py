@@ -2,7 +2,8 @@
 
 A supervisor's control room revokes the holder's session and calls the robot off; it is sent to the
 same event anew, to be driven by the person's own seat; and the seat asks for it, which succeeds
-once it stands. Each step is a message, and the DVA may refuse any.
+once it stands. Where there is no seat, it is called off, and asked for otherwise. Each
+step is a message, and the DVA may refuse any.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from dva_sim.console.refusal import Said
-from dva_sim.console.rooms import NO_ANSWER, ConsoleRoom, why
+from dva_sim.agents.control_room.control_room import ControlRoomAgent
+from dva_sim.console.refusal import Said, unanswered
+from dva_sim.console.rooms import why
 from dva_sim.protocol import messages as m
 
 AGAIN: Final = 0.5  # while a robot is brought to a standstill, or the policy was quicker [s]
@@ -22,38 +24,38 @@ class Takeover:
     """One robot on its way into a person's hands.
 
     Args:
-        room: Whose decision it is.
+        agent: Of the control room whose decision it is.
         robot: By its id.
         reason: In words.
         event: How that stands which the robot was sent to; None: it was sent nowhere.
-        seat: Id of the device that shall drive it.
-        take: Has the seat ask for the robot.
+        seat: Id of the device that shall drive it; None: it is sent nowhere by the DVA.
+        take: Asks for the robot, for the seat or otherwise.
         said: Told how it ended.
     """
 
     def __init__(
         self,
-        room: ConsoleRoom,
+        agent: ControlRoomAgent,
         robot: str,
         reason: str,
         event: m.EventStatus | None,
-        seat: str,
+        seat: str | None,
         take: Callable[[Said], object],
         said: Said,
     ) -> None:
-        self._room, self._robot, self._reason = room, robot, reason
+        self._agent, self._robot, self._reason = agent, robot, reason
         self._event, self._seat, self._take, self._said = event, seat, take, said
         self._tries = 0
 
     def begin(self) -> None:
         """Take the robot from whoever holds it."""
-        if self._event is not None and self._event.operator == self._seat:
+        if self._seat is not None and self._event and self._event.operator == self._seat:
             self._ask_for_it()
         else:
-            self._room.agent.ask(m.Revoke(self._robot, self._reason), self._revoked, self._lost)
+            self._agent.ask(m.Revoke(self._robot, self._reason), self._revoked, self._lost)
 
     def _lost(self) -> None:
-        self._said(False, NO_ANSWER)
+        unanswered(self._said)
 
     def _revoked(self, reply: m.Reply) -> None:
         if reply.code != m.OK:
@@ -63,7 +65,7 @@ class Takeover:
         else:
             # Where nobody held it yet, somebody may still be about to; else this is refused.
             body = m.TakeOff(self._event.event_id, self._robot, self._reason)
-            self._room.agent.ask(body, self._called_off, self._lost)
+            self._agent.ask(body, self._called_off, self._lost)
 
     def _called_off(self, reply: m.Reply) -> None:
         self._send(reply.content)
@@ -72,12 +74,12 @@ class Takeover:
         """Send it to the same event, driven by the seat, if the event is still open."""
         event = content if isinstance(content, m.EventStatus) else self._event
         assert event is not None
-        if event.closed_for is not None:
+        if event.closed_for is not None or self._seat is None:
             self._ask_for_it()
             return
         number, decisions = event.event_id, event.decisions
         body = m.Assign(number, self._robot, self._seat, None, self._reason, decisions)
-        self._room.agent.ask(body, self._sent, self._lost)
+        self._agent.ask(body, self._sent, self._lost)
 
     def _sent(self, reply: m.Reply) -> None:
         status = reply.content
@@ -85,7 +87,7 @@ class Takeover:
             self._ask_for_it()
         elif isinstance(status, m.EventStatus):
             # The policy was quicker, or the robot is not free yet.
-            self._room.device.clock.call_after(AGAIN, self._send, status)
+            self._agent.device.clock.call_after(AGAIN, self._send, status)
         else:
             self._ask_for_it()
 
@@ -96,7 +98,7 @@ class Takeover:
         if ok or not self._has_another_try():
             self._said(ok, text, **more)
         else:
-            self._room.device.clock.call_after(AGAIN, self._ask_for_it)
+            self._agent.device.clock.call_after(AGAIN, self._ask_for_it)
 
     def _has_another_try(self) -> bool:
         self._tries += 1

@@ -102,17 +102,8 @@ class ToldWorld:
         self.tell(scene)
 
     def _tell_audit(self) -> None:
-        if self.audited is None:
-            return
-        keeper = self.audited.keeper
-        line = {
-            "k": "audit",
-            "t": self.feed.now_ms,
-            "rows": keeper.number,
-            "hash": keeper.head,
-        }
-        line |= {"problem": keeper.problem, "lasting": keeper.is_lasting}
-        self._tell_new(line | {"file": str(keeper.path) if keeper.is_lasting else ""}, but="t")
+        if self.audited is not None:
+            self._tell_new(self.audited.keeper.line(self.feed.now_ms), but="t")
 
     def clock_line(self) -> Line:
         """How time goes by."""

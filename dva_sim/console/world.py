@@ -15,9 +15,9 @@ from dva_sim.agents.observation import Cameras
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.alarm_desk import AlarmDesk
+from dva_sim.console.alarm_desk import AlarmDesk, RunFacts
 from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.audited import Audited
+from dva_sim.console.audited import Audited, name_of_page
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
@@ -46,15 +46,6 @@ Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
-POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = (
-    0.1,
-    0.1,
-    0.5,
-    1.0,
-    1.0,
-    1.0,
-)  # from one line to the next, real time [s]
-SOON = 0.05  # from one look at what has changed to the next, real time [s]
 
 
 class ConsoleWorld(ToldWorld):
@@ -135,7 +126,7 @@ class ConsoleWorld(ToldWorld):
         self.guards = PlayedGuards(self.run, self.feed)
         self.strangers = Strangers(self.run, self.feed)
         self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
-        self.alarms = AlarmDesk(self.run)
+        self.alarms = AlarmDesk(RunFacts(self.run))
         self.audited: Audited | None = None
         self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
         self.recorder.on_applied = self.seat_lines.applied
@@ -196,7 +187,6 @@ class ConsoleWorld(ToldWorld):
         self.audited = Audited(keeper, self.author, self._named)
         self.run.dva.on_fact = self.audited.decided
         keeper.on_rows = self._audit_written
-        self.clock.watch(keeper.fileno(), keeper.take)
 
     def _audit_written(self, rows: Sequence[AuditRow]) -> None:
         if self.recorder.kept is not None:
@@ -212,7 +202,7 @@ class ConsoleWorld(ToldWorld):
         seat = next((n for n, who in self.client_of.items() if who == client), None)
         if seat is not None:
             return self._persons[seat].device.label
-        return f"page {client.partition('-')[0]}" if client != "rest" else "program"
+        return name_of_page(client)
 
     def _named(self, device: str) -> str:
         """The name of a device by its id, or of things by their numbers."""

@@ -70,6 +70,27 @@ class Fact:
         """What it holds, by names, in plain numbers and words that JSON can hold."""
         return asdict(self)
 
+    @classmethod
+    def of_record(cls, record: m.AuditRecord, time: float, waited: float | None) -> Fact:
+        """A fact as a message tells it, which was heard at a time [s]."""
+        return cls(
+            time=time,
+            author=record.author,
+            label=record.label,
+            action=record.action,
+            role=record.role,
+            event=record.event_id,
+            device=record.device,
+            task=record.task,
+            arrival_in=record.arrival_in,
+            cause=record.reason,
+            code=record.code,
+            outcome=record.text,
+            advised=record.advised,
+            advised_in=record.advised_in,
+            waited=waited,
+        )
+
     def record(self) -> m.AuditRecord:
         """The same as a message, as far as one can hold it."""
         return m.AuditRecord(

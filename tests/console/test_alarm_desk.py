@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from phone_page import PhonePage
 
-from dva_sim.console.alarm_desk import ESCALATED_FOR, AlarmDesk
+from dva_sim.console.alarm_desk import ESCALATED_FOR, AlarmDesk, RunFacts
 from dva_sim.console.refusal import Refused
 
 
@@ -29,7 +29,7 @@ def page(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
 @pytest.fixture
 def desk(page: PhonePage) -> AlarmDesk:
     page.let(5.0)  # everybody has registered
-    return AlarmDesk(page.world.run)
+    return AlarmDesk(RunFacts(page.world.run))
 
 
 def texts(desk: AlarmDesk, *events: Any, robots: Any = (), now_ms: int = 10_000) -> list[str]:

@@ -80,7 +80,7 @@ def test_an_event_is_shown_as_the_dva_tells_it():
     )
     row = lines.event_row(status, 100.0, {ROBOT: "robot-1"}, None, HERE)
     assert (row["state"], row["severity"], row["over"]) == ("on scene", "critical", False)
-    assert (row["x_m"], row["y_m"], row["room"]) == (1.0, 2.0, "")
+    assert (row["x_m"], row["y_m"], row["room"]) == (1.0, 2.0, "unknown room")
     assert (row["reported_ms"], row["since_ms"]) == (80_000, 95_000)
     assert row["assigned"] == ["robot-1"]
 
@@ -92,6 +92,11 @@ def test_an_event_is_shown_as_the_dva_tells_it():
 def test_what_is_no_address_is_refused(dva):
     with pytest.raises(ConfigError, match="should be HOST:PORT"):
         AttachOptions(dva=dva).check()
+
+
+def test_an_audit_log_that_cannot_be_kept_is_told_before_anything_starts():
+    with pytest.raises(ConfigError, match=r"should end in \.sqlite"):
+        AttachOptions(dva="127.0.0.1:5600", audit=Path("log.txt")).check()
 
 
 def test_without_a_key_each_console_has_an_id_of_its_own():

@@ -13,12 +13,14 @@ from dva_sim.console.replay.moments import decided_on, event_at
 from dva_sim.console.replay.player import NOBODY, Player
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
+from dva_sim.console.web.audit import rows_of
 from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import write_recording
+from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
 from dva_sim.recordings.reading import read_recording
 from dva_sim.simulation.full.measures import tables_of
 from dva_sim.simulation.full.stage import DVA
@@ -325,3 +327,28 @@ def test_what_was_decided_is_shown_from_when_it_was():
     assert decided_on(facts, 1, 20.0)["note"] == "x"
     assert decided_on(facts, 1, 20.0)["decided"]["action"] == "note", "a refusal decides nothing"
     assert decided_on(facts, 2, 20.0)["decided"] is None
+
+
+# --- its audit log --------------------------------------------------------------------------
+
+
+def test_the_rows_of_an_audit_log_are_those_of_the_recording_that_is_played(tmp_path, playing):
+    log = AuditLog(tmp_path / "audit.sqlite")
+    entries = [AuditEntry(time_s=1.0, at_utc="", author="ana", action=a) for a in ("begin", "take")]
+    rows = log.append(entries)
+    log.close()
+    write_recording(drill(), tmp_path / "a.mcap", audit=[(1.0, plain_row(row)) for row in rows])
+    write_recording(drill(), tmp_path / "b.mcap")
+    told = playing(None, Shelf(tmp_path))
+    told.ask("open_recording", "1", name="a.mcap")
+
+    path = told.player.audit.path
+    assert rows_of(path) == rows
+    assert rows_of(path, after=1) == rows[1:]
+    assert told.lines["scene"]["replay"]["audit"]
+    stands = told.lines["audit"]
+    assert (stands["rows"], stands["hash"], stands["file"]) == (2, rows[1].hash, "a.mcap")
+
+    told.ask("open_recording", "2", name="b.mcap")
+    assert rows_of(path) == []
+    assert not told.lines["scene"]["replay"]["audit"]

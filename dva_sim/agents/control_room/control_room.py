@@ -28,6 +28,7 @@ class ControlRoomAgent:
         dispatch: How orders are given, and the own role; None: not told yet.
         orders: What it drives robots for, as it wanted, by event.
         on_event: Told of each change of an event.
+        on_list: Told when the DVA has told all events that there are.
         on_dispatch: Told when orders are given otherwise.
         on_record: Told of each decision.
         gives_up: Whether it gives a robot up that another asks for.
@@ -42,6 +43,7 @@ class ControlRoomAgent:
         self.dispatch: m.DispatchStatus | None = None
         self.orders: dict[int, m.Order] = {}
         self.on_event: Callable[[m.EventStatus], object] = do_nothing
+        self.on_list: Callable[[], object] = do_nothing
         self.on_dispatch: Callable[[m.DispatchStatus], object] = do_nothing
         self.on_record: Callable[[m.AuditRecord], object] = do_nothing
         self.on_message: Callable[[m.Message], object] = do_nothing
@@ -80,8 +82,12 @@ class ControlRoomAgent:
         """The list comes in parts, by number."""
 
         def more(reply: m.Reply) -> None:
-            if isinstance(reply.content, m.EventList) and reply.content.events:
+            if not isinstance(reply.content, m.EventList):
+                return
+            if reply.content.events:
                 self._ask_above(reply.content.events[-1].event_id)
+            else:
+                self.on_list()
 
         self.ask(m.GetEventList(number), more)
 

@@ -9,12 +9,16 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.missions import inspection_of, send_on_mission
+from dva_sim.console.refusal import NO_ANSWER, Refused, Said, unanswered
+from dva_sim.console.takeover import Takeover
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
+Doer = Callable[[str, Line, Said], object]
 
 
 class AttachedDecisions:
@@ -22,28 +26,73 @@ class AttachedDecisions:
 
     Args:
         system: To which the console is attached.
+        people: Who is at the pages.
     """
 
-    def __init__(self, system: AttachedSystem) -> None:
-        self._system = system
-        self.doers: Mapping[str, Callable[[Line, Said], object]] = {
+    def __init__(self, system: AttachedSystem, people: AttachedPeople) -> None:
+        self._system, self._people = system, people
+        self.doers: Mapping[str, Doer] = {
             "room_join": self._join,
             "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self._decide),
+            **dict.fromkeys(DECISIONS, self.decide),
+            "mission": self._mission,
+            "take_over": self._take_over,
         }
 
-    def _join(self, _: Line, said: Said) -> None:
-        """All who decide here share the console's own control room."""
+    def _join(self, client: str, line: Line, said: Said) -> None:
+        """All who decide here share the console's own control room, each by an own name."""
         if not self._system.answers:
-            raise Refused("the DVA does not answer")
-        said(True, f"you are {self._system.device.label}, and may {self._system.role}")
+            raise Refused(NO_ANSWER)
+        name = str(line.get("name", "")).strip()[:64]
+        name = self._people.join(client, str(line.get("role", "look")), name)
+        said(True, f"you are {name}, and may {self._system.role}")
 
-    def _raise(self, line: Line, said: Said) -> None:
+    def _raise(self, _: str, line: Line, said: Said) -> None:
         place = self._system.place_of(line["x_m"], line["y_m"])
         self._ask(*report_of(line, place), said)
 
-    def _decide(self, line: Line, said: Said) -> None:
+    def decide(self, _: str, line: Line, said: Said) -> None:
+        """Decide on an event."""
         self._ask(*decision_of(line, self._device, self._seen), said)
+
+    # --- robots ------------------------------------------------------------------------------
+
+    def _mission(self, _: str, line: Line, said: Said) -> None:
+        """Have a robot go to an event by itself, and look at it."""
+        status = self._system.agent.events.get(line["event"])
+        if status is None:
+            raise Refused(f"there is no event {line['event']}")
+        self._send(self._robot(line["robot"]), status, said)
+
+    def _send(self, robot: str, status: m.EventStatus, said: Said) -> None:
+        label = self._system.label_of(robot)
+        send_on_mission(self._system.device, robot, label, inspection_of(status), said)
+
+    def _take_over(self, _: str, line: Line, said: Said) -> None:
+        """Take a robot from whoever holds it; it goes by itself where it was sent to."""
+        robot, agent = self._robot(line["robot"]), self._system.agent
+        label = self._system.label_of(robot)
+        sent = (e for e in agent.events.values() if e.closed_for is None and e.responder == robot)
+        event = next(sent, None)
+
+        def take(said: Said) -> None:
+            if event is None:
+                said(True, f"{label} is nobody's now, and stands")
+            else:
+                self._send(robot, event, said)
+
+        Takeover(agent, robot, str(line["reason"]), event, None, take, said).begin()
+
+    def _robot(self, number: Any) -> str:
+        """The id of a robot that pages know by a number.
+
+        Raises:
+            Refused: the DVA has listed none.
+        """
+        found = self._system.id_of(number)
+        if found is None or found not in self._system.robots():
+            raise Refused(f"the DVA has listed no robot {number!r}")
+        return found
 
     def _ask(self, body: m.Body, done: str, said: Said) -> None:
         robots = self._system.robots
@@ -54,7 +103,7 @@ class AttachedDecisions:
             more = answer_of(reply, lambda device: device in robots()) if ok else {}
             said(ok, done if ok else words, **more)
 
-        self._system.agent.ask(body, answered, partial(said, False, "the DVA does not answer"))
+        self._system.agent.ask(body, answered, partial(unanswered, said))
 
     def _seen(self, event: int) -> int | None:
         """How many decisions on an event are known here."""

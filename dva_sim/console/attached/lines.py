@@ -19,6 +19,7 @@ from dva_sim.worlds.site import Site
 
 Line = dict[str, Any]
 AROUND: Final = 40.0  # of the first position, where no site is known [m]
+UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
 KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
 SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
 
@@ -108,13 +109,28 @@ def robot_row(told: ToldDevice, number: int, now: float) -> Line:
         holder_label=said.label if said is not None else None,
         session_age_s=round(said.held_for + now - since, 1) if said and held else None,
         camera=told.camera,
-        sensors=sensors_of(told),
+        sensors=readings_of(told, now),
     )
 
 
 def sensors_of(told: ToldDevice) -> list[str]:
     """What a device can measure, in words."""
     return [f"{sensor.name} [{sensor.unit}]" for sensor in told.sensors]
+
+
+def readings_of(told: ToldDevice, now: float) -> list[str]:
+    """What its sensors show, in words; a value that is not told any more is unknown."""
+    return [f"{sensor.name} {_reading(sensor, told, now)}" for sensor in told.sensors]
+
+
+def _reading(sensor: m.Sensor, told: ToldDevice, now: float) -> str:
+    value, heard = told.values.get(sensor.name, (None, 0.0))
+    if value is None or now - heard > SILENT_AFTER:
+        return "unknown"
+    if len(value.values) > 1:
+        return f"nearest {min(value.values):.3g} {value.unit}"
+    unit = "" if value.unit == "1" else f" {value.unit}"
+    return f"{value.values[0]:.3g}{unit}"
 
 
 def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> Line:
@@ -165,7 +181,7 @@ def event_row(
         "y_m": round(y, 2),
         "latitude_deg": status.position.latitude,
         "longitude_deg": status.position.longitude,
-        "room": site.room_at(x, y) if site is not None else "",
+        "room": site.room_at(x, y) if site is not None else UNKNOWN_ROOM,
         "severity": next(name for least, name in SEVERITIES if status.severity >= least),
         "severity_value": round(status.severity, 2),
         "state": status.event_state.replace("_", " "),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from dva_sim.console.audit_keeper import check_target
 from dva_sim.console.options import PageOptions
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
@@ -31,12 +32,14 @@ class AttachOptions(PageOptions):
         keys: Folder with the keys of the devices; None: without.
         scenario: Whose site is drawn; None: no plan is known.
         changes: Of the scenario, `KEY=VALUE`.
+        audit: File of the audit log; None: one that is gone with the console.
     """
 
     dva: str
     keys: Path | None = None
     scenario: str | None = None
     changes: tuple[str, ...] = ()
+    audit: Path | None = None
 
     @property
     def listen(self) -> str:
@@ -52,10 +55,12 @@ class AttachOptions(PageOptions):
         """Whether it can be.
 
         Raises:
-            ConfigError: the address is none.
+            ConfigError: the address is none, or no audit log can be kept where it is wanted.
         """
         if not is_address(self.dva):
             raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
+        if self.audit is not None:
+            check_target(self.audit)
 
     def site(self) -> Site | None:
         """What is known of the place.

@@ -5,8 +5,11 @@ from __future__ import annotations
 from contextlib import suppress
 
 from dva_sim.console.attached.actions import AttachedActions
+from dva_sim.console.attached.links import over_sockets
 from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.audit_keeper import auditing
 from dva_sim.console.children import ChildFailed
 from dva_sim.console.processes import ConsoleProcesses, Say
 from dva_sim.kernel.errors import DvaSimError
@@ -21,23 +24,32 @@ def attach(options: AttachOptions, say: Say) -> None:
         say: Prints a line.
 
     Raises:
-        ConfigError: address, keys or site are not as they should be.
+        ConfigError: address, keys, site or audit log are not as they should be.
         NetworkError: no port can be had.
         ChildFailed: the web process could not begin, or has ended by itself.
     """
     options.check()
-    system, processes = AttachedSystem(options), ConsoleProcesses(options, say)
+    system = AttachedSystem(options, over_sockets(options))
+    processes = ConsoleProcesses(options, say)
+    about = {"dva": options.dva, "scenario": options.scenario}
     try:
-        with ending_when_asked(system.clock, supervised=False) as ending:
-            processes.start(system, AttachedActions(system).take)
-            say(f"Attached to: {options.dva}")
-            if not ending.is_asked:
-                system.clock.go()
-                system.clock.run()
-            system.tell({"k": "bye", "t": system.now_ms, "why": "the console was ended"})
+        with auditing(options.audit, system.clock, about, say) as audit:
+            _show(AttachedPages(system, audit), processes, say)
     finally:
         processes.end()
         with suppress(DvaSimError):
             system.close()
     if processes.failed:
         raise ChildFailed(processes.failed)
+
+
+def _show(pages: AttachedPages, processes: ConsoleProcesses, say: Say) -> None:
+    system = pages.system
+    with ending_when_asked(system.clock, supervised=False) as ending:
+        path = pages.audited.keeper.path
+        processes.start(pages, AttachedActions(pages).take, audit=path)
+        say(f"Attached to: {system.options.dva}")
+        if not ending.is_asked:
+            system.clock.go()
+            system.clock.run()
+        pages.tell({"k": "bye", "t": system.now_ms, "why": "the console was ended"})

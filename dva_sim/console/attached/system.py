@@ -1,113 +1,82 @@
-"""A system that runs elsewhere, as a console shows it: all that is told to a control room.
+"""A system that runs elsewhere, as a control room knows it: what is asked of its DVA, and heard.
 
-Nothing here waits for the DVA: it is asked again and again, and what it last said stays shown,
-with a word that it does not answer.
+Nothing here waits for the DVA: it is asked again and again, and what it last said stays known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.agents.device import AgentDevice
-from dva_sim.console.attached import lines
+from dva_sim.agents.device import AgentDevice, do_nothing
+from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.told import ToldSystem
-from dva_sim.console.decisions import about_event, dispatch_line
 from dva_sim.console.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.real_links import start_of_day
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
-from dva_sim.kernel.recorder import Moment, Recorder
-from dva_sim.network.realtime import PacedClock
-from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.worlds.geo import GeoFrame
-
-Line = dict[str, Any]
-Tell = Callable[..., object]
 
 TIMEOUT, ATTEMPTS = 1.0, 2  # of what the DVA is asked [s]
 POLL: Final = 2.0  # from one question who is there to the next [s]
 ASK_SENSORS: Final = 10.0  # the same about sensors and cameras [s]
 UNHEARD: Final = 2 * POLL + TIMEOUT * ATTEMPTS  # without a word the DVA counts as gone [s]
-POSITIONS, ROWS, DEVICES, SOON = 0.2, 0.5, 1.0, 0.1  # from one line to the next, real time [s]
-FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is known [s]
 SOMEWHERE: Final = GeoFrame(0.0, 0.0)
 
 
 class AttachedSystem:
-    """What runs at another DVA; see `ConsoleSubject`.
+    """What runs at another DVA.
 
     Args:
         options: Where the DVA is.
+        links: To it.
 
     Attributes:
         clock: Real time.
+        recorder: Keeps the story.
+        note: Tells people that something has gone wrong.
         agent: The console's own control room.
         told: What the devices tell.
         fakes: Devices that were added by hand.
-        looked: Whether somebody looks at the table of devices.
+        numbers: By which pages know devices; each stays as it is.
+        site: Of the scenario, if one is named.
+        is_told: Whether the DVA has told all events of its present life.
+        on_devices: Called when there is a device more, or one less.
+        on_record: Told of each decision that the DVA tells of.
 
     Raises:
-        ConfigError: keys or site cannot be read.
-        NetworkError: no port can be had.
+        ConfigError: the site cannot be read.
     """
 
-    def __init__(self, options: AttachOptions) -> None:
-        self.options = options
-        self.tell: Tell = lambda *_: None
-        self.show: Tell = lambda *_: None
-        self.dropped: Callable[[], int] = lambda: 0
-        self.looked = False
-        self._site, ring = options.site(), options.ring()
-        own = options.own_id(ring)
-        self._frame = self._site.frame if self._site is not None else SOMEWHERE
-        self.clock, self.recorder, self._numbers = PacedClock(), Recorder(), dict[str, int]()
-        self.network = SocketNetwork(self.clock, ring, self.note)
-        self.network.introduce(DVA, options.dva)
-        address = self.network.join(own, options.listen)
-        self.device = self._make(own, "control room", CONTROL_ROOM, address)
+    def __init__(self, options: AttachOptions, links: AttachedLinks) -> None:
+        self.options, self._links = options, links
+        self.clock, self.recorder, self.note = links.clock, links.recorder, links.note
+        self.site, self.numbers = options.site(), dict[str, int]()
+        self.frame = self.site.frame if self.site is not None else SOMEWHERE
+        self.device = self._make(links.own, "control room", CONTROL_ROOM, links.address)
         self.agent = ControlRoomAgent(self.device)
-        self.told = ToldSystem(self.device, self._tell_scene)
+        self.on_devices: Callable[[], object] = do_nothing
+        self.on_record: Callable[[m.AuditRecord], object] = do_nothing
+        self.told = ToldSystem(self.device, lambda: self.on_devices())
         self.fakes = FakeDevices(self._make, self._is_known, _identity, self._drop)
-        self._heard, self._answers, self._newest = -UNHEARD, False, dict[str, Any]()
-        self._is_shown = False
+        self.is_told, self._heard = False, -UNHEARD
 
-    # --- see `ConsoleSubject` --------------------------------------------------------------
-
-    def serve_cameras(self, base: str) -> None:
-        """Robots that run elsewhere say themselves where their pictures are."""
-
-    def show_scene(self) -> None:
-        """There is nothing to be drawn here: of the world only messages are known."""
-
-    def note(self, text: str) -> None:
-        """Something has gone wrong that people should know of."""
-        self.recorder.tell(self.clock.now, "console", text, "link")
-
-    def begin(self) -> None:
-        """Take part, tell what there is, and from then on what changes."""
+    def start(self) -> None:
+        """Take part, and ask again and again."""
+        self.agent.on_list = self._all_told
         self.agent.on_record = self._note_record
         self.agent.start()
         clock = self.clock
         clock.every(POLL, self._ask_who, start=clock.now + 0.05)
         clock.every(ASK_SENSORS, self._ask_sensors, start=clock.now + POLL)
-        clock.call_after(FIRST_SCENE, self._tell_scene)
-        clock.pulse(POSITIONS, self._tell_positions)
-        clock.pulse(ROWS, self._tell_rows)
-        clock.pulse(SOON, self._tell_news)
-        clock.pulse(DEVICES, self._tell_devices)
 
     def close(self) -> None:
         """Take part no more."""
         self.device.leave()
-        self.network.close()
-
-    def place_of(self, x: float, y: float) -> m.Position:
-        """Where on earth a place of the map lies [m]."""
-        return m.Position(*self._frame.to_latlon(x, y))
+        self._links.close()
 
     # --- what is asked ---------------------------------------------------------------------
 
@@ -124,14 +93,23 @@ class AttachedSystem:
 
     def _ask_who(self) -> None:
         def answered(reply: m.Reply) -> None:
-            self._heard = self.clock.now
-            if reply.code == m.NOT_REGISTERED:  # a DVA that knows nothing of an earlier life
-                self.agent.events.clear()
-                self.agent.told_at.clear()
+            was_gone, self._heard = not self.answers, self.clock.now
+            if reply.code == m.NOT_REGISTERED or (was_gone and self.is_told):
+                self._ask_anew()  # it may know nothing of an earlier life
             if isinstance(reply.content, m.DeviceList):
                 self.told.list(reply.content.devices)
 
         self.agent.ask(m.GetDeviceList(), answered)
+
+    def _ask_anew(self) -> None:
+        """Nothing of what was told of events counts until the DVA has told all there are."""
+        self.is_told = False
+        self.agent.events.clear()
+        self.agent.told_at.clear()
+        self.clock.call_after(0.0, self.agent.refresh)  # after the device has registered again
+
+    def _all_told(self) -> None:
+        self.is_told = True
 
     def _ask_sensors(self) -> None:
         def answered(reply: m.Reply) -> None:
@@ -140,124 +118,68 @@ class AttachedSystem:
 
         self.agent.ask(m.GetSensorInfo(), answered)
 
-    def robots(self) -> list[str]:
-        """Ids of the robots that the DVA lists."""
-        known = self.told.devices.items()
-        return [i for i, told in known if told.device.device_type == ROBOT and i not in self._fake]
-
-    def label_of(self, id_tag: str) -> str:
-        """What a device calls itself."""
-        told = self.told.devices.get(id_tag)
-        return id_tag if told is None else told.device.label
-
-    def number_of(self, id_tag: str) -> int | None:
-        """By which pages know a device."""
-        return self._numbers.get(id_tag)
-
-    # --- what is told ----------------------------------------------------------------------
-
-    @property
-    def now_ms(self) -> int:
-        """Time since the start [ms]."""
-        return round(1000 * self.clock.now)
-
-    @property
-    def _fake(self) -> dict[str, AgentDevice]:
-        return self.fakes.devices
-
-    def _tell_scene(self) -> None:
-        """Whoever is new gets a number; an unknown place lies where somebody first is."""
-        status = next((t.status for t in self.told.devices.values() if t.status is not None), None)
-        if self._site is None and self._frame is SOMEWHERE and status is not None:
-            self._frame = GeoFrame(status.position.latitude, status.position.longitude)
-        if self.clock.now < FIRST_SCENE and self._frame is SOMEWHERE:
-            return
-        things = lines.things_of(self.told.devices.values(), self._numbers)
-        self._is_shown = True
-        self.tell(lines.scene_of_told(things, self.options.dva, self._site, self._frame))
-
-    def _tell_positions(self) -> None:
-        if self._frame is SOMEWHERE and any(t.status for t in self.told.devices.values()):
-            self._tell_scene()
-        if self._is_shown:
-            rows = lines.positions(self.told.devices, self._numbers, self._frame)
-            self._tell_new({"k": "pos", "t": self.now_ms, "p": rows})
-
-    def _tell_rows(self) -> None:
-        if self.answers is not self._answers:
-            self._answers = self.answers
-            word = "answers" if self._answers else "does not answer: what is shown is old"
-            self.recorder.tell(self.clock.now, "dva", word, "link")
-        now, devices = self.clock.now, self.told.devices
-        clock = {"factor": 1, "paused": False, "lag_s": 0, "given_up_s": 0, "held_by_lag": False}
-        robots = {i: told for i, told in devices.items() if told.device.device_type == ROBOT}
-        people = {i: t.status for i, t in devices.items() if isinstance(t.status, m.PersonStatus)}
-        number = self._numbers.get
-        self.tell(
-            {
-                "k": "rows",
-                "t": self.now_ms,
-                "clock": clock,
-                "link": lines.link(),
-                "dropped": self.dropped(),
-                "server": self._server(),
-                "robots": [
-                    lines.robot_row(told, self._numbers[i], now)
-                    for i, told in robots.items()
-                    if number(i) is not None
-                ],
-                "people": [
-                    {"i": number(i), "doing": s.activity}
-                    for i, s in people.items()
-                    if number(i) is not None
-                ],
-                "order": None,
-            }
-        )
-
-    def _server(self) -> Line:
-        told: Line = {"listens": self.answers, "address": self.options.dva, "port": None}
-        return told | {"modelled": False, "own": False, "role": self.role}
-
-    def _tell_news(self) -> None:
-        agent, labels = self.agent, {i: t.device.label for i, t in self.told.devices.items()}
-        rows = [
-            lines.event_row(status, agent.told_at[number], labels, self._site, self._frame)
-            | about_event(agent.events, agent.told_at, number)
-            for number, status in sorted(agent.events.items())
-        ]
-        self._tell_new({"k": "events", "t": self.now_ms, "events": rows})
-        dispatch = dispatch_line(agent.dispatch, 0.0)
-        self._tell_new({"k": "control", "t": self.now_ms, "dispatch": dispatch, "rooms": []})
-        moments, self.recorder.timeline = self.recorder.timeline, list[Moment]()
-        for time, who, what, kind in moments:
-            line = {"k": "story", "t": round(1000 * time), "who": who, "what": what}
-            self.tell(line | {"kind": kind})
-
-    def _tell_devices(self) -> None:
-        if self.looked:
-            now, may = self.clock.now, self.role == "supervise"
-            rows = [
-                lines.device_row(told, now, i in self._fake, may)
-                for i, told in self.told.devices.items()
-            ]
-            self.tell({"k": "devices", "t": self.now_ms, "devices": rows})
-
-    def _tell_new(self, line: Line) -> None:
-        """Tell a line unless nothing in it has changed, its time apart."""
-        said = {name: value for name, value in line.items() if name != "t"}
-        if self._newest.get(line["k"]) != said:
-            self._newest[line["k"]] = said
-            self.tell(line)
-
     def _note_record(self, record: m.AuditRecord) -> None:
         """What somebody has decided, in words."""
         about = f" about event {record.event_id}" if record.event_id is not None else ""
         refused = f", refused: {record.text}" if record.code != m.OK else ""
         said = f"{record.action.replace('_', ' ')}{about}{refused}"
         self.recorder.tell(self.clock.now, record.label, said, "order")
+        self.on_record(record)
 
-    # --- fake devices ----------------------------------------------------------------------
+    # --- what is known ---------------------------------------------------------------------
+
+    @property
+    def now_ms(self) -> int:
+        """Time since the start [ms]."""
+        return round(1000 * self.clock.now)
+
+    def place_of(self, x: float, y: float) -> m.Position:
+        """Where on earth a place of the map lies [m]."""
+        return m.Position(*self.frame.to_latlon(x, y))
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether it is known where on earth the map lies."""
+        return self.frame is not SOMEWHERE
+
+    def find_place(self) -> bool:
+        """An unknown place lies where somebody first is; whether it is found by that."""
+        status = next((t.status for t in self.told.devices.values() if t.status is not None), None)
+        if self.is_placed or status is None:
+            return False
+        self.frame = GeoFrame(status.position.latitude, status.position.longitude)
+        return True
+
+    def robots(self) -> list[str]:
+        """Ids of the robots that the DVA lists."""
+        known = self.told.devices.items()
+        return [i for i, told in known if told.device.device_type == ROBOT and not self.is_fake(i)]
+
+    def is_fake(self, id_tag: str) -> bool:
+        """Whether a device was added by hand, here."""
+        return id_tag in self.fakes.devices
+
+    def id_of(self, number: int) -> str | None:
+        """The id of a device that pages know by a number; None: there is none."""
+        return next((i for i, known in self.numbers.items() if known == number), None)
+
+    def label_of(self, id_tag: str) -> str:
+        """What a device calls itself."""
+        told = self.told.devices.get(id_tag)
+        return id_tag if told is None else told.device.label
+
+    def named(self, given: str) -> str:
+        """The name of a device by its id, or of things by their numbers, as in `0, 1`."""
+        by_number = {str(number): id_tag for id_tag, number in self.numbers.items()}
+        return ", ".join(self.label_of(by_number.get(one, one)) for one in given.split(", "))
+
+    def age_of(self, event: int | None) -> float | None:
+        """How long ago an event was first reported [s]."""
+        if event is None or (status := self.agent.events.get(event)) is None:
+            return None
+        return status.age + self.clock.now - self.agent.told_at[event]
+
+    # --- devices ---------------------------------------------------------------------------
 
     def _make(self, id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
         return AgentDevice(
@@ -266,9 +188,9 @@ class AttachedSystem:
             device_type=kind,
             address=address,
             dva=DVA,
-            network=self.network,
+            network=self._links.network,
             recorder=self.recorder,
-            frame=self._frame,
+            frame=self.frame,
             timeout=TIMEOUT,
             attempts=ATTEMPTS,
             time_of_day=start_of_day(self.clock),

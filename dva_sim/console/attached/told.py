@@ -30,6 +30,7 @@ class ToldDevice:
         beats: Heartbeats heard.
         camera: Where its pictures are.
         sensors: What it can measure.
+        values: What its sensors have shown last, and when that came [s]; by their names.
     """
 
     device: m.Device
@@ -40,6 +41,7 @@ class ToldDevice:
     beats: int = 0
     camera: str | None = None
     sensors: tuple[m.Sensor, ...] = ()
+    values: dict[str, tuple[m.SensorValue, float]] = field(default_factory=dict)
     rate: Rate = field(default_factory=Rate)
     subscriptions: list[Subscription] = field(default_factory=list)
 

@@ -62,7 +62,7 @@ def show_replay(options: ReplayOptions, say: Say) -> None:
     ):
         report = None if player.shelf is None else player.shelf.report
         try:
-            processes.start(player, player.take, report)
+            processes.start(player, player.take, report, player.audit.path)
             if not ending.is_asked:
                 player.clock.go()
                 player.clock.run()

@@ -14,6 +14,7 @@ from typing import Any
 
 from dva_sim.console.answers import Answers
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.replay.audit import RecordedAudit
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
@@ -23,13 +24,8 @@ from dva_sim.recordings.writing import pack
 
 Line = dict[str, Any]
 SLOWEST = 0.1  # that a recording is played, as a multiple of real time
-POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = (
-    0.1,
-    0.25,
-    1.0,
-    0.1,
-    0.2,
-)  # from one line to the next, real time [s]
+# From one line to the next, real time [s].
+POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = 0.1, 0.25, 1.0, 0.1, 0.2
 NOBODY = "this is a recording: there is nobody who could be told to do anything"
 
 
@@ -44,12 +40,13 @@ class Player:
     Attributes:
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
+        audit: The audit log in the recording.
     """
 
     def __init__(
         self, run: RecordedRun | None, shelf: Shelf | None = None, clock: PacedClock | None = None
     ) -> None:
-        self.run, self.shelf = run, shelf
+        self.run, self.shelf, self.audit = run, shelf, RecordedAudit()
         self.clock = clock or PacedClock()
         self.tell: Callable[..., object] = lambda *_: None
         self.show: Callable[..., object] = lambda *_: None
@@ -112,13 +109,15 @@ class Player:
 
     def close(self) -> None:
         """Leave nothing behind."""
+        self.audit.close()
         if self._site is not None:
             self._site.cleanup()
             self._site = None
 
     def _site_files(self, run: RecordedRun) -> Path:
         """Where the site of a recording lies as files, as long as it is played."""
-        self.close()
+        if self._site is not None:
+            self._site.cleanup()
         self._site = TemporaryDirectory(prefix="dva-sim-")
         folder, files = Path(self._site.name), pack(run.playback.site)
         for name, data in files.items():
@@ -132,6 +131,7 @@ class Player:
             self.tell(self._empty_scene())
         else:
             self.tell(self.run.scene())
+            self.tell(self.audit.show(self.run.audit, self.run.name))
             self.show_scene()
             if not self.run.is_drawn:
                 self.note("no pictures: a hazard of this run has a class that is not loaded")

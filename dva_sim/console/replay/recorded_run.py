@@ -49,12 +49,13 @@ class RecordedRun:
         things: Everybody, with the number that lines call them by.
         numbers: Those numbers, by id and by label.
         duration: How long it lasts [s].
+        audit: The rows of the console's audit log, if it had one.
         tracks: Where everybody was.
     """
 
     def __init__(self, opened: Opened, name: str) -> None:
         self.playback = playback = opened.playback
-        self.name, self.is_whole = name, opened.is_whole
+        self.name, self.is_whole, self.audit = name, opened.is_whole, opened.audit
         self.duration = playback.duration
         self.things: list[Line] = []
         self.numbers: dict[str, int] = {}
@@ -143,6 +144,7 @@ class RecordedRun:
             "duration_ms": round(1000 * self.duration),
             "whole": self.is_whole,
             "marks": self._marks(),
+            "audit": bool(self.audit),
         }
         return line
 

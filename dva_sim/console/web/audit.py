@@ -1,4 +1,7 @@
-"""The audit log for pages and programs: read from its file, which the world alone writes."""
+"""The audit log for pages and programs: read from its file, which the world alone writes.
+
+Of a recording its rows are in a file of JSON, as they were kept.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,16 @@ from starlette.responses import JSONResponse, Response
 from dva_sim.console.audit_measures import measured
 from dva_sim.console.web.rest import NOT_KEPT, problem
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.recordings.audit_log import COLUMNS, AuditRow, plain_row, read_rows, verify
+from dva_sim.recordings.audit_log import (
+    COLUMNS,
+    SUFFIX,
+    AuditRow,
+    Verified,
+    plain_row,
+    read_rows,
+    verify,
+    verify_plain,
+)
 
 MOST_ROWS = 1000  # in one answer
 FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would compute what begins so
@@ -40,14 +52,14 @@ class AuditPages:
         return await self._read(self._rows, int(after))
 
     def _rows(self, path: Path, after: int) -> Response:
-        rows = read_rows(path, after, MOST_ROWS)
+        rows = rows_of(path, after, MOST_ROWS)
         body = {"rows": [plain_row(row) for row in rows], "more": len(rows) == MOST_ROWS}
         return JSONResponse(body, headers=NOT_KEPT)
 
     async def measures(self, _: Request) -> Response:
         """`GET /api/audit/measures`: times to acknowledge and to assign, and overrides."""
         return await self._read(
-            lambda path: JSONResponse(measured(read_rows(path)), headers=NOT_KEPT)
+            lambda path: JSONResponse(measured(rows_of(path)), headers=NOT_KEPT)
         )
 
     async def check(self, _: Request) -> Response:
@@ -56,12 +68,12 @@ class AuditPages:
 
     async def as_csv(self, _: Request) -> Response:
         """`GET /api/audit.csv`."""
-        return await self._read(lambda path: _file("csv", "text/csv", csv_of(read_rows(path))))
+        return await self._read(lambda path: _file("csv", "text/csv", csv_of(rows_of(path))))
 
     async def as_json(self, _: Request) -> Response:
         """`GET /api/audit.json`."""
         return await self._read(
-            lambda path: _file("json", "application/json", json_of(read_rows(path)))
+            lambda path: _file("json", "application/json", json_of(rows_of(path)))
         )
 
     async def _read(self, do: Any, *more: Any) -> Response:
@@ -74,8 +86,28 @@ class AuditPages:
         return answer
 
 
+def rows_of(path: Path, after: int = 0, most: int | None = None) -> list[AuditRow]:
+    """The rows after a number, so many of them.
+
+    Raises:
+        ConfigError: the file holds none, or what no log writes.
+    """
+    if path.suffix == SUFFIX:
+        return read_rows(path, after, -1 if most is None else most)
+    return [AuditRow(**plain) for plain in _kept(path) if plain["number"] > after][:most]
+
+
+def _kept(path: Path) -> list[dict[str, Any]]:
+    kept: list[dict[str, Any]] = json.loads(path.read_text())
+    return kept
+
+
+def _verified(path: Path) -> Verified:
+    return verify(path) if path.suffix == SUFFIX else verify_plain(_kept(path))
+
+
 def _checked(path: Path) -> Response:
-    found = verify(path)
+    found = _verified(path)
     wrong = found.problem
     body = {
         "rows": found.rows,

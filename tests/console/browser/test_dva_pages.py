@@ -6,6 +6,7 @@ What runs is asked for before the browser, so that it is there until the last pa
 from __future__ import annotations
 
 import re
+import signal
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,9 +19,13 @@ from patience import PATIENCE_S
 from playwright.sync_api import Page, expect
 from programs import Program, Programs, all_gone_after
 
+from dva_sim.network.keys import create_keys
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.mistakes import check_message
+from dva_sim.recordings.audit_log import verify
+from dva_sim.simulation.full.stage import id_of, team_of
+from dva_sim.simulation.scenario import build, load
 
 DVA, STRANGER = "02:00:00:00:00:01", "02:00:00:0A:00:01"
 HOSTILE = "<img src=x onerror=alert(1)>"
@@ -326,3 +331,73 @@ def test_an_attached_console_shows_what_messages_tell_and_the_rest_as_unknown(
     expect(page.get_by_text("does not answer")).to_have_count(0, timeout=SLOW)
     page.get_by_role("link", name="Devices").click()
     expect(robot).to_contain_text("Idle", timeout=SLOW)
+
+
+@pytest.fixture
+def supervised(programs: Programs, tmp_path: Path) -> tuple[str, Path]:
+    """The address of a DVA elsewhere that lets a control room supervise, and the keys for it."""
+    dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
+    create_keys(keys, [*team_of(build(load("hands-on"))), id_of("control-room", 1)])
+    words = ("--dva", dva, "--keys", str(keys), "--for", "1000")
+    roles = ("--set", "dva.control_rooms={control-room-1: supervise}")
+    asks = ("--set", "dispatch.mode=ask_first")
+    programs.start("live", "hands-on", "--only", "dva", *words, *roles, *asks)
+    programs.start("live", "hands-on", "--only", "world", *words)
+    return dva, keys
+
+
+def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
+    programs: Programs, supervised: tuple[str, Path], visit, tmp_path: Path
+) -> None:
+    dva, keys = supervised
+    audit = tmp_path / "audit.sqlite"
+    words = ("--dva", dva, "--keys", str(keys), "--audit", str(audit))
+    console, address = started(programs, "hands-on", *words)
+    page = visit.open(address, "events")
+
+    page.get_by_label("Your name").fill("ana")
+    expect(page.get_by_role("button", name="Use this name")).to_be_visible(timeout=SLOW)
+    page.get_by_role("button", name="Use this name").click()
+    expect(page.get_by_text("The log calls you ana")).to_be_visible(timeout=SLOW)
+    alarms = page.get_by_role("region", name="Alarms")
+    expect(alarms).to_contain_text("Fire", timeout=SLOW)
+    assert faults(page) == []
+    page.get_by_role("button", name=re.compile("^Seen: Fire")).click()
+    expect(alarms).to_contain_text("acknowledged by control room", timeout=SLOW)
+    page.get_by_role("button", name="Event 1", exact=True).click()
+    page.get_by_role("button", name="Send a guard").click()
+    expect(page.get_by_role("table", name="Events")).to_contain_text("guard-", timeout=SLOW)
+    page.get_by_role("button", name="Send a robot on a mission").click()
+    done = page.get_by_role("status", name="Done")
+    expect(done).to_contain_text("by itself", timeout=SLOW)
+    page.get_by_role("button", name="Take over").click()
+    expect(done).to_contain_text("stands", timeout=SLOW)
+    expect(page).to_have_url(re.compile("#/events"))  # there is no page to drive on
+
+    page.get_by_role("link", name="Audit").click()
+    table = page.get_by_role("table", name="Audit log")
+    rows = table.get_by_role("row")
+    expect(rows.filter(has_text="anasuperviseacknowledge")).to_have_count(1)
+    expect(rows.filter(has_text="by itself").filter(has_text="ana")).to_have_count(1)
+    expect(page.get_by_role("status", name="Verification")).to_contain_text("The chain holds")
+    assert faults(page) == []
+    page.close()
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    assert verify(audit).is_ended
+
+
+def test_whom_the_dva_lets_look_alone_reads_sensors_and_is_offered_no_decision(
+    programs: Programs, elsewhere: tuple[str, Program], visit
+) -> None:
+    dva, _ = elsewhere
+    page = visit.open(started(programs, "--dva", dva)[1], "events")
+
+    expect(page.get_by_text("The DVA lets this console look.")).to_be_visible(timeout=SLOW)
+    expect(page.get_by_role("region", name="Alarms")).to_contain_text("Fire", timeout=SLOW)
+    expect(page.get_by_role("button", name=re.compile("^Seen"))).to_have_count(0)
+    expect(page.get_by_role("button", name="Take over")).to_have_count(0)
+    page.get_by_role("link", name="Map").click()
+    page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
+    card = page.get_by_role("complementary", name="What is chosen")
+    expect(card).to_contain_text(re.compile(r"temperature \d"), timeout=SLOW)

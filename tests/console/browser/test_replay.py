@@ -15,6 +15,7 @@ from programs import Programs, all_gone_after
 from recordings.runs import drill, drive
 
 from dva_sim.recordings import write_recording
+from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
 from dva_sim.simulation.full.measures import tables_of
 
 
@@ -28,6 +29,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text += "<script>document.title = 'a script ran'</script>"
     (folder / "report.html").write_text(text)
     return folder
+
+
+@pytest.fixture
+def audited(folder: Path, tmp_path: Path) -> Path:
+    """A recording with an audit log, of which it holds the end alone."""
+    log = AuditLog(tmp_path / "audit.sqlite")
+    actions = ("begin", "take", "acknowledge", "end")
+    entries = [
+        AuditEntry(time_s=t, at_utc="", author="ana", action=a) for t, a in enumerate(actions)
+    ]
+    rows = [(row.time_s, plain_row(row)) for row in log.append(entries)[1:]]
+    log.close()
+    write_recording(drill(), tmp_path / "audited.mcap", audit=rows)
+    return tmp_path / "audited.mcap"
 
 
 @pytest.fixture
@@ -182,3 +197,24 @@ def test_axe_finds_nothing_serious_and_all_fits(
         expect(link).to_have_attribute("aria-current", "page")
         assert faults(page) == []
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_audit_log_of_a_recording_is_shown_with_its_chain(
+    address, audited: Path, folder: Path, visit
+) -> None:
+    page = visit.open(address("replay", audited, "--console"), "audit")
+
+    table = page.get_by_role("table", name="Audit log")
+    expect(table.locator("tbody tr")).to_have_count(3)
+    expect(table).to_contain_text("acknowledge")
+    state = page.get_by_role("status", name="Verification")
+    expect(state).to_contain_text("The chain holds")
+    expect(page.get_by_text("It is kept in audited.mcap.")).to_be_visible()
+    assert faults(page) == []
+
+
+def test_a_recording_without_an_audit_log_has_no_page_of_it(address, folder: Path, visit) -> None:
+    page = visit.open(address("replay", folder / "drill.mcap", "--console"), "events")
+
+    expect(page.get_by_role("link", name="Story")).to_be_visible()
+    expect(page.get_by_role("link", name="Audit")).to_have_count(0)

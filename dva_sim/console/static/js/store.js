@@ -86,10 +86,18 @@ export const robots = computed(
 export const mayDrive = computed(() => roleIsOneOf('phone', 'drive', 'dispatch', 'supervise'));
 /** Whether it is one of the console's own, and no phone's. */
 export const isOperator = computed(() => roleIsOneOf('drive', 'dispatch', 'supervise'));
-/** Whether it is one for sending people and robots to events. */
-export const mayDispatch = computed(() => !isPast.value && roleIsOneOf('dispatch', 'supervise'));
-/** Whether it is one for taking robots from their holders. */
-export const maySupervise = computed(() => !isPast.value && roleIsOneOf('supervise'));
+/** What a DVA elsewhere lets this console do; where the world is the console's own: all. */
+export const allowed = computed(() => (isAttached.value ? (rows.value?.server?.role ?? 'look') : 'supervise'));
+/** Whether this page's address is one for sending people and robots to events. */
+export const isDispatcher = computed(() => roleIsOneOf('dispatch', 'supervise'));
+/** Whether people and robots can be sent to events from here. */
+export const mayDispatch = computed(
+  () => !isPast.value && isDispatcher.value && ['dispatch', 'supervise'].includes(allowed.value),
+);
+/** Whether robots can be taken from their holders from here. */
+export const maySupervise = computed(
+  () => !isPast.value && roleIsOneOf('supervise') && allowed.value === 'supervise',
+);
 /** @param {string[]} roles */
 const roleIsOneOf = (...roles) => roles.includes(you.value?.role ?? '');
 /** Whether anything can be steered now. */

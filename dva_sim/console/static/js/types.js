@@ -27,7 +27,8 @@
  *   pages?: string[], lag_limit_s: number, dva_address?: string, attached?: boolean, phone?: PhoneOffer,
  *   replay?: ReplayAbout | null}} Scene
  * @typedef {{t: number, who: string, what: string, kind: string}} Mark
- * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[]}} ReplayAbout
+ * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Mark[],
+ *   audit: boolean}} ReplayAbout
  * @typedef {{name: string, bytes: number, part: string, person: number | null,
  *   trial: number | null, levels: unknown[], values: unknown[]}} ShelfEntry
  * @typedef {{folder: string, question: string, report: boolean, factors: string[],
@@ -59,7 +60,7 @@
  * @typedef {{t: number, clock: Clock, link: LinkSetting, dropped: number, robots: RobotRow[],
  *   people: {i: number, doing: string}[], order?: Order | null, server?: Server}} Rows
  * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
- *   own?: boolean}} Server
+ *   own?: boolean, role?: string}} Server
  *
  * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
  *   severity: number, contained: boolean}} Hazard

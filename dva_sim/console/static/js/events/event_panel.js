@@ -1,6 +1,6 @@
 /** One event: how it stands, whom the policy would send, and all that can be done about it. */
 import { html, useRef, useState } from '../../vendor/preact.js';
-import { mayDispatch, maySteer, maySupervise, robots, rowOf, selection, thingNamed } from '../store.js';
+import { isAttached, mayDispatch, maySteer, maySupervise, modeOf, robots, rowOf, selection, thingNamed } from '../store.js';
 import { act } from '../net/actions.js';
 import { worldNow } from '../net/world_time.js';
 import { isOpen } from '../map/shown.js';
@@ -89,10 +89,14 @@ function Doing({ event }) {
 const sentTo = (event) =>
   event.assigned.filter((who) => ['robot', 'guard'].includes(thingNamed(who)?.kind ?? ''));
 
+/** A robot that could go though the policy would not send it, as it needs nobody who drives. */
+const idleRobot = () =>
+  robots.value.find((robot) => modeOf(robot.i) === 'Idle' && !rowOf(robot.i)?.holder)?.label ?? '';
+
 /** @param {{event: SiteEvent, off: boolean, tell: (text: string) => void}} props */
 function Sending({ event, off, tell }) {
   const guard = nearestGuard.value;
-  const robot = nearestRobot.value;
+  const robot = nearestRobot.value || idleRobot();
   const send = async () => {
     const done = await assignTo(event, guard);
     tell(done.ok ? done.text : '');
@@ -114,16 +118,21 @@ function TakeOver({ off, words, event, tell }) {
   const label = picked || (here[0] ?? robots.value[0])?.label || '';
   const take = async () => {
     tell('');
-    const done = await act('take_over', { robot: label, reason: words || 'taken over by hand' });
+    const done = await act('take_over', { robot: label, reason: words || (isAttached.value ? 'taken over' : 'taken over by hand') });
     if (!done.ok) return;
+    if (isAttached.value) {
+      tell(done.text);
+      return;
+    }
     selection.value = null;
     chooseRobots([label]);
   };
+  const hint = isAttached.value ? 'From whoever holds it: it goes by itself where it was sent to' : 'Into your own hands';
   return html`<div class="take-over"><label for="take-over">Robot</label>
     <select id="take-over" value=${label} onInput=${(/** @type {any} */ event) => pick(event.currentTarget.value)}>
       ${robots.value.map((robot) => html`<option value=${robot.label} selected=${robot.label === label}>
         ${robot.label}${holderText(robot.i)}</option>`)}</select>
-    <button type="button" disabled=${off || !label} onClick=${take}>Take over</button></div>`;
+    <button type="button" disabled=${off || !label} title=${hint} onClick=${take}>Take over</button></div>`;
 }
 
 /** @param {number} i */

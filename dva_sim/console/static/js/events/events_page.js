@@ -1,6 +1,6 @@
 /** What waits for me? Alarms, events, one of them with what can be done, and how orders are given. */
 import { html, useEffect } from '../../vendor/preact.js';
-import { connection, control, isPast, mayDispatch, maySupervise, you } from '../store.js';
+import { allowed, connection, control, isDispatcher, isPast, mayDispatch, maySupervise, you } from '../store.js';
 import { act, ask } from '../net/actions.js';
 import { Choice, Field } from '../ui/fields.js';
 import { AlarmList } from './alarm_list.js';
@@ -16,7 +16,7 @@ const MODES = /** @type {[string, string][]} */ ([
 
 /** The page. */
 export function EventsPage() {
-  useEffect(keepJoining, [you.value?.client, connection.value]);
+  useEffect(keepJoining, [you.value?.client, connection.value, mayDispatch.value]);
   return html`<main class="page events-page" id="main" tabindex="-1">
     <h1 class="hidden">Events</h1>
     <div class="events-list">${!isPast.value && html`<${Head} /><${AlarmList} />`}<${EventsTable} /></div>
@@ -43,10 +43,13 @@ function keepJoining() {
   };
 }
 
+const byDva = () => `The DVA lets this console ${allowed.value}.`;
+const byAddress = () => `This address may ${you.value?.role ?? 'look'}. Those for dispatch and for
+  supervision are printed where the console was started.`;
+
 function Head() {
   if (!mayDispatch.value) {
-    return html`<p class="soft events-head">This address may ${you.value?.role ?? 'look'}. Those for dispatch and for
-      supervision are printed where the console was started.</p>`;
+    return html`<p class="soft events-head">${isDispatcher.value ? byDva() : byAddress()}</p>`;
   }
   const me = control.value?.rooms?.find((room) => room.client === you.value?.client);
   const asked = control.value?.dispatch;

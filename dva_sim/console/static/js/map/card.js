@@ -1,6 +1,7 @@
 /** More about what is chosen. */
-import { html } from '../../vendor/preact.js';
+import { html, useEffect } from '../../vendor/preact.js';
 import { doingOf, isAttached, modeOf, rowOf, rows, selection, thingAt, tracks } from '../store.js';
+import { watch } from '../net/sockets.js';
 import { worldNow } from '../net/world_time.js';
 import { chooseRobots } from '../shell/route.js';
 import { useEvery } from '../ui/every.js';
@@ -51,8 +52,18 @@ function thingCard(key) {
       <dt>Speed</dt><dd>${speed}</dd>
       <dt>Place</dt><dd>${where}</dd>
     </dl>
+    ${robot && isAttached.value && html`<${Watched} i=${key} />`}
     ${robot && !isAttached.value && html`<button type="button" class="wide" onClick=${() => chooseRobots([thing.label])}>
       <${Icon} name="gamepad-2" />Look through its camera</button>`}`;
+}
+
+/** As long as it is shown, its sensors are listened to. @param {{i: number}} props */
+function Watched({ i }) {
+  useEffect(() => {
+    watch([i]);
+    return () => watch([]);
+  }, [i]);
+  return null;
 }
 
 /** @param {number} key */

@@ -31,7 +31,7 @@ const PAGES = /** @type {[string, string, string][]} */ ([
   ['network', 'Network', 'activity'],
   ['audit', 'Audit', 'shield-check'],
 ]);
-const NOT_ATTACHED = ['robots', 'drive', 'network', 'audit']; // of which messages tell nothing
+const NOT_ATTACHED = ['robots', 'drive', 'network']; // of which messages tell nothing
 // What sends something is not there in a recording.
 const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['map', 'Map', 'map'],
@@ -40,6 +40,7 @@ const OF_A_RECORDING = /** @type {[string, string, string][]} */ ([
   ['robots', 'Robots', 'bot'],
   ['events', 'Events', 'flag'],
   ['story', 'Story', 'activity'],
+  ['audit', 'Audit', 'shield-check'],
 ]);
 const SHELF = /** @type {[string, string, string]} */ (['recordings', 'Recordings', 'play']);
 const BODIES = /** @type {Record<string, any>} */ ({
@@ -81,7 +82,7 @@ function pages() {
   if (some) return PAGES.filter(([name]) => some.includes(name));
   if (isAttached.value) return PAGES.filter(([name]) => !NOT_ATTACHED.includes(name));
   if (!isPast.value) return PAGES;
-  const past = replay.value ? OF_A_RECORDING : [];
+  const past = replay.value ? OF_A_RECORDING.filter(([name]) => name !== 'audit' || replay.value?.audit) : [];
   return shelf.value ? [...past, SHELF] : past;
 }
 

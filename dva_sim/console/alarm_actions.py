@@ -1,0 +1,55 @@
+"""What people ask for about alarms: to have seen them, or to have them out of the list a while."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dva_sim.agents.operator.handheld import Gathered
+from dva_sim.console.alarm_desk import AlarmDesk
+from dva_sim.console.refusal import Said
+
+Line = dict[str, Any]
+Doer = Callable[[str, Line, Said], object]
+
+
+class AlarmActions:
+    """Does what people ask for about alarms.
+
+    Args:
+        desk: With the alarms.
+        author: What the person of a page is called.
+        acknowledge: Tells the DVA that somebody has seen an event.
+    """
+
+    def __init__(self, desk: AlarmDesk, author: Callable[[str], str], acknowledge: Doer) -> None:
+        self._desk, self._author, self._acknowledge_event = desk, author, acknowledge
+        self.doers: Mapping[str, Doer] = {
+            "alarm_acknowledge": self._acknowledge,
+            "alarm_shelve": self._shelve,
+            "alarm_unshelve": self._unshelve,
+        }
+
+    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
+        """What an open event is behind is acknowledged at the DVA, all else here."""
+        keys = self._desk.members(line["alarm"])
+        events = self._desk.by_event(keys)
+        for key in keys:
+            if key not in events:
+                self._desk.acknowledge(key, self._author(client))
+        if not events:
+            said(True, "seen")
+            return
+        answers = Gathered(len(events), said)
+        for number in events.values():
+            about = {"do": "event_acknowledge", "event": number, "id": f"{line['id']} {number}"}
+            self._acknowledge_event(client, line | about, answers)
+
+    def _shelve(self, client: str, line: Line, said: Said) -> None:
+        keys = self._desk.members(line["alarm"])
+        self._desk.shelve(keys, line["for_s"], self._author(client))
+        said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
+
+    def _unshelve(self, client: str, line: Line, said: Said) -> None:
+        self._desk.unshelve(self._desk.members(line["alarm"]))
+        said(True, "back in the list")

@@ -1,0 +1,47 @@
+"""What messages tell of robots that are lost, and of who is left to be sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.attached.lines import SILENT_AFTER
+from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+
+class ToldFacts:
+    """See `AlarmFacts`; of a robot's watchdog no message tells, but its silence can be heard.
+
+    Args:
+        system: To which the console is attached.
+    """
+
+    def __init__(self, system: AttachedSystem) -> None:
+        self._system = system
+
+    def lost(self, robots: Sequence[Line]) -> Iterator[tuple[str, str]]:
+        """Robots of which nothing is heard since they were driven."""
+        for told in self._system.told.devices.values():
+            status = told.status
+            driven = isinstance(status, m.RobotStatus) and status.mode == Mode.TELEOPERATION.value
+            if driven and told.heard is not None and self._is_long_ago(told.heard):
+                yield told.device.label, "nothing is heard of it"
+
+    def is_somebody_free(self) -> bool:
+        """Whether somebody is listed who was sent to no open event."""
+        events = self._system.agent.events.values()
+        engaged = {status.responder for status in events if status.closed_for is None}
+        return any(
+            told.device.device_type in (ROBOT, GUARD)
+            and not self._is_long_ago(told.listed)
+            and id_tag not in engaged
+            for id_tag, told in self._system.told.devices.items()
+        )
+
+    def _is_long_ago(self, when: float) -> bool:
+        return self._system.clock.now - when > SILENT_AFTER

@@ -1,0 +1,141 @@
+"""The audit log of an attached console: what people do here, and what the DVA tells of decisions.
+
+A decision of this console is one row: who asked for it at which page, what the DVA answered, and
+what its own record of it says beside, such as whom the policy would have sent. Of everybody else's
+decisions there is the record alone. Where nobody answers, the outcome is `unknown`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, Final
+
+from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audited import ACTIONS, DECISIONS, Audited
+from dva_sim.console.refusal import Said
+from dva_sim.core.audit import Fact
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
+MESSAGES: Final = DECISIONS | {"revoke"}  # what is decided by a message to the DVA
+
+
+@dataclass
+class AskedDecision:
+    """A decision of which the DVA's answer or its record is still to come.
+
+    Attributes:
+        action: As the DVA calls it.
+        event: About which event; None: none, or one that has no number yet.
+        record: What the DVA has published of it.
+        finish: Tells how it ended; None: not answered yet.
+    """
+
+    action: str
+    event: int | None
+    record: m.AuditRecord | None = None
+    finish: Callable[[], object] | None = None
+
+    def is_told_by(self, record: m.AuditRecord) -> bool:
+        """Whether a record can be that of this decision."""
+        fits = record.action == self.action and self.event in (None, record.event_id)
+        return fits and self.record is None
+
+
+class AttachedAudit(Audited):
+    """Keeps the audit log of an attached console.
+
+    Args:
+        keeper: Of the file.
+        system: To which the console is attached.
+        author: What the person of a page is called.
+    """
+
+    noted = (ACTIONS | DECISIONS) - {"release"}  # nothing is in hand here that could be released
+
+    def __init__(
+        self, keeper: AuditKeeper, system: AttachedSystem, author: Callable[[str], str]
+    ) -> None:
+        super().__init__(keeper, author, system.named)
+        self._system = system
+        self._asked: dict[str, AskedDecision] = {}  # by the id of the action
+
+    def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
+        """See `Audited`; a decision that was taken waits a moment for the DVA's record of it."""
+        told = super().answered(what, client, line, said)
+        if what not in MESSAGES:
+            return told
+        number = str(line["id"])
+        asked = self._asked[number] = AskedDecision(_action(what), line.get("event"))
+
+        def wait(ok: bool, text: str, /, **more: Any) -> None:
+            asked.finish = partial(told, ok, text, **more)
+            if not ok or asked.record is not None:
+                asked.finish()
+            else:
+                self._system.clock.call_after(RECORD_WITHIN, self._finish, number)
+
+        return wait
+
+    def _finish(self, number: str) -> None:
+        asked = self._asked.get(number)
+        if asked is not None and asked.finish is not None:
+            asked.finish()
+
+    def heard(self, record: m.AuditRecord) -> None:
+        """The DVA tells of a decision."""
+        if record.author == self._system.device.id_tag:
+            for number, asked in self._asked.items():
+                if asked.is_told_by(record):
+                    asked.record = record
+                    self._finish(number)
+                    return
+            if record.code != m.OK:  # its answer has said so already
+                return
+        self.decided(self._fact(record))
+
+    def _fact(self, record: m.AuditRecord) -> Fact:
+        waited = self._system.age_of(record.event_id)
+        return Fact.of_record(record, self._system.clock.now, waited)
+
+    def _note(self, what: str, client: str, line: Line, outcome: str, text: str) -> None:
+        asked = self._asked.pop(str(line["id"]), None)
+        if asked is None:
+            super()._note(what, client, line, outcome, text)
+        elif asked.record is not None:
+            fact = replace(self._fact(asked.record), label=self._author(client))
+            words = line.get("text") or line.get("kind")
+            self.decided(replace(fact, text=words, mode=line.get("mode")))
+        else:
+            self._note_answer(asked, client, line, outcome, text)
+
+    def _note_answer(
+        self, asked: AskedDecision, client: str, line: Line, outcome: str, text: str
+    ) -> None:
+        """All that is known of a decision is what was asked for, and what was answered."""
+        told = {key: line[key] for key in ("task", "mode", "kind", "severity") if key in line}
+        waited = self._system.age_of(asked.event)
+        self.keeper.put(
+            self.keeper.entry(
+                asked.action.replace("_", " "),
+                self._author(client),
+                device=self._system.device.id_tag,
+                role=self._system.role,
+                event=asked.event,
+                subject=self._label(str(line.get("device", ""))),
+                cause=str(line.get("reason") or ""),
+                outcome=outcome,
+                text=": ".join(word for word in (line.get("text"), text) if word),
+                details=told if waited is None else told | {"waited_s": round(waited, 3)},
+            )
+        )
+
+
+def _action(what: str) -> str:
+    """What the DVA calls an action of a page."""
+    return "set_dispatch" if what == "dispatch_mode" else what.removeprefix("event_")

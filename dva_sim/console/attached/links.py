@@ -1,0 +1,65 @@
+"""How an attached console takes part: its clock, and what carries its messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dva_sim.agents.device import do_nothing
+from dva_sim.console.attached.options import AttachOptions
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.messaging import Transport
+from dva_sim.network.realtime import PacedClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.simulation.full.stage import DVA
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttachedLinks:
+    """A place among the devices of a DVA.
+
+    Attributes:
+        clock: Real time.
+        recorder: Keeps the story.
+        network: Carries messages to the DVA, and to whom it lists.
+        own: Id of the console's own device.
+        address: At which that is found.
+        close: Ends what was opened.
+    """
+
+    clock: PacedClock
+    recorder: Recorder
+    network: Transport
+    own: str
+    address: str
+    close: Callable[[], object] = do_nothing
+
+    def note(self, text: str) -> None:
+        """Something has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
+
+
+def over_sockets(options: AttachOptions) -> AttachedLinks:
+    """By ZeroMQ, with keys if they are wanted.
+
+    Raises:
+        ConfigError: keys cannot be read.
+        NetworkError: no port can be had.
+    """
+    ring = options.ring()
+    own, clock, recorder = options.own_id(ring), PacedClock(), Recorder()
+
+    def note(text: str) -> None:
+        recorder.tell(clock.now, "console", text, "link")
+
+    network = SocketNetwork(clock, ring, note)
+    network.introduce(DVA, options.dva)
+    address = network.join(own, options.listen)
+    return AttachedLinks(
+        clock=clock,
+        recorder=recorder,
+        network=network,
+        own=own,
+        address=address,
+        close=network.close,
+    )

@@ -1,0 +1,189 @@
+"""What pages of an attached console are told: each thing as it changes, and no more often.
+
+While the DVA does not answer, what it last said stays shown, with a word that says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from dva_sim.console.alarm_desk import AlarmDesk
+from dva_sim.console.attached import lines
+from dva_sim.console.attached.alarm_facts import ToldFacts
+from dva_sim.console.attached.audit import AttachedAudit
+from dva_sim.console.attached.people import AttachedPeople
+from dva_sim.console.attached.sensing import ToldSensors
+from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.decisions import about_event, dispatch_line
+from dva_sim.core.registry import ROBOT
+from dva_sim.kernel.recorder import Moment
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+Tell = Callable[..., object]
+
+POSITIONS, ROWS, DEVICES, SOON = 0.2, 0.5, 1.0, 0.1  # from one line to the next, real time [s]
+FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is known [s]
+
+
+class AttachedPages:
+    """What of a system elsewhere is told; see `ConsoleSubject`.
+
+    Args:
+        system: To which the console is attached.
+        audit: Keeps the audit log.
+
+    Attributes:
+        looked: Whether somebody looks at the table of devices.
+        people: Who is at the pages.
+        alarms: What wants somebody to act.
+        sensors: Those that somebody looks at.
+        audited: Keeps who did what.
+    """
+
+    def __init__(self, system: AttachedSystem, audit: AuditKeeper) -> None:
+        self.system, self.clock = system, system.clock
+        self.tell: Tell = lambda *_: None
+        self.show: Tell = lambda *_: None
+        self.dropped: Callable[[], int] = lambda: 0
+        self.looked, self.people = False, AttachedPeople()
+        self.sensors = ToldSensors(system.device, system.told, system.id_of)
+        self.alarms = AlarmDesk(ToldFacts(system))
+        self.audited = AttachedAudit(audit, system, self.people.author)
+        system.on_record = self.audited.heard
+        self._answers, self._newest, self._is_shown = False, dict[str, Any](), False
+        system.on_devices = self._tell_scene
+
+    # --- see `ConsoleSubject` --------------------------------------------------------------
+
+    def serve_cameras(self, base: str) -> None:
+        """Robots that run elsewhere say themselves where their pictures are."""
+
+    def show_scene(self) -> None:
+        """There is nothing to be drawn here: of the world only messages are known."""
+
+    def note(self, text: str) -> None:
+        """Something has gone wrong that people should know of."""
+        self.system.note(text)
+
+    def begin(self) -> None:
+        """Take part, tell what there is, and from then on what changes."""
+        self.system.start()
+        clock = self.clock
+        clock.call_after(FIRST_SCENE, self._tell_scene)
+        clock.pulse(POSITIONS, self._tell_positions)
+        clock.pulse(ROWS, self._tell_rows)
+        clock.pulse(ROWS, self._tell_alarms)
+        clock.pulse(SOON, self._tell_news)
+        clock.pulse(DEVICES, self._tell_devices)
+        clock.pulse(DEVICES, self.sensors.go_on)
+
+    # --- what is told ----------------------------------------------------------------------
+
+    def _tell_scene(self) -> None:
+        """Whoever is new gets a number; an unknown place lies where somebody first is."""
+        system = self.system
+        system.find_place()
+        if self.clock.now < FIRST_SCENE and not system.is_placed:
+            return
+        things = lines.things_of(system.told.devices.values(), system.numbers)
+        self._is_shown = True
+        self.tell(lines.scene_of_told(things, system.options.dva, system.site, system.frame))
+
+    def _tell_positions(self) -> None:
+        system = self.system
+        if system.find_place():
+            self._tell_scene()
+        if self._is_shown:
+            rows = lines.positions(system.told.devices, system.numbers, system.frame)
+            self._tell_new({"k": "pos", "t": system.now_ms, "p": rows})
+
+    def _tell_rows(self) -> None:
+        system = self.system
+        if system.answers is not self._answers:
+            self._answers = system.answers
+            word = "answers" if self._answers else "does not answer: what is shown is old"
+            system.recorder.tell(self.clock.now, "dva", word, "link")
+        clock = {"factor": 1, "paused": False, "lag_s": 0, "given_up_s": 0, "held_by_lag": False}
+        self.tell(
+            {
+                "k": "rows",
+                "t": system.now_ms,
+                "clock": clock,
+                "link": lines.link(),
+                "dropped": self.dropped(),
+                "server": self._server(),
+                "robots": self._robots(),
+                "people": self._people(),
+                "order": None,
+            }
+        )
+
+    def _tell_alarms(self) -> None:
+        """As long as it is not known how events stand, alarms stay as they are."""
+        system, now_ms = self.system, self.system.now_ms
+        is_known = system.is_told and system.answers
+        known = self.alarms.look(self._events(), [], now_ms) if is_known else None
+        self._tell_new(known or self.alarms.hold(now_ms))
+
+    def _robots(self) -> list[Line]:
+        now, numbers = self.clock.now, self.system.numbers
+        return [
+            lines.robot_row(told, numbers[id_tag], now)
+            for id_tag, told in self.system.told.devices.items()
+            if told.device.device_type == ROBOT and id_tag in numbers
+        ]
+
+    def _people(self) -> list[Line]:
+        numbers = self.system.numbers
+        return [
+            {"i": numbers[id_tag], "doing": told.status.activity}
+            for id_tag, told in self.system.told.devices.items()
+            if isinstance(told.status, m.PersonStatus) and id_tag in numbers
+        ]
+
+    def _server(self) -> Line:
+        system = self.system
+        told: Line = {"listens": system.answers, "address": system.options.dva, "port": None}
+        return told | {"modelled": False, "own": False, "role": system.role}
+
+    def _tell_news(self) -> None:
+        """Events, how orders are given, and the story, as soon as they change."""
+        system, now_ms = self.system, self.system.now_ms
+        if system.is_told:
+            self._tell_new({"k": "events", "t": now_ms, "events": self._events()})
+        dispatch = dispatch_line(system.agent.dispatch, 0.0)
+        rooms = self.people.lines(system.role)
+        self._tell_new({"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms})
+        self._tell_new(self.audited.keeper.line(now_ms))
+        moments, system.recorder.timeline = system.recorder.timeline, list[Moment]()
+        for time, who, what, kind in moments:
+            line = {"k": "story", "t": round(1000 * time), "who": who, "what": what}
+            self.tell(line | {"kind": kind})
+
+    def _events(self) -> list[Line]:
+        system, agent = self.system, self.system.agent
+        labels = {i: told.device.label for i, told in system.told.devices.items()}
+        return [
+            lines.event_row(status, agent.told_at[number], labels, system.site, system.frame)
+            | about_event(agent.events, agent.told_at, number)
+            for number, status in sorted(agent.events.items())
+        ]
+
+    def _tell_devices(self) -> None:
+        if self.looked:
+            now, may = self.clock.now, self.system.role == "supervise"
+            rows = [
+                lines.device_row(told, now, self.system.is_fake(id_tag), may)
+                for id_tag, told in self.system.told.devices.items()
+            ]
+            self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})
+
+    def _tell_new(self, line: Line) -> None:
+        """Tell a line unless nothing in it has changed, its time apart."""
+        said = {name: value for name, value in line.items() if name != "t"}
+        if self._newest.get(line["k"]) != said:
+            self._newest[line["k"]] = said
+            self.tell(line)

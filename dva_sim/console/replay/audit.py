@@ -1,0 +1,39 @@
+"""The audit log in a recording, as a file that the web process reads like that of a console."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from dva_sim.recordings.audit_log import NOTHING_BEFORE
+
+Line = dict[str, Any]
+
+
+class RecordedAudit:
+    """The rows of whichever recording is played; a file that is gone with the player.
+
+    Attributes:
+        path: Of the file.
+    """
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="dva-sim-audit-")
+        self.path = Path(self._folder.name) / "audit.json"
+        self.path.write_text("[]")
+
+    def show(self, rows: Sequence[Mapping[str, Any]], name: str) -> Line:
+        """Another recording is played; what pages are told of its log."""
+        new = self.path.with_suffix(".new")
+        new.write_text(json.dumps(rows))
+        new.replace(self.path)  # at once: somebody may be reading
+        last = rows[-1] if rows else {"number": 0, "hash": NOTHING_BEFORE}
+        stands = {"rows": last["number"], "hash": last["hash"], "problem": ""}
+        return {"k": "audit", "t": 0, **stands, "lasting": True, "file": name}
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+        self._folder.cleanup()

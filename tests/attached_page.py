@@ -1,0 +1,115 @@
+"""A console at the DVA of a world that runs in virtual time, and what one does at its page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from phone_page import PhonePage
+
+from dva_sim.console.attached.actions import AttachedActions
+from dva_sim.console.attached.links import AttachedLinks
+from dva_sim.console.attached.options import AttachOptions
+from dva_sim.console.attached.pages import AttachedPages
+from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.recordings.audit_log import AuditRow, read_rows
+from dva_sim.simulation.full.stage import id_of
+
+OWN = id_of("control-room", 900)
+
+
+class AttachedPage:
+    """An attached console beside the world of its DVA.
+
+    Args:
+        world: Of the DVA.
+        audit: File of the audit log.
+        role: That the DVA gives its control room.
+
+    Attributes:
+        lines: What the page is told.
+    """
+
+    def __init__(self, world: PhonePage, audit: Path, role: str = "supervise") -> None:
+        self.world, run = world, world.world.run
+        run.dva.desk.roles.appoint(OWN, role)
+        links = AttachedLinks(
+            clock=world.world.clock,
+            recorder=Recorder(),
+            network=run.network,
+            own=OWN,
+            address="198.51.100.9:5600",
+        )
+        options = AttachOptions(dva="198.51.100.1:5600", scenario="hands-on", audit=audit)
+        self.system = AttachedSystem(options, links)
+        self.keeper = AuditKeeper(audit, lambda: world.world.clock.now, {})
+        self.pages = AttachedPages(self.system, self.keeper)
+        self.lines: list[dict[str, Any]] = []
+        self.pages.tell = lambda line, _="": self.lines.append(line)
+        self.actions = AttachedActions(self.pages)
+        self.pages.begin()
+        world.world.clock.every(0.05, self.keeper.take)
+        self._count = 0
+
+    def let(self, seconds: float) -> None:
+        """Let so much time go by."""
+        self.world.let(seconds)
+
+    def told(self, kind: str) -> list[dict[str, Any]]:
+        """All lines of a kind."""
+        return [line for line in self.lines if line["k"] == kind]
+
+    def ask(self, what: str, /, within: float = 60.0, **about: Any) -> dict[str, Any]:
+        """An action, and its whole answer once it comes."""
+        self._count += 1
+        number = f"action {self._count}"
+        usual = {"id": number, "client": "c1", "role": "supervise", "do": what}
+        self.actions.take(usual | about)
+        end = self.world.world.clock.now + within
+        while self.world.world.clock.now < end:
+            for line in self.told("done"):
+                if line["id"] == number:
+                    return line
+            self.let(0.01)
+        raise AssertionError(f"{what}: no answer within {within} s")
+
+    def events(self) -> list[dict[str, Any]]:
+        """As the page is told of them now."""
+        told = self.told("events")
+        return list(told[-1]["events"]) if told else []
+
+    def alarms(self) -> list[str]:
+        """The texts of the list, the gravest first."""
+        self.let(1.0)
+        return [row["text"] for row in self.told("alarms")[-1]["alarms"]]
+
+    def until(self, seen: Any, within: float = 120.0) -> None:
+        """Let time go by until something is so."""
+        end = self.world.world.clock.now + within
+        while not seen():
+            assert self.world.world.clock.now < end, f"not so within {within} s"
+            self.let(0.1)
+
+    def written(self) -> list[AuditRow]:
+        """The rows of the audit log, which ends by that."""
+        self.keeper.close()
+        return read_rows(self.keeper.path)
+
+
+@contextmanager
+def attached(
+    monkeypatch: pytest.MonkeyPatch, folder: Path, role: str = "supervise", **changes: Any
+) -> Iterator[AttachedPage]:
+    """An attached console that has heard of a fire; the policy asks first."""
+    fire = [{"kind": "fire", "room": "North office", "at_s": 2, "latest_s": 2, "reported": True}]
+    usual = {"bystander__count": 0, "events": fire, "dispatch__mode": "ask_first"}
+    world = PhonePage(monkeypatch, client="w1", **usual | changes)
+    page = AttachedPage(world, folder / "audit.sqlite", role)
+    page.until(page.events)
+    yield page
+    page.keeper.close()

@@ -1,0 +1,114 @@
+"""Robots sent on missions, and taken from their holders, from an attached console."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from attached_page import OWN, AttachedPage, attached
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.mistakes import check_message
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[AttachedPage]:
+    with attached(monkeypatch, tmp_path) as one:
+        one.ask("room_join", name="ana")
+        one.until(lambda: len(one.system.numbers) >= 4)
+        yield one
+
+
+def number(page: AttachedPage, label: str) -> int:
+    """By which the page knows a device, as the web process says it."""
+    return next(t["i"] for t in page.told("scene")[-1]["things"] if t["label"] == label)
+
+
+def said_by(page: AttachedPage) -> list[bytes]:
+    """What the console's own control room has sent."""
+    return [data for source, _, data in page.world.heard if source == OWN]
+
+
+def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page: AttachedPage) -> None:
+    done = page.ask("mission", robot=number(page, "robot-1"), event=1)
+    assert done["text"] == "robot-1 goes to event 1 by itself"
+    robot = page.world.robot()
+    assert robot.controller.mode is Mode.MISSION
+    assert robot.holder[0] == OWN
+    page.until(lambda: robot.controller.grant is None, within=400.0)
+    page.let(1.0)
+
+    story = [line["what"] for line in page.told("story")]
+    assert any(what.startswith("the mission of robot-1 is done: ") for what in story)
+    sent = [data for data in said_by(page) if isinstance(data, bytes)]
+    kinds = {type(decode(data).body) for data in sent}
+    assert {m.PermissionRequest, m.Inspect, m.GetMissionStatus, m.PermissionRevocation} <= kinds
+    assert [found for data in sent for found in check_message(data)] == []
+    (row,) = [row for row in page.written() if row.action == "mission"]
+    assert (row.author, row.subject, row.event, row.outcome) == ("ana", "robot-1", 1, "done")
+
+
+def test_a_robot_that_does_not_answer_may_be_on_its_way_or_not(page: AttachedPage) -> None:
+    number_ = number(page, "robot-1")
+    page.world.world.run.network.leave(page.world.robot().device.id_tag)
+    refused = page.ask("mission", robot=number_, event=1)
+
+    assert refused["text"] == "robot-1: it does not answer"
+    (row,) = [row for row in page.written() if row.action == "mission"]
+    assert row.outcome == "unknown"
+
+
+def test_a_robot_that_falls_silent_on_its_way_is_given_back(page: AttachedPage) -> None:
+    robot = page.world.robot()
+    assert page.ask("mission", robot=number(page, "robot-1"), event=1)["ok"]
+    page.world.world.run.network.leave(robot.device.id_tag)
+    page.until(lambda: "how its mission stands is unknown" in str(page.told("story")))
+    page.let(1.0)
+
+    given_back = [decode(data).body for data in said_by(page) if isinstance(data, bytes)][-9:]
+    assert any(isinstance(body, m.PermissionRevocation) for body in given_back)
+
+
+@pytest.mark.parametrize(
+    ("about", "words"),
+    [({"robot": 99, "event": 1}, "no robot 99"), ({"robot": 0, "event": 7}, "no event 7")],
+)
+def test_what_is_not_there_is_refused(page: AttachedPage, about: dict, words: str) -> None:
+    assert words in page.ask("mission", **about)["text"]
+
+
+def test_a_robot_is_taken_from_its_driver_and_goes_on_by_itself(page: AttachedPage) -> None:
+    assert page.ask("event_assign", event=1, device="robot-1")["ok"]
+    assert page.world.do("take", robots=["robot-1"])[0]
+    assert page.world.do("start")[0]
+    robot = page.world.robot()
+    page.until(lambda: robot.controller.mode is Mode.TELEOPERATION)
+    taken = page.ask("take_over", robot=number(page, "robot-1"), reason="its driver is away")
+
+    assert taken["text"] == "robot-1 goes to event 1 by itself"
+    assert robot.holder[0] == OWN
+    assert robot.controller.mode is Mode.MISSION
+    rows = {(row.action, row.author, row.outcome) for row in page.written()}
+    assert {("revoke", "control room", "done"), ("take over", "ana", "done")} <= rows
+
+
+def test_a_robot_that_was_sent_nowhere_is_nobodys_then(page: AttachedPage) -> None:
+    assert page.world.do("take", robots=["robot-1"])[0]
+    taken = page.ask("take_over", robot=number(page, "robot-1"), reason="it is needed")
+
+    assert taken["text"] == "robot-1 is nobody's now, and stands"
+    page.let(2.0)
+    assert page.world.robot().controller.grant is None
+
+
+def test_the_dva_refuses_both_to_who_may_only_look(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with attached(monkeypatch, tmp_path, role="look") as page:
+        page.until(lambda: len(page.system.numbers) >= 4)
+        robot = number(page, "robot-1")
+        assert not page.ask("mission", robot=robot, event=1)["ok"]
+        assert "needs" in page.ask("take_over", robot=robot, reason="I want it")["text"]
