@@ -61,10 +61,7 @@ def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
     """What is left of a message: its parts, and the last frame, which says whose key it came with.
 
     A frame says whether it is the last one at half the price of asking the socket, as
-    `recv_multipart` does.
-
-    Raises:
-        zmq.Again: There is none.
+    `recv_multipart` does. Raises `zmq.Again` if there is none.
     """
     frame = recv(socket, NOBLOCK, False)
     parts = [frame.bytes]
@@ -419,10 +416,7 @@ class SocketNetwork:
     def _requests(self, node: str, router: Socket) -> None:
         """Hand the requests that have arrived to the service of a node."""
         for _ in range(DRAIN):
-            try:
-                peer = recv(router, NOBLOCK)
-            except zmq.Again:
-                return
+            peer = recv(router, NOBLOCK)
             parts, last = receive_parts(router)
             sender = None if self._ring is None else user_of(last) or NOBODY
             self._request(node, router, peer, parts, sender)
@@ -462,10 +456,7 @@ class SocketNetwork:
     def send(self, socket: Socket, frames: list[bytes], look: bool = True) -> None:
         """Send without waiting; what does not fit is dropped and counted.
 
-        Args:
-            socket: By which.
-            frames: The message.
-            look: Whether the socket may have something to read that its file does not tell.
+        It need not `look` where a socket has nothing to read that its file would not tell.
         """
         try:
             for frame in frames[:-1]:
