@@ -8,7 +8,7 @@ from dva_sim.kernel import early_stop
 def main() -> NoReturn:
     """Entry point: `dva-sim`."""
     early_stop.end_at_once()
-    from dva_sim.cli import main as program  # late: Ctrl-C must be heard while this is loaded
+    from dva_sim.cli import main as program  # late: start-up, so that Ctrl-C is heard meanwhile
 
     program()
 
