@@ -1,6 +1,17 @@
-"""`python -m dva_sim` is `dva-sim`."""
+"""`python -m dva_sim` is `dva-sim`: what has to be done before all else, and then the program."""
 
-from dva_sim.cli import main
+from typing import NoReturn
+
+from dva_sim.kernel import early_stop
+
+
+def main() -> NoReturn:
+    """Entry point: `dva-sim`."""
+    early_stop.end_at_once()
+    from dva_sim.cli import main as program  # late: start-up, so that Ctrl-C is heard meanwhile
+
+    program()
+
 
 if __name__ == "__main__":
     main()

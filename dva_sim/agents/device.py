@@ -13,7 +13,15 @@ from dva_sim.network.messaging import Request, Requester, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.exchange import NOON, Hearing, Nuisances, Outbox, ReplyCache, key_of
+from dva_sim.protocol.exchange import (
+    ANSWERED,
+    IGNORED,
+    NOON,
+    Nuisances,
+    Outbox,
+    ReplyCache,
+    key_of,
+)
 from dva_sim.worlds.geo import GeoFrame
 
 HEARTBEAT = "heartbeat|"  # topics; the bar ends each, so that none begins another
@@ -235,7 +243,7 @@ class AgentDevice:
         """
         now, count = self.clock.now, self.recorder.counters
         hearing = self._nuisances.hearing(request.peer, now)
-        if hearing is Hearing.IGNORED and b"<EmergencyMsg" not in request.data:
+        if hearing is IGNORED and b"<EmergencyMsg" not in request.data:
             self._nuisances.bad(request.peer, now)
             count["refused unread: of a peer that sends no messages"] += 1
             return None
@@ -244,7 +252,7 @@ class AgentDevice:
         except ProtocolError as error:
             count["refused"] += 1
             self._nuisances.bad(request.peer, now)
-            if hearing is Hearing.ANSWERED:
+            if hearing is ANSWERED:
                 request.answer(self._bad_message(error))
             return None
         refusal = self._imposture(message, request.sender) or self._misdirection(message)
@@ -261,7 +269,7 @@ class AgentDevice:
         hearing = self._nuisances.hearing(request.peer, now)
         self._nuisances.bad(request.peer, now)
         self.recorder.counters[f"refused: {m.CODE_NAMES[refusal.code]}"] += 1
-        if hearing is not Hearing.ANSWERED:
+        if hearing is not ANSWERED:
             return
         if message is None:
             request.answer(self._bad_message(ProtocolError(refusal.code, refusal.text)))

@@ -16,6 +16,7 @@ import typer
 from dva_sim import __version__
 from dva_sim.cli import files, results, runs, site, studies
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
+from dva_sim.kernel import early_stop
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
 from dva_sim.kernel.suggestions import hint
 
@@ -97,6 +98,7 @@ class DvaSimProgram(PanelGroup):
     def invoke(self, ctx: Any) -> Any:
         """Tell who ended a command from outside; the parser would end the program by itself."""
         try:
+            early_stop.raise_again()
             return super().invoke(ctx)
         except KeyboardInterrupt:
             raise Stopped("stopped by Ctrl-C") from None
@@ -169,7 +171,7 @@ def _told(problem: object, code: int) -> int:
 
 
 def main() -> NoReturn:
-    """Entry point: `dva-sim`."""
+    """Do what the command line says, and end the process."""
     import dva_sim.kernel.rare_collection  # noqa: F401  # late: start-up
 
     sys.exit(call())

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.makers import maker
 
 QUEUE_LIMIT = 1000  # requests waiting at one requester
 ROUND_TRIPS_KEPT = 100_000
@@ -35,6 +36,8 @@ class Request(NamedTuple):
     sender: str | None = None
     peer: Hashable = None
 
+
+make_request = maker(Request)
 
 Service = Callable[[Request], object]
 
@@ -115,7 +118,7 @@ class Transport(Protocol):
         """
 
 
-@dataclass
+@dataclass(slots=True)
 class _Asked:
     """A request that waits or is under way."""
 
@@ -205,7 +208,7 @@ class Requester:
         self._disconnect()
 
     def _fill(self) -> None:
-        while self._queue and not self.busy:
+        while self._queue and len(self._open) < self._window:
             asked = self._queue.popleft()
             asked.sent_at = self._clock.now
             self._open[asked.tag] = asked

@@ -19,14 +19,18 @@ from dva_sim.kernel.clock import US, Clock
 AT_ONCE = 500  # events that are late, before messages have their turn
 LONGEST_WAIT = 60.0  # of one poll [s]
 
-# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
-EVENTS: Final = int(zmq.EVENTS)
-POLLIN: Final = int(zmq.POLLIN)
+POLLIN: Final = int(zmq.POLLIN)  # pyzmq's enumerations cost more than a system call
 
 
-def has_more(socket: zmq.Socket[bytes]) -> bool:
-    """Whether something can be read: asking costs a third of trying in vain."""
-    return bool(socket.getsockopt(EVENTS) & POLLIN)  # type: ignore[operator]
+Socket = zmq.Socket[bytes]
+
+
+def has_more(socket: Socket) -> bool:
+    """Whether something can be read.
+
+    To try in vain costs ten times as much, and the option `EVENTS` three times.
+    """
+    return bool(zmq.zmq_poll([(socket, POLLIN)], 0))
 
 
 class Poller:
@@ -35,17 +39,22 @@ class Poller:
     `zmq.Poller` asks every socket each time, so that a message among a thousand sockets costs a
     thousand questions. The file descriptor of a ZeroMQ socket says only that it should be asked:
     once asked it is quiet, whatever is left to read. So a socket is asked again for as long as
-    it had something, and after everything else that may have asked it, as sending does (`look`).
+    it had something, unless all was read (`read_out`), and after everything else that may have
+    asked it, as sending does (`look`).
     """
 
     def __init__(self) -> None:
         self._selector = selectors.DefaultSelector()
         self._files: dict[Any, int] = {}
-        self._ask: dict[zmq.Socket[bytes], None] = {}
+        self._sockets: set[Socket] = set()
+        self._ask: dict[Socket, None] = {}
 
     def register(self, source: Any) -> None:
         """Wait for a socket of ZeroMQ, or for a file descriptor, too."""
-        file = int(source.getsockopt(zmq.FD)) if isinstance(source, zmq.Socket) else source
+        file = source
+        if isinstance(source, zmq.Socket):
+            file = int(source.getsockopt(zmq.FD))
+            self._sockets.add(source)
         self._selector.register(file, selectors.EVENT_READ, source)
         self._files[source] = file
         self.look(source)
@@ -53,24 +62,36 @@ class Poller:
     def unregister(self, source: Any) -> None:
         """Wait for it no more; to be called before it is closed."""
         self._selector.unregister(self._files.pop(source))
+        self._sockets.discard(source)
         self._ask.pop(source, None)
 
     def look(self, source: Any) -> None:
         """Ask a socket again, if it is one of these: it was used by others."""
-        if source in self._files and isinstance(source, zmq.Socket):
+        if source in self._sockets:
             self._ask[source] = None
+
+    def has_more(self, source: Socket) -> bool:
+        """Whether a socket has something to read; if not, its file will tell when it has."""
+        more = has_more(source)
+        if not more:
+            self.read_out(source)
+        return more
+
+    def read_out(self, source: Socket) -> None:
+        """A socket has no more to read until its file says so: it need not be asked."""
+        self._ask.pop(source, None)
 
     def poll(self, wait: float) -> list[Any]:
         """Those that have something to read, after so long at most [s]; there may be none."""
-        asked, self._ask = self._ask, {}
-        self._ask = ready = {socket: None for socket in asked if has_more(socket)}
+        ready = {socket: None for socket in self._ask if has_more(socket)} if self._ask else {}
         found: list[Any] = []
         for key, _ in self._selector.select(0.0 if ready else wait):
             source = key.data
-            if not isinstance(source, zmq.Socket):
+            if source not in self._sockets:
                 found.append(source)
             elif source not in ready and has_more(source):
                 ready[source] = None
+        self._ask = ready
         return [*ready, *found]
 
     def close(self) -> None:
@@ -116,6 +137,14 @@ class LiveClock(Clock):
         """A socket was used: what it has to read may be told by nothing else."""
         self._poller.look(source)
 
+    def has_more(self, source: Socket) -> bool:
+        """Whether a socket that is watched has something to read."""
+        return self._poller.has_more(source)
+
+    def read_out(self, source: Socket) -> None:
+        """A socket that is watched has no more to read until its file says so."""
+        self._poller.read_out(source)
+
     def stop(self) -> None:
         """Let `run` return after what is being done now."""
         self._running = False
@@ -131,31 +160,34 @@ class LiveClock(Clock):
 
     def _wait(self, end: float) -> None:
         """Wait for the next event or message; events that are due by then go first."""
-        wait = min(self.env.peek(), end) - self._real()
-        ready = self._poller.poll(max(0.0, min(LONGEST_WAIT, wait / US)))
+        queue = self._queue
+        due = queue[0][0] if queue and queue[0][0] < end else end
+        wait = (due - self._real()) / US
+        wait = 0.0 if wait < 0.0 else wait if wait < LONGEST_WAIT else LONGEST_WAIT
+        ready = self._poller.poll(wait)
         self._catch_up(end)
         for source in ready:
             handler = self._handlers.get(source)
             if handler is not None:  # nobody unwatched it since
                 handler()
-        if self.env.peek() <= self.env._now:
+        if queue and queue[0][0] <= self.env._now:
             self._catch_up(end)
 
     def _catch_up(self, end: float) -> None:
         """Let the events happen that are due, in their order, then make it now."""
-        env, real = self.env, self._real()
-        until = min(real, end)
-        due = env.peek()
+        env, queue, real = self.env, self._queue, self._real()
+        until = real if real < end else end
         for _ in range(AT_ONCE):
-            if due > until:
+            if not queue or queue[0][0] > until:
                 break
-            self.lateness = max(self.lateness, (real - due) / US)
+            self.lateness = max(self.lateness, (real - queue[0][0]) / US)
             self.step()
             if not self._running:
                 return
-            due = env.peek()
         # Never beyond the next event, whose own step would turn time back.
-        self._set(max(env._now, min(until, due)))
+        until = queue[0][0] if queue and queue[0][0] < until else until
+        if until > env._now:
+            self._set(until)
 
     def _real(self) -> int:
         return time.monotonic_ns() // 1000 - self._origin

@@ -18,7 +18,7 @@ import zmq
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.messaging import OnReply, Request, RequestTap, Service
+from dva_sim.network.messaging import OnReply, RequestTap, Service, make_request
 from dva_sim.network.realtime import LiveClock, Poller, has_more
 from dva_sim.network.security import Refusal, Security, Socket, user_of
 
@@ -27,6 +27,10 @@ DRAIN: Final = 64  # messages read from one socket before others have their turn
 # As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
 NOBLOCK: Final = int(zmq.NOBLOCK)
 MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
+
+# Without what pyzmq adds to each call for other kinds of sockets.
+recv: Final = zmq.backend.Socket.recv
+send: Final = zmq.backend.Socket.send
 
 
 def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
@@ -48,9 +52,23 @@ def next_of(socket: Socket) -> list[bytes] | None:
 def receive(socket: Socket) -> list[bytes] | None:
     """A message, if there is one: what a REQ socket had may be the copy of a reply."""
     try:
-        return socket.recv_multipart(NOBLOCK)
+        return receive_parts(socket)[0]
     except zmq.Again:
         return None
+
+
+def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
+    """What is left of a message: its parts, and the last frame, which says whose key it came with.
+
+    A frame says whether it is the last one at half the price of asking the socket, as
+    `recv_multipart` does. Raises `zmq.Again` if there is none.
+    """
+    frame = recv(socket, NOBLOCK, False)
+    parts = [frame.bytes]
+    while frame.more:
+        frame = recv(socket, NOBLOCK, False)
+        parts.append(frame.bytes)
+    return parts, frame
 
 
 class PublisherSocket:
@@ -124,11 +142,13 @@ class ReqWire(SocketWire):
         """See `Wire`; the last one sent must have been answered."""
         self._tag = tag
         self._network.note(self._node, data)
-        self._network.send(self._socket, [data])
+        # It throws away what it still has to read before it sends: its file tells what comes.
+        self._network.send(self._socket, [data], look=False)
 
     def _replies(self) -> None:
         """There is one at most: asking whether there are more would delay every command."""
         frames = receive(self._socket)
+        self._network.clock.read_out(self._socket)
         if frames is not None:
             self._reply(frames)
 
@@ -396,33 +416,33 @@ class SocketNetwork:
     def _requests(self, node: str, router: Socket) -> None:
         """Hand the requests that have arrived to the service of a node."""
         for _ in range(DRAIN):
-            if self._ring is not None:
-                parts = router.recv_multipart(NOBLOCK, copy=False)
-                frames, sender = [part.bytes for part in parts], user_of(parts[-1]) or NOBODY
-            else:
-                frames, sender = router.recv_multipart(NOBLOCK), None
-            self._request(node, router, frames, sender)
-            if not has_more(router):
+            peer = recv(router, NOBLOCK)
+            parts, last = receive_parts(router)
+            sender = None if self._ring is None else user_of(last) or NOBODY
+            self._request(node, router, peer, parts, sender)
+            if not self.clock.has_more(router):
                 return
 
-    def _request(self, node: str, router: Socket, frames: list[bytes], sender: str | None) -> None:
+    def _request(
+        self, node: str, router: Socket, peer: bytes, parts: list[bytes], sender: str | None
+    ) -> None:
         """One request: its route back, an empty frame, and one frame with the message."""
         service = self._services.get(node)
-        if service is None or b"" not in frames[1:]:
+        if service is None or b"" not in parts:
             self.counters["requests of another form"] += 1
             return
-        start = frames.index(b"", 1) + 1
-        route, body = frames[:start], frames[start:]
+        start = parts.index(b"") + 1
+        route = [peer, *parts[:start]]
         # Anything but one frame is no message; its empty text is refused as such, and answered.
-        data = body[0] if len(body) == 1 else b""
+        data = parts[start] if len(parts) == start + 1 else b""
         self.note(node, data, sent=False)
 
         def answer(reply: bytes) -> None:
             self.note(node, reply)
             self.send(router, [*route, reply])
 
-        # The first frame is what the socket itself calls the connection: nobody can take another's.
-        request, tap = Request(data, answer, sender, route[0]), self.taps.get(node)
+        # The peer is what the socket itself calls the connection: nobody can take another's.
+        request, tap = make_request(data, answer, sender, peer), self.taps.get(node)
         if tap is None:
             service(request)
         else:
@@ -433,16 +453,20 @@ class SocketNetwork:
         if self.watcher is not None:
             self.watcher(node, payload, sent)
 
-    def send(self, socket: Socket, frames: list[bytes]) -> None:
-        """Send without waiting; what does not fit is dropped and counted."""
+    def send(self, socket: Socket, frames: list[bytes], look: bool = True) -> None:
+        """Send without waiting; what does not fit is dropped and counted.
+
+        It need not `look` where a socket has nothing to read that its file would not tell.
+        """
         try:
             for frame in frames[:-1]:
-                socket.send(frame, MORE)
-            socket.send(frames[-1], NOBLOCK)
+                send(socket, frame, MORE)
+            send(socket, frames[-1], NOBLOCK)
         except zmq.ZMQError:
             # The queue is full, or nobody is there: whoever waits for a reply has a time-out.
             self.counters["not sent"] += 1
-        self.clock.look(socket)
+        if look:
+            self.clock.look(socket)
 
     # --- publications ------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict, deque
+from collections import OrderedDict, deque
 from collections.abc import Hashable
 from enum import Enum
 from hashlib import blake2b
@@ -60,6 +60,15 @@ def key_of(sender: str | None, request: bytes) -> Key:
     return sender, blake2b(request, digest_size=16).digest()
 
 
+class _Kept:
+    """The replies to one source: what they are known by, and how long they are in all [B]."""
+
+    __slots__ = ("keys", "used")
+
+    def __init__(self) -> None:
+        self.keys, self.used = deque[Key](), 0
+
+
 class ReplyCache:
     """Replies already given, so that a request sent again acts once.
 
@@ -77,8 +86,7 @@ class ReplyCache:
     def __init__(self, each: int = 64, sources: int = 1024, room: int = 65_536) -> None:
         self._each, self._sources, self._room = each, sources, room
         self._replies: dict[Key, bytes] = {}
-        self._order: OrderedDict[str, deque[Key]] = OrderedDict()
-        self._used: Counter[str] = Counter()
+        self._kept: OrderedDict[str, _Kept] = OrderedDict()
 
     def get(self, key: Key) -> bytes | None:
         """The reply to the same request, if it was answered before."""
@@ -86,17 +94,18 @@ class ReplyCache:
 
     def put(self, key: Key, source: str, reply: bytes) -> bytes:
         """Remember a reply to a request of `source`, and return it."""
-        keys = self._order.setdefault(source, deque())
-        self._order.move_to_end(source)
+        kept = self._kept.get(source)
+        if kept is None:
+            kept = self._kept[source] = _Kept()
+        self._kept.move_to_end(source)
+        keys, used = kept.keys, kept.used + len(reply)
         keys.append(key)
         self._replies[key] = reply
-        self._used[source] += len(reply)
-        while len(keys) > self._each or (self._used[source] > self._room and len(keys) > 1):
-            self._used[source] -= len(self._replies.pop(keys.popleft(), b""))
-        if len(self._order) > self._sources:
-            gone, forgotten = self._order.popitem(last=False)
-            del self._used[gone]
-            for key in forgotten:
+        while len(keys) > self._each or (used > self._room and len(keys) > 1):
+            used -= len(self._replies.pop(keys.popleft(), b""))
+        kept.used = used
+        if len(self._kept) > self._sources:
+            for key in self._kept.popitem(last=False)[1].keys:
                 self._replies.pop(key, None)
         return reply
 
@@ -107,6 +116,9 @@ class Hearing(Enum):
     ANSWERED = "answered"
     READ = "read"
     IGNORED = "ignored"
+
+
+ANSWERED, READ, IGNORED = Hearing  # found faster than as members of their class
 
 
 class Nuisances:
@@ -130,11 +142,11 @@ class Nuisances:
     def hearing(self, peer: Hashable, now: float) -> Hearing:
         """How a peer is heard now [s]."""
         if not self._counts:
-            return Hearing.ANSWERED
+            return ANSWERED
         count = self._count(peer, now)
         if count > self.UNREAD:
-            return Hearing.IGNORED
-        return Hearing.READ if count > self.UNANSWERED else Hearing.ANSWERED
+            return IGNORED
+        return READ if count > self.UNANSWERED else ANSWERED
 
     def bad(self, peer: Hashable, now: float) -> None:
         """It has sent what is no message."""

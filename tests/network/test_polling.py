@@ -91,3 +91,23 @@ def test_a_socket_that_is_unregistered_is_not_asked(make: Make) -> None:
     here.close()
     poller.look(here)
     assert poller.poll(0.0) == []
+
+
+def test_a_socket_that_was_read_out_is_not_asked_until_its_file_tells(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, there = make(zmq.PAIR), make(zmq.PAIR)
+    poller, asked = Poller(), list[object]()
+    poller.register(here)
+    original = realtime.has_more
+    monkeypatch.setattr(realtime, "has_more", lambda s: asked.append(s) or original(s))
+    poller.read_out(here)
+    assert poller.poll(0.0) == []
+    assert asked == []
+    here.bind("inproc://here")
+    there.connect("inproc://here")
+    there.send(b"news")
+    assert becomes(lambda: poller.poll(0.05) == [here])
+    assert poller.has_more(here)
+    assert here.recv() == b"news"
+    assert not poller.has_more(here)

@@ -47,6 +47,9 @@ class Standing(IntEnum):
     STRANGER = 2
 
 
+HOLDER, DVA, STRANGER = Standing  # found faster than as members of their class
+
+
 class Letter(NamedTuple):
     """A message that has arrived.
 
@@ -115,7 +118,7 @@ class FairQueue:
     def put(self, letter: Letter) -> Letter | None:
         """Take a letter in; the one that finds no room, if any: another, or itself."""
         gone, standing = None, self._standing(letter)
-        if standing is not Standing.HOLDER or self._length >= self._limit:
+        if standing is not HOLDER or self._length >= self._limit:
             gone = self._make_room(letter, standing)
             if gone is letter:
                 return letter
@@ -126,11 +129,11 @@ class FairQueue:
     def _make_room(self, letter: Letter, standing: Standing) -> Letter | None:
         """The one that has to go for a letter, if any: another, which is gone then, or itself."""
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
-        if standing is not Standing.HOLDER and sum(mine) >= EACH:
+        if standing is not HOLDER and sum(mine) >= EACH:
             return letter
-        places = self._limit if standing is Standing.HOLDER else min(self._limit, OTHERS)
+        places = self._limit if standing is HOLDER else min(self._limit, OTHERS)
         if self._length >= places:
-            beside = self._beside(standing is Standing.HOLDER)
+            beside = self._beside(standing is HOLDER)
             if sum(map(len, beside.values())) >= places:
                 worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
                 if (standing, mine[letter.moves] + 1) >= self._rank(line):
@@ -151,7 +154,7 @@ class FairQueue:
         for key, line in self._lines.items():
             standing = self._standing(line[0])
             known = lines.setdefault(standing, key)
-            if standing is Standing.HOLDER and key[1] < known[1]:
+            if standing is HOLDER and key[1] < known[1]:
                 lines[standing] = key
         return lines
 
@@ -216,7 +219,7 @@ class CommandQueue:
         latest_wins: bool,
         limit: int = LIMIT,
         read: Read | None = None,
-        standing: StandingOf = lambda _: Standing.HOLDER,
+        standing: StandingOf = lambda _: HOLDER,
         driven: Callable[[], bool] = lambda: False,
         refuse: Callable[[Letter], object] = _nobody_waits,
     ) -> None:
@@ -227,7 +230,7 @@ class CommandQueue:
         self._paused = self._busy = self._waking = self._was_urgent = False
         self._emergencies: list[Letter] = []
         self._waiting = FairQueue(limit, standing)
-        self._last, self._turns = Standing.HOLDER, [Standing.DVA, Standing.STRANGER]
+        self._last, self._turns = HOLDER, [DVA, STRANGER]
         self._rested = -math.inf  # strangers are, from then on [s]
         self.longest = self.superseded = self.overflowed = 0
 
@@ -237,8 +240,8 @@ class CommandQueue:
     @property
     def hears_the_dva(self) -> bool:
         """Whether something that claims to be of the DVA waits, or is being worked on."""
-        at_work = self._busy and self._last is Standing.DVA
-        return at_work or self._waiting.has(Standing.DVA)
+        at_work = self._busy and self._last is DVA
+        return at_work or self._waiting.has(DVA)
 
     def request(self, request: Request) -> None:
         """A request has arrived; somebody waits for the answer."""
@@ -277,6 +280,11 @@ class CommandQueue:
         return self._waiting.forget_published()
 
     def _put(self, letter: Letter, urgent: bool = False) -> None:
+        is_next = not (urgent or self._busy or len(self._waiting))
+        if is_next and self._standing(letter) is HOLDER:  # as nearly always
+            self._last, self.longest = HOLDER, self.longest or 1
+            self._work([letter])
+            return
         if urgent:
             self._emergencies.append(letter)
         else:
@@ -287,29 +295,33 @@ class CommandQueue:
         if length > self.longest:
             self.longest = length
         if not self._busy:
-            self._work()
+            self._work(self._next())
 
     def _turn_away(self, letter: Letter) -> None:
         self.overflowed += 1
         self._refuse(letter)
 
-    def _work(self) -> None:
-        """Take what is next; where processing takes no time, all of it."""
-        while letters := self._next():
+    def _work(self, letters: list[Letter]) -> None:
+        """Take these, which are next; where processing takes no time, all that wait."""
+        while letters:
             self._busy = True
             if self._paused:
                 self._take_more()
             duration = self.service()
-            if duration > 0.0 and self._last is Standing.STRANGER and not self._was_urgent:
+            if duration > 0.0 and self._last is STRANGER and not self._was_urgent:
                 self._rested = self._clock.now + (1.0 + REST) * duration
             if duration > 0.0:
                 self._clock.call_after(duration, self._done, letters)
                 return
             self._finish(letters)
+            letters = self._next()
         self._busy = False
 
     def _next(self) -> list[Letter]:
         """Emergencies, all in one, unless it is the turn of somebody else."""
+        if not (self._emergencies or len(self._waiting)):
+            self._was_urgent = False
+            return []
         held_up = self._emergencies and not self._was_urgent
         letter = None if held_up else self._next_of_others()
         self._was_urgent = letter is None and bool(self._emergencies)
@@ -319,9 +331,9 @@ class CommandQueue:
         """The holder's after each of another; the DVA and strangers by turns."""
         if not self._waiting:
             return None
-        lines, others, holder = self._waiting.next_lines(), self._turns, Standing.HOLDER
+        lines, others, holder = self._waiting.next_lines(), self._turns, HOLDER
         for one in (*others, holder) if self._last is holder else (holder, *others):
-            if one not in lines or (one is Standing.STRANGER and self._strangers_rest()):
+            if one not in lines or (one is STRANGER and self._strangers_rest()):
                 continue
             self._last = one
             if one is not holder:
@@ -334,7 +346,7 @@ class CommandQueue:
 
         Behind a message of the holder there is most time until its next one.
         """
-        behind_holder = self._busy and self._last is Standing.HOLDER
+        behind_holder = self._busy and self._last is HOLDER
         until = self._rested + (0.0 if behind_holder else AFTER_HOLDER)
         if self._clock.now >= until - TICK or not self._driven():
             return False
@@ -346,7 +358,7 @@ class CommandQueue:
     def _wake(self) -> None:
         self._waking = False
         if not self._busy:
-            self._work()
+            self._work(self._next())
 
     def _take_more(self) -> None:
         """Let published commands come again once half of the inbox is done."""
@@ -363,7 +375,7 @@ class CommandQueue:
 
     def _done(self, letters: list[Letter]) -> None:
         self._finish(letters)
-        self._work()
+        self._work(self._next())
 
 
 def _is_emergency(data: bytes) -> bool:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from dva_sim.kernel.makers import maker
 from dva_sim.protocol import messages as m
@@ -27,6 +27,9 @@ class Mode(StrEnum):
     IDLE = "Idle"
     MISSION = "Mission"
     TELEOPERATION = "Teleoperation"
+
+
+TELEOPERATION: Final = Mode.TELEOPERATION  # found faster than as a member of its class
 
 
 class TimedSetPoint(NamedTuple):
@@ -246,7 +249,7 @@ class RobotController:
 
     def expire(self, now: float) -> bool:
         """End a drive, by messages or by hand, of whom nothing was heard for long; True if so."""
-        driven = self.mode is Mode.TELEOPERATION or self.by_hand is not None
+        driven = self.mode is TELEOPERATION or self.by_hand is not None
         if driven and now - self.last_valid > LEASE_S:
             self._idle("")
             return True
@@ -492,7 +495,7 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
-        again = self.mode is Mode.TELEOPERATION and self.owner == message.source
+        again = self.mode is TELEOPERATION and self.owner == message.source
         refusal = None if again else self._begin(arrived, moving)
         refusal = refusal or self._order(message)
         if refusal is not None:
@@ -500,7 +503,7 @@ class RobotController:
         self.last_set_id = max(self.last_set_id, message.message_id)
         if again:
             return Decision(m.OK, "already started")
-        self.mode, self.owner = Mode.TELEOPERATION, message.source
+        self.mode, self.owner = TELEOPERATION, message.source
         self.last_valid = now
         return Decision(m.OK, set_point=STAND)
 
@@ -508,7 +511,7 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
-        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
+        if self.mode is not TELEOPERATION or self.owner != message.source:
             return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
         if message.message_id <= self.last_set_id:
             return Decision(m.OUT_OF_ORDER, "a newer command was received before")
@@ -533,7 +536,7 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation") or self._order(message)
         if refusal is not None:
             return refusal
-        if self.mode is not Mode.TELEOPERATION:
+        if self.mode is not TELEOPERATION:
             return Decision(m.OK, "not in teleoperation")
         self._idle("")
         return Decision(m.OK, set_point=STAND)

@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
 from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
+from dva_sim.agents.robot import command_queue as queue
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (
     ENDS,
     STAND,
+    TELEOPERATION,
     Decision,
     Mission,
     Mode,
@@ -84,7 +86,7 @@ class CollisionGuardedDrive:
             self._around.clock.every(PERIOD, self._look)
 
     def _look(self) -> bool:
-        driven = self._controller.mode is Mode.TELEOPERATION
+        driven = self._controller.mode is TELEOPERATION
         self._looking = driven and self._around.clock.now < self._wanted.until
         if self._looking:
             self._apply()
@@ -298,7 +300,7 @@ class RobotAgent:
         Raises:
             RuntimeError: it is driven now.
         """
-        if self.controller.mode is Mode.TELEOPERATION:
+        if self.controller.mode is TELEOPERATION:
             raise RuntimeError(f"{self.device.label} is driven")
         self._pattern = pattern
         self.inbox.latest_wins = pattern.newest_wins or self._setup.conflates
@@ -322,7 +324,8 @@ class RobotAgent:
     def is_moving(self) -> bool:
         """Whether its wheels turn now."""
         self._world.advance_to(self.device.clock.now)
-        return abs(self.body.speed) > STANDING or abs(self.body.turn_rate) > STANDING
+        # The turn rate is the cheaper question.
+        return abs(self.body.turn_rate) > STANDING or abs(self.body.speed) > STANDING
 
     def hang(self) -> None:
         """Its computer hangs: it hears and says nothing, and is idle when it starts anew.
@@ -357,26 +360,27 @@ class RobotAgent:
         message = None if self.device.silent else self.device.admit(request)
         if message is None or not isinstance(body := message.body, NOT_STRANGERS):
             return message
-        standing, now = self._standing_of(message), self.device.clock.now
-        unknown = not self._is_driven() or self.inbox.hears_the_dva
-        if standing is not Standing.STRANGER or (unknown and isinstance(body, HOLDERS_ONLY)):
+        if self._standing_of(message) is not queue.STRANGER:
+            return message
+        unknown, now = not self._is_driven() or self.inbox.hears_the_dva, self.device.clock.now
+        if unknown and isinstance(body, HOLDERS_ONLY):
             return message
         self.device.conclude(request, message, lambda one: self._reply(one, now), at_once=True)
         return None
 
     def _standing_of(self, message: m.Message) -> Standing:
         if self.controller.knows(message):
-            return Standing.HOLDER
-        return Standing.DVA if message.source == self.controller.dva else Standing.STRANGER
+            return queue.HOLDER
+        return queue.DVA if message.source == self.controller.dva else queue.STRANGER
 
     def _standing(self, letter: Letter) -> Standing:
         """Who publishes commands is the holder: the robot has subscribed to it."""
         if letter.request is None or letter.message is None:
-            return Standing.HOLDER
+            return queue.HOLDER
         return self._standing_of(letter.message)
 
     def _is_driven(self) -> bool:
-        return self.controller.mode is Mode.TELEOPERATION
+        return self.controller.mode is TELEOPERATION
 
     def _turn_away(self, letter: Letter) -> None:
         """There is no room for a letter."""
@@ -411,17 +415,17 @@ class RobotAgent:
 
     def _decide(self, message: m.Message, arrived: float) -> Decision:
         now, moving = self.device.clock.now, self.is_moving
-        before, mission = self.controller.mode, self.controller.mission_status
-        decision = self.controller.handle(message, arrived, now, moving)
-        if self.refuses is not None and isinstance(message.body, m.SetTeleOp):
+        controller, is_command = self.controller, isinstance(message.body, m.SetTeleOp)
+        before, mission = controller.mode, controller.mission_status
+        decision = controller.handle(message, arrived, now, moving)
+        if is_command and self.refuses is not None:
             decision = Decision(self.refuses, "refuses all commands")
         if self.trace is not None:
             self.trace.decided(message, arrived, now, moving, decision)
-        if self.controller.doubts.unasked is not None:
-            self._ask_about(self.controller.doubts.unasked)
+        if controller.doubts.unasked is not None:
+            self._ask_about(controller.doubts.unasked)
         if decision.set_point is not None:
             self.move(decision.set_point)
-        is_command = isinstance(message.body, m.SetTeleOp)
         if decision.code == m.OK and not is_command:
             decision = self._follow_up(message, decision)
         if decision.code != m.OK:
@@ -430,9 +434,9 @@ class RobotAgent:
             self.device.recorder.counters[f"robot refused: {name}"] += 1
         elif is_command:
             self._log_command(message, arrived, now, decision.set_point)
-        if self.controller.mode is not before:
+        if controller.mode is not before:
             self.mode_changed(message.source)
-        if self.controller.mission_status is not mission:
+        if controller.mission_status is not mission:
             self._publish_mission()
         self._note_holder(message, decision.code)
         return decision
@@ -453,7 +457,7 @@ class RobotAgent:
 
     @property
     def _fares(self) -> int:
-        return self._fared if self.controller.mode is Mode.TELEOPERATION else m.WRONG_MODE
+        return self._fared if self.controller.mode is TELEOPERATION else m.WRONG_MODE
 
     def _publish_holder(self) -> None:
         """Say who holds the robot, to those who listen: who publishes commands gets no answer."""
@@ -517,7 +521,7 @@ class RobotAgent:
     def move(self, set_point: TimedSetPoint) -> None:
         """Give the motors a set point that was decided on."""
         self.set_point = set_point
-        if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
+        if self._guarded is not None and self.controller.mode is TELEOPERATION:
             self._guarded.take(set_point)
             return
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
@@ -531,7 +535,7 @@ class RobotAgent:
             self._commands.close()
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
-        if mode is Mode.TELEOPERATION and self._pattern.published:
+        if mode is TELEOPERATION and self._pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
                 me, source, command_topic(me), self._published

@@ -1,0 +1,57 @@
+"""Ctrl-C ends a command in one line at any moment, also while the program is still being loaded."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+STOPPED_AT = """
+import os, runpy, signal, sys
+
+class Stop:
+    def find_spec(self, name, *_):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Stop())
+sys.argv = ["dva-sim", *{words!r}]
+runpy.run_module("dva_sim", run_name="__main__")
+"""
+LIVE = ["live", "drive-to-event"]
+
+
+def stopped_at(module: str, words: list[str], ignored: bool = False) -> tuple[int, str, str]:
+    """How a command ends where Ctrl-C comes as it looks for a module: code, output, errors."""
+    ended = subprocess.run(
+        [sys.executable, "-c", STOPPED_AT.format(module=module, words=words)],
+        preexec_fn=lambda: signal.signal(
+            signal.SIGINT, signal.SIG_IGN if ignored else signal.SIG_DFL
+        ),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return ended.returncode, ended.stdout, ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [
+        ("dva_sim.cli", ["list"]),
+        ("typer", ["list"]),
+        ("dva_sim.cli.program", LIVE),
+        ("dva_sim.kernel.rare_collection", LIVE),
+        ("dva_sim.live", LIVE),
+        ("numpy", LIVE),
+        ("zmq", LIVE),
+    ],
+)
+def test_a_command_that_is_stopped_while_it_is_loaded_says_so_in_a_line(module, words):
+    assert stopped_at(module, words) == (130, "", "error: stopped by Ctrl-C\n")
+
+
+def test_who_ignores_ctrl_c_is_not_stopped_by_it():
+    assert stopped_at("typer", ["--version"], ignored=True)[0] == 0
