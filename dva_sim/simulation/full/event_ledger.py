@@ -18,9 +18,8 @@ PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twic
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
-OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>", b"<FalseAlarm>"
-_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"
-"""What it wants to hear that reaches the DVA, and what it wants to read that the DVA sends."""
+_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"  # of what the DVA sends
+OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # the most of what reaches the DVA
 Broken = tuple[str, str]
 
 
@@ -94,8 +93,8 @@ class EventLedger:
     # --- what is said --------------------------------------------------------------------
 
     def hears(self, source: str, message: m.Message | None, now: float) -> None:
-        """Something about events has reached the DVA; `source` has really sent it."""
-        if message is None or message.source != source:
+        """Something has reached the DVA; `source` has really sent it."""
+        if message is None or message.source != source or isinstance(message.body, OF_NO_EVENT):
             return
         match message.body:
             case m.SensorValue():

@@ -8,7 +8,6 @@ itself. `CHECKED` says which rules it holds that against.
 
 from __future__ import annotations
 
-import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,7 +22,7 @@ from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.simulation.full.event_ledger import OF_EVENTS, PENDING_SLACK, EventLedger
+from dva_sim.simulation.full.event_ledger import PENDING_SLACK, EventLedger
 from dva_sim.simulation.scenario import RobotConfig
 from dva_sim.worlds.bodies import G
 
@@ -58,8 +57,6 @@ CHECKED_IN_SHORT: Final = (
 )
 
 Broken = tuple[str, str]
-# As everybody here writes them, but any other would do no harm.
-_NUMBER_AND_SOURCE = re.compile(rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -248,23 +245,20 @@ class SafetyAudit:
                 witness.offset = data.captured - data.observation.tick / 1000
         elif to in self._robots and to not in self.deaf:
             self._reaches_robot(now, source, to, data)
-        elif to == self._dva and any(what in data for what in OF_EVENTS):
+        elif to == self._dva:
             self._ledger.hears(source, _read(data), now)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
-        witness = self.witness(robot)
-        command = _NUMBER_AND_SOURCE.search(data) if b"<SetTeleOp>" in data else None
-        if command is not None:
-            witness.arrivals.setdefault((command[2].decode(), int(command[1])), now)
+        witness, message = self.witness(robot), _read(data)
+        if message is None:
+            return
+        key = message.source, message.message_id
+        if isinstance(message.body, m.SetTeleOp):
+            witness.arrivals.setdefault(key, now)
             if len(witness.arrivals) > MOST_KEPT:
                 witness.arrivals.popitem(last=False)
             return
-        message = _read(data)
-        if message is None:
-            return
-        witness.unanswered.setdefault(
-            (message.source, message.message_id), Unanswered(message, now, source)
-        )
+        witness.unanswered.setdefault(key, Unanswered(message, now, source))
         if source == self._dva and isinstance(message.body, m.PermissionGrant):
             grant = message.body
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
@@ -509,6 +503,7 @@ def _end(witness: Witness, session: int, when: float) -> None:
 
 
 def _read(data: bytes) -> m.Message | None:
+    """What whoever gets it reads, too: the same bytes are read once."""
     try:
         return decode(data)
     except ProtocolError:
