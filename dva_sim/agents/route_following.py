@@ -92,6 +92,8 @@ _make_place = maker(_Place)
 
 
 ROUNDED = 1e-6  # far more than lengths are rounded by [m]
+BEND = 0.6  # a route leads away from a place until it has turned by so much in all since [rad]
+AWAY = 1.0 / math.cos(BEND)  # way along it by which it is a metre away, at most
 
 
 class _Line:
@@ -106,6 +108,9 @@ class _Line:
         steps = np.hypot(*np.diff(points, axis=0).T)
         self.legs = [_leg(*start, *end) for start, end in pairwise(corners)]
         self.at: list[float] = [0.0, *np.cumsum(steps).tolist()]
+        headings = np.arctan2([leg.dy for leg in self.legs], [leg.dx for leg in self.legs])
+        turns = np.abs(np.remainder(np.diff(headings) + math.pi, 2.0 * math.pi) - math.pi)
+        self._turned: list[float] = [0.0, *np.cumsum(turns).tolist()]  # in all, up to each piece
         self.begin = _Place(0, 0.0, *corners[0], math.inf)
         self._last: _Place | None = None
         self._found = self.begin
@@ -128,14 +133,15 @@ class _Line:
 
         The way along a route is no shorter than the straight one: who is so much farther from a
         place on it than from the nearest one need not look at what comes within as much behind it.
+        Nor need who has left no piece behind: a route that goes on about as straight leads away.
         """
         at, legs, nearest, found = self.at, self.legs, math.inf, (last.leg, 0.0, math.inf, 0.0)
         end = last.along + reach + BENT * math.hypot(x - last.x, y - last.y)
-        i, count = last.leg, len(legs)
+        i, count, away, until = last.leg, len(legs), math.inf, 0
         while i < count and at[i] <= end:
             begins = at[i]
             ax, ay, dx, dy, square, length = legs[i]
-            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
+            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 1.0
             share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
             if at[i + 1] > end:
                 share = min(share, (end - begins) / (at[i + 1] - begins))
@@ -147,10 +153,14 @@ class _Line:
             far = away_x * away_x + away_y * away_y
             if far < nearest:
                 nearest, found = far, (i, along, away_x, away_y)
+                away = along + AWAY * math.sqrt(far) + ROUNDED if share < 1.0 else math.inf
+                until = bisect_right(self._turned, self._turned[i] + BEND, i)
                 i += 1
             else:
                 farther = math.sqrt(far) - math.sqrt(nearest) - ROUNDED
                 i = bisect_right(at, along + farther, i + 2) - 1
+            if at[i] > away and i < until:
+                i = until
         leg, along, away_x, away_y = found
         return _make_place(leg, along, x, y, math.hypot(away_x, away_y))
 
