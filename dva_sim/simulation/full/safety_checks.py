@@ -108,7 +108,7 @@ class Witness:
         ordered: When the newest order that was accepted had arrived.
         does: What that was, by sender and session; nothing once that was ended.
         owner: Who gave it.
-        newest: Sender, session and number of the newest command that was accepted.
+        newest: Sender and session, and number, of the newest command that was accepted.
         allowed: Until when that lets it move.
         offset: What is to be added to its own clock to have the time.
         last_mission: When it was last on a mission that it may be on.
@@ -127,7 +127,7 @@ class Witness:
     ordered: float = -1.0
     does: Doing | None = None
     owner: str | None = None
-    newest: tuple[str, int | None, int] = "", None, 0
+    newest: tuple[tuple[str, int | None], int] = ("", None), 0
     allowed: float = 0.0
     offset: float | None = None
     last_mission: float = 0.0
@@ -373,9 +373,10 @@ class SafetyAudit:
             found.append(("S2", f"obeys {source} while it is driven by hand"))
         elif witness.does != (source, session, "teleoperation"):
             found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
-        if witness.newest[:2] == (source, session) and number <= witness.newest[2]:
+        speaker, known = witness.newest
+        if speaker == (source, session) and number <= known:
             found.append(("S1", "obeys a command again, or after a newer one"))
-        witness.newest = source, session, number
+        witness.newest = (source, session), number
         arrived = witness.arrivals.pop((source, number), command.arrived)
         witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
@@ -386,7 +387,8 @@ class SafetyAudit:
             witness.allowed = witness.allowed if witness.allowed < oldest else oldest
             if pictured > command.time + ROUNDED:
                 found.append(("S1", "obeys a command behind a picture that was not taken yet"))
-        self._report(found, command.time, self._robots[command.robot].device.label)
+        if found:
+            self._report(found, command.time, self._robots[command.robot].device.label)
 
     def by_hand(self, done: ByHand) -> None:
         """Somebody drives a robot at the robot itself: no message tells of that."""
@@ -459,22 +461,23 @@ def broken_by_wish(
         yield "S1", f"is asked to move for {late:.2f} s longer than it may"
 
 
-def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
-    """Rules that the motion of a robot breaks now."""
+def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> list[Broken]:
+    """Rules that the motion of a robot breaks now; what was pushed breaks none."""
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
-    pushed, stopping = _pushed(robot, now), _stopping(robot)
-    if abs(speed) > MOVING and not pushed:
-        allowed = max(witness.allowed, witness.last_mission)
+    found: list[Broken] = []
+    if abs(speed) > MOVING:
+        allowed, stopping = max(witness.allowed, witness.last_mission), _stopping(robot)
         if now > allowed + stopping:
-            yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
+            late = f"{now - allowed:.1f} s after it had to stop"
+            found.append(("S1", f"moves at {speed:.2f} m/s, {late}"))
         if witness.stopped > witness.ordered and now > witness.stopped + stopping:
-            since = now - witness.stopped
-            yield "S3", f"moves at {speed:.2f} m/s, {since:.1f} s after an emergency"
+            late = f"{now - witness.stopped:.1f} s after an emergency"
+            found.append(("S3", f"moves at {speed:.2f} m/s, {late}"))
     # Comparisons that a nan fails, too; nobody drives backwards.
     forward = -MOVING <= speed <= spec.max_speed * SLACK
-    within = forward and abs(turn_rate) <= spec.max_turn_rate * SLACK
-    if not within and not pushed:
-        yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
+    if not (forward and abs(turn_rate) <= spec.max_turn_rate * SLACK):
+        found.append(("S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"))
+    return [] if found and _pushed(robot, now) else found
 
 
 def _taken_by_hand(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
