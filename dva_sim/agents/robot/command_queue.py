@@ -47,6 +47,9 @@ class Standing(IntEnum):
     STRANGER = 2
 
 
+HOLDER, DVA, STRANGER = Standing  # a member is looked up in its class fifteen times as slowly
+
+
 class Letter(NamedTuple):
     """A message that has arrived.
 
@@ -92,14 +95,14 @@ class FairQueue:
     Args:
         limit: How many messages of the holder may wait; of others no more than `OTHERS`.
         standing: Of a message, by now: a grant that comes meanwhile counts.
+
+    Attributes:
+        length: How many wait.
     """
 
     def __init__(self, limit: int, standing: StandingOf) -> None:
-        self._limit, self._standing, self._length = limit, standing, 0
+        self._limit, self._standing, self.length = limit, standing, 0
         self._lines: OrderedDict[LineOf, Line] = OrderedDict()
-
-    def __len__(self) -> int:
-        return self._length
 
     def count(self, holders: bool) -> int:
         """How many are the holder's, or are not."""
@@ -115,22 +118,22 @@ class FairQueue:
     def put(self, letter: Letter) -> Letter | None:
         """Take a letter in; the one that finds no room, if any: another, or itself."""
         gone, standing = None, self._standing(letter)
-        if standing is not Standing.HOLDER or self._length >= self._limit:
+        if standing is not HOLDER or self.length >= self._limit:
             gone = self._make_room(letter, standing)
             if gone is letter:
                 return letter
         self._lines.setdefault((letter.peer, letter.moves), deque()).append(letter)
-        self._length += 1
+        self.length += 1
         return gone
 
     def _make_room(self, letter: Letter, standing: Standing) -> Letter | None:
         """The one that has to go for a letter, if any: another, which is gone then, or itself."""
         mine = [len(self._lines.get((letter.peer, moves), ())) for moves in (False, True)]
-        if standing is not Standing.HOLDER and sum(mine) >= EACH:
+        if standing is not HOLDER and sum(mine) >= EACH:
             return letter
-        places = self._limit if standing is Standing.HOLDER else min(self._limit, OTHERS)
-        if self._length >= places:
-            beside = self._beside(standing is Standing.HOLDER)
+        places = self._limit if standing is HOLDER else min(self._limit, OTHERS)
+        if self.length >= places:
+            beside = self._beside(standing is HOLDER)
             if sum(map(len, beside.values())) >= places:
                 worst, line = max(beside.items(), key=lambda one: self._rank(one[1]))
                 if (standing, mine[letter.moves] + 1) >= self._rank(line):
@@ -151,7 +154,7 @@ class FairQueue:
         for key, line in self._lines.items():
             standing = self._standing(line[0])
             known = lines.setdefault(standing, key)
-            if standing is Standing.HOLDER and key[1] < known[1]:
+            if standing is HOLDER and key[1] < known[1]:
                 lines[standing] = key
         return lines
 
@@ -165,13 +168,13 @@ class FairQueue:
         letter = line.pop() if newest else line.popleft()
         if not line:
             del self._lines[key]
-        self._length -= 1
+        self.length -= 1
         return letter
 
     def forget_published(self) -> int:
         """Drop what nobody waits to be answered: how many those were."""
         gone = len(self._lines.pop((PUBLISHED, True), ()))
-        self._length -= gone
+        self.length -= gone
         return gone
 
 
@@ -216,7 +219,7 @@ class CommandQueue:
         latest_wins: bool,
         limit: int = LIMIT,
         read: Read | None = None,
-        standing: StandingOf = lambda _: Standing.HOLDER,
+        standing: StandingOf = lambda _: HOLDER,
         driven: Callable[[], bool] = lambda: False,
         refuse: Callable[[Letter], object] = _nobody_waits,
     ) -> None:
@@ -227,18 +230,18 @@ class CommandQueue:
         self._paused = self._busy = self._waking = self._was_urgent = False
         self._emergencies: list[Letter] = []
         self._waiting = FairQueue(limit, standing)
-        self._last, self._turns = Standing.HOLDER, [Standing.DVA, Standing.STRANGER]
+        self._last, self._turns = HOLDER, [DVA, STRANGER]
         self._rested = -math.inf  # strangers are, from then on [s]
         self.longest = self.superseded = self.overflowed = 0
 
     def __len__(self) -> int:
-        return len(self._emergencies) + len(self._waiting)
+        return len(self._emergencies) + self._waiting.length
 
     @property
     def hears_the_dva(self) -> bool:
         """Whether something that claims to be of the DVA waits, or is being worked on."""
-        at_work = self._busy and self._last is Standing.DVA
-        return at_work or self._waiting.has(Standing.DVA)
+        at_work = self._busy and self._last is DVA
+        return at_work or self._waiting.has(DVA)
 
     def request(self, request: Request) -> None:
         """A request has arrived; somebody waits for the answer."""
@@ -267,7 +270,7 @@ class CommandQueue:
             self.superseded += self.forget_published()
         self._put(_make_letter(data, self._clock.now, None, message, True))
         waiting, limit = self._waiting, self._limit
-        is_full = len(waiting) >= limit and waiting.count(holders=True) >= limit
+        is_full = waiting.length >= limit and waiting.count(holders=True) >= limit
         if is_full and self.flow is not None:
             self._paused = True
             self.flow.pause()
@@ -277,13 +280,21 @@ class CommandQueue:
         return self._waiting.forget_published()
 
     def _put(self, letter: Letter, urgent: bool = False) -> None:
+        """Take a letter in; the holder's that finds nothing else here is worked on at once."""
+        idle = not (self._busy or urgent or self._emergencies or self._waiting.length)
+        if idle and self._standing(letter) is HOLDER:
+            self._last, self._was_urgent = HOLDER, False
+            self.longest = self.longest or 1
+            if self._begin([letter]):
+                self._work()
+            return
         if urgent:
             self._emergencies.append(letter)
         else:
             gone = self._waiting.put(letter)
             if gone is not None:
                 self._turn_away(gone)
-        length = len(self._emergencies if urgent else self._waiting)
+        length = len(self._emergencies) if urgent else self._waiting.length
         if length > self.longest:
             self.longest = length
         if not self._busy:
@@ -296,17 +307,23 @@ class CommandQueue:
     def _work(self) -> None:
         """Take what is next; where processing takes no time, all of it."""
         while letters := self._next():
-            self._busy = True
-            if self._paused:
-                self._take_more()
-            duration = self.service()
-            if duration > 0.0 and self._last is Standing.STRANGER and not self._was_urgent:
-                self._rested = self._clock.now + (1.0 + REST) * duration
-            if duration > 0.0:
-                self._clock.call_after(duration, self._done, letters)
+            if not self._begin(letters):
                 return
-            self._finish(letters)
         self._busy = False
+
+    def _begin(self, letters: list[Letter]) -> bool:
+        """Work on letters; whether that is done already, as it takes no time."""
+        self._busy = True
+        if self._paused:
+            self._take_more()
+        duration = self.service()
+        if duration > 0.0:
+            if self._last is STRANGER and not self._was_urgent:
+                self._rested = self._clock.now + (1.0 + REST) * duration
+            self._clock.call_after(duration, self._done, letters)
+            return False
+        self._finish(letters)
+        return True
 
     def _next(self) -> list[Letter]:
         """Emergencies, all in one, unless it is the turn of somebody else."""
@@ -317,14 +334,14 @@ class CommandQueue:
 
     def _next_of_others(self) -> Letter | None:
         """The holder's after each of another; the DVA and strangers by turns."""
-        if not self._waiting:
+        if not self._waiting.length:
             return None
-        lines, others, holder = self._waiting.next_lines(), self._turns, Standing.HOLDER
-        for one in (*others, holder) if self._last is holder else (holder, *others):
-            if one not in lines or (one is Standing.STRANGER and self._strangers_rest()):
+        lines, others = self._waiting.next_lines(), self._turns
+        for one in (*others, HOLDER) if self._last is HOLDER else (HOLDER, *others):
+            if one not in lines or (one is STRANGER and self._strangers_rest()):
                 continue
             self._last = one
-            if one is not holder:
+            if one is not HOLDER:
                 self._turns = [*(other for other in others if other is not one), one]
             return self._waiting.pop(lines[one])
         return None
@@ -334,7 +351,7 @@ class CommandQueue:
 
         Behind a message of the holder there is most time until its next one.
         """
-        behind_holder = self._busy and self._last is Standing.HOLDER
+        behind_holder = self._busy and self._last is HOLDER
         until = self._rested + (0.0 if behind_holder else AFTER_HOLDER)
         if self._clock.now >= until - TICK or not self._driven():
             return False
