@@ -185,7 +185,8 @@ class TiltApp:
         self._advance(now)
         if not self._ideal and self._batch is None:
             if not self._watches:
-                self.shown = self._mapping.command(*self._filter.value(), 0.0)
+                level, turn = self._filter.value()
+                self.shown = self._mapping.command(level, turn, 0.0)
             self._captured = self._trail.captured()
             self._stems_from = self._sampled_at - self._trail.age * self._period
         level, turn = self.shown
