@@ -76,7 +76,7 @@ class DelayEstimate:
             return
         self._next_look = now + self._period
         self._remember(now)
-        steps = min(max(1, round(over / self._step)), len(self._lags))
+        steps = min(max(1, round(over / self._step)), len(self._lags)) if over else 1
         motion = self._motion
         motion[0, 0], motion[1, 0] = one, other
         errors = self._past(steps) - motion
