@@ -29,6 +29,9 @@ class Mode(StrEnum):
     TELEOPERATION = "Teleoperation"
 
 
+IDLE, MISSION, TELEOPERATION = Mode  # a member is looked up in its class fifteen times as slowly
+
+
 class TimedSetPoint(NamedTuple):
     """How to move, and until when at the latest: speed [m/s], turn rate [rad/s], time [s]."""
 
@@ -162,7 +165,7 @@ class RobotController:
     camera_url: str = "http://192.168.1.20:8080/camera"
     sensors: tuple[m.Sensor, ...] = ()
     clock_offset: float = 0.0
-    mode: Mode = Mode.IDLE
+    mode: Mode = IDLE
     owner: str | None = None
     grant: m.PermissionGrant | None = None
     highest_session: int = 0
@@ -246,7 +249,7 @@ class RobotController:
 
     def expire(self, now: float) -> bool:
         """End a drive, by messages or by hand, of whom nothing was heard for long; True if so."""
-        driven = self.mode is Mode.TELEOPERATION or self.by_hand is not None
+        driven = self.mode is TELEOPERATION or self.by_hand is not None
         if driven and now - self.last_valid > LEASE_S:
             self._idle("")
             return True
@@ -316,7 +319,7 @@ class RobotController:
             reason: In words.
         """
         before = self.mission_status
-        if self.mode is Mode.MISSION:
+        if self.mode is MISSION:
             self.mission_status = m.MissionStatus(before.mission_id, state, left, reason)
             if state in ENDS:
                 self._idle(reason)
@@ -325,10 +328,10 @@ class RobotController:
     def _idle(self, why: str) -> None:
         """Stand by; a mission that was still going on has failed, and this is `why`."""
         status = self.mission_status
-        if self.mode is Mode.MISSION and status.mission_state not in ENDS:
+        if self.mode is MISSION and status.mission_state not in ENDS:
             left = status.waypoints_left
             self.mission_status = m.MissionStatus(status.mission_id, "failed", left, why)
-        self.mode, self.owner, self.mission, self.by_hand = Mode.IDLE, None, None, None
+        self.mode, self.owner, self.mission, self.by_hand = IDLE, None, None, None
 
     def _emergency(self, now: float) -> Decision:
         """Stop and stand idle; whatever was received before this moment moves nothing (S3)."""
@@ -431,7 +434,7 @@ class RobotController:
     @property
     def free(self) -> bool:
         """Whether it stands idle, and nobody holds it: then it can be sent somewhere."""
-        idle = self.mode is Mode.IDLE and self.by_hand is None
+        idle = self.mode is IDLE and self.by_hand is None
         return idle and self.owner is None and self.grant is None
 
     def _auction(self, message: m.Message) -> Decision:
@@ -480,7 +483,7 @@ class RobotController:
         """Why no new activity may begin now, or None."""
         if arrived <= self.emergency_at:
             return Decision(m.STALE, "sent before the emergency")
-        if self.mode is not Mode.IDLE:
+        if self.mode is not IDLE:
             return Decision(m.BUSY, f"in mode {self.mode}")
         if self.by_hand is not None:
             return Decision(m.BUSY, "driven by hand, at the robot")
@@ -492,7 +495,7 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
-        again = self.mode is Mode.TELEOPERATION and self.owner == message.source
+        again = self.mode is TELEOPERATION and self.owner == message.source
         refusal = None if again else self._begin(arrived, moving)
         refusal = refusal or self._order(message)
         if refusal is not None:
@@ -500,7 +503,7 @@ class RobotController:
         self.last_set_id = max(self.last_set_id, message.message_id)
         if again:
             return Decision(m.OK, "already started")
-        self.mode, self.owner = Mode.TELEOPERATION, message.source
+        self.mode, self.owner = TELEOPERATION, message.source
         self.last_valid = now
         return Decision(m.OK, set_point=STAND)
 
@@ -508,7 +511,7 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
             return refusal
-        if self.mode is not Mode.TELEOPERATION or self.owner != message.source:
+        if self.mode is not TELEOPERATION or self.owner != message.source:
             return Decision(m.WRONG_MODE, f"in mode {self.mode}, not driven by {message.source}")
         if message.message_id <= self.last_set_id:
             return Decision(m.OUT_OF_ORDER, "a newer command was received before")
@@ -533,7 +536,7 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation") or self._order(message)
         if refusal is not None:
             return refusal
-        if self.mode is not Mode.TELEOPERATION:
+        if self.mode is not TELEOPERATION:
             return Decision(m.OK, "not in teleoperation")
         self._idle("")
         return Decision(m.OK, set_point=STAND)
@@ -543,7 +546,7 @@ class RobotController:
         refusal = refusal or self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
-        self.mode, self.owner, self.mission = Mode.MISSION, message.source, body
+        self.mode, self.owner, self.mission = MISSION, message.source, body
         left = len(body.waypoints) if isinstance(body, m.GoTo | m.Patrol) else 1
         self.mission_status = m.MissionStatus(message.message_id, "under_way", left, "")
         return Decision(m.OK)
@@ -552,6 +555,6 @@ class RobotController:
         refusal = self._refusal(message, "missions") or self._order(message)
         if refusal is not None:
             return refusal
-        if self.mode is Mode.MISSION:
+        if self.mode is MISSION:
             self._idle("cancelled")
         return Decision(m.OK, set_point=STAND)

@@ -15,6 +15,7 @@ from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Stan
 from dva_sim.agents.robot.controller import (
     ENDS,
     STAND,
+    TELEOPERATION,
     Decision,
     Mission,
     Mode,
@@ -84,7 +85,7 @@ class CollisionGuardedDrive:
             self._around.clock.every(PERIOD, self._look)
 
     def _look(self) -> bool:
-        driven = self._controller.mode is Mode.TELEOPERATION
+        driven = self._controller.mode is TELEOPERATION
         self._looking = driven and self._around.clock.now < self._wanted.until
         if self._looking:
             self._apply()
@@ -299,7 +300,7 @@ class RobotAgent:
         Raises:
             RuntimeError: it is driven now.
         """
-        if self.controller.mode is Mode.TELEOPERATION:
+        if self.controller.mode is TELEOPERATION:
             raise RuntimeError(f"{self.device.label} is driven")
         self._pattern = pattern
         self.inbox.latest_wins = pattern.newest_wins or self._setup.conflates
@@ -377,7 +378,7 @@ class RobotAgent:
         return self._standing_of(letter.message)
 
     def _is_driven(self) -> bool:
-        return self.controller.mode is Mode.TELEOPERATION
+        return self.controller.mode is TELEOPERATION
 
     def _turn_away(self, letter: Letter) -> None:
         """There is no room for a letter."""
@@ -445,7 +446,8 @@ class RobotAgent:
             self._fared = code
         if holder != self._told[0]:
             self._held_since = self.device.clock.now
-        if (holder, self._fares if self._fares in m.OBEYS_NO_MORE else m.OK) != self._told:
+        fares = self._fares
+        if (holder, fares if fares in m.OBEYS_NO_MORE else m.OK) != self._told:
             self._publish_holder()
 
     @property
@@ -454,7 +456,7 @@ class RobotAgent:
 
     @property
     def _fares(self) -> int:
-        return self._fared if self.controller.mode is Mode.TELEOPERATION else m.WRONG_MODE
+        return self._fared if self.controller.mode is TELEOPERATION else m.WRONG_MODE
 
     def _publish_holder(self) -> None:
         """Say who holds the robot, to those who listen: who publishes commands gets no answer."""
@@ -518,7 +520,7 @@ class RobotAgent:
     def move(self, set_point: TimedSetPoint) -> None:
         """Give the motors a set point that was decided on."""
         self.set_point = set_point
-        if self._guarded is not None and self.controller.mode is Mode.TELEOPERATION:
+        if self._guarded is not None and self.controller.mode is TELEOPERATION:
             self._guarded.take(set_point)
             return
         self.body.drive(set_point.speed, set_point.turn_rate, set_point.until)
@@ -532,7 +534,7 @@ class RobotAgent:
             self._commands.close()
             self._commands = self.inbox.flow = None
             self.inbox.forget_published()
-        if mode is Mode.TELEOPERATION and self._pattern.published:
+        if mode is TELEOPERATION and self._pattern.published:
             me = self.device.id_tag
             self._commands = self.inbox.flow = self.device.network.subscribe(
                 me, source, command_topic(me), self._published
