@@ -208,5 +208,8 @@ class RunHazards:
 
     def _going_on(self, now: float) -> list[RunHazard]:
         """What has begun, is real, and was not dealt with yet."""
-        over = self.contained.get
-        return [i for n, i in self._real.items() if i.start <= now < over(n, math.inf)]
+        going_on = []
+        for number, incident in self._real.items():
+            if incident.start <= now < self.contained.get(number, math.inf):
+                going_on.append(incident)
+        return going_on
