@@ -53,24 +53,18 @@ class Ahead(NamedTuple):
 _make_ahead = maker(Ahead)
 
 
-class _Leg(NamedTuple):
-    """A straight piece: its beginning [m], the way to its end [m], that squared, and its length."""
-
-    x: float
-    y: float
-    dx: float
-    dy: float
-    square: float
-    length: float
+_Leg = tuple[float, float, float, float, float, float]
+"""A straight piece: its beginning [m], the way to its end [m], that squared, and its length."""
 
 
 def _leg(ax: float, ay: float, bx: float, by: float) -> _Leg:
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
-    return _Leg(ax, ay, dx, dy, square, math.sqrt(square))
+    return ax, ay, dx, dy, square, math.sqrt(square)
 
 
-class _Place(NamedTuple):
+@dataclass(slots=True)
+class _Place:
     """Where on a route somebody is.
 
     Attributes:
@@ -88,10 +82,9 @@ class _Place(NamedTuple):
     offset: float
 
 
-_make_place = maker(_Place)
-
-
 ROUNDED = 1e-6  # far more than lengths are rounded by [m]
+BEND = 0.6  # a route leads away from a place until it has turned by so much in all since [rad]
+AWAY = 1.0 / math.cos(BEND)  # way along it by which it is a metre away, at most
 
 
 class _Line:
@@ -106,6 +99,9 @@ class _Line:
         steps = np.hypot(*np.diff(points, axis=0).T)
         self.legs = [_leg(*start, *end) for start, end in pairwise(corners)]
         self.at: list[float] = [0.0, *np.cumsum(steps).tolist()]
+        headings = np.arctan2([leg[3] for leg in self.legs], [leg[2] for leg in self.legs])
+        turns = np.abs(np.remainder(np.diff(headings) + math.pi, 2.0 * math.pi) - math.pi)
+        self._turned: list[float] = [0.0, *np.cumsum(turns).tolist()]  # in all, up to each piece
         self.begin = _Place(0, 0.0, *corners[0], math.inf)
         self._last: _Place | None = None
         self._found = self.begin
@@ -128,14 +124,15 @@ class _Line:
 
         The way along a route is no shorter than the straight one: who is so much farther from a
         place on it than from the nearest one need not look at what comes within as much behind it.
+        Nor need who has left no piece behind: a route that goes on about as straight leads away.
         """
         at, legs, nearest, found = self.at, self.legs, math.inf, (last.leg, 0.0, math.inf, 0.0)
         end = last.along + reach + BENT * math.hypot(x - last.x, y - last.y)
-        i, count = last.leg, len(legs)
+        i, count, away, until = last.leg, len(legs), math.inf, 0
         while i < count and at[i] <= end:
             begins = at[i]
             ax, ay, dx, dy, square, length = legs[i]
-            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 0.0
+            share = ((x - ax) * dx + (y - ay) * dy) / square if square else 1.0
             share = 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
             if at[i + 1] > end:
                 share = min(share, (end - begins) / (at[i + 1] - begins))
@@ -147,12 +144,16 @@ class _Line:
             far = away_x * away_x + away_y * away_y
             if far < nearest:
                 nearest, found = far, (i, along, away_x, away_y)
+                away = along + AWAY * math.sqrt(far) + ROUNDED if share < 1.0 else math.inf
+                until = bisect_right(self._turned, self._turned[i] + BEND, i)
                 i += 1
             else:
                 farther = math.sqrt(far) - math.sqrt(nearest) - ROUNDED
                 i = bisect_right(at, along + farther, i + 2) - 1
+            if at[i] > away and i < until:
+                i = until
         leg, along, away_x, away_y = found
-        return _make_place(leg, along, x, y, math.hypot(away_x, away_y))
+        return _Place(leg, along, x, y, math.hypot(away_x, away_y))
 
 
 class Route:
@@ -168,23 +169,22 @@ class Route:
         points: Corners, shape `(n, 2)` [m], n >= 2.
         reach: How far ahead, beyond what one may have come [m]. A corner may be cut by so much of
             the route; where laps lie on each other, it should be well below a lap.
+
+    Attributes:
+        points: As given.
+        length: Whole way [m].
     """
 
     def __init__(self, points: NDArray[np.float64], reach: float = REACH) -> None:
         self._line, self._reach = _Line(points), reach
         self._place = self._line.begin
-        self.points = points
+        self.points, self.length = points, self._line.at[-1]
 
     def twin(self) -> Route:
         """The same route for somebody else: what both look for at one place is found once."""
         twin = copy(self)
         twin.points = self.points.copy()
         return twin
-
-    @property
-    def length(self) -> float:
-        """Whole way [m]."""
-        return self._line.at[-1]
 
     @property
     def left(self) -> float:
@@ -225,7 +225,7 @@ class Route:
     def point_at(self, along: float) -> tuple[float, float]:
         """The place a given way along the route [m]; beyond its end, the end."""
         at, legs = self._line.at, self._line.legs
-        i = bisect_right(at, along, hi=len(legs)) - 1
+        i = bisect_right(at, along, 0, len(legs)) - 1
         ax, ay, dx, dy, _, _ = legs[i]
         length = at[i + 1] - at[i]
         share = (along - at[i]) / length if length else 1.0
@@ -340,8 +340,9 @@ class PurePursuit:
         if self._turning or is_there:
             gain = gain_at(person.crossover, person.margin, delay)
             return reach.turn(self._clamp(gain * ahead.bearing))
-        speed = min(wanted, person.caution * look / delay, ahead.remaining / (2.0 * delay + 1.0))
-        return self._along(route, view, ahead, look, speed)
+        speed, slow = person.caution * look / delay, ahead.remaining / (2.0 * delay + 1.0)
+        speed = speed if speed < wanted else wanted
+        return self._along(route, view, ahead, look, speed if speed < slow else slow)
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
         """Towards the point ahead on an arc, slower where that would be too sharp.

@@ -42,11 +42,11 @@ class Clock:
         self, period: float, action: Callable[[], object], start: float | None = None
     ) -> None:
         """Run `action()` each `period` [s] until it returns `False`; first at `start` [s]."""
-        env, step = self.env, max(1, round(period * US))
+        env, queue, step = self.env, self._queue, max(1, round(period * US))
 
         def tick() -> None:
             if action() is not False:
-                self._put(env._now + step, tick, ())
+                heappush(queue, (env._now + step, next(env._eid), tick, ()))
 
         self._put(env._now if start is None else round(start * US), tick, ())
 

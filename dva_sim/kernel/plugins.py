@@ -150,6 +150,8 @@ class Plugins(Generic[T]):
     def _check_options(
         self, name: str, factory: Callable[..., T], options: Mapping[str, Any], given: int
     ) -> None:
+        if not options:
+            return
         parameters = list(inspect.signature(factory).parameters.values())[given:]
         if any(p.kind is p.VAR_KEYWORD for p in parameters):
             return

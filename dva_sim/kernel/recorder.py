@@ -337,9 +337,8 @@ class Recorder:
         issued = self._issued.pop((source, message_id), None)
         if issued is None:
             return
-        ages = issued.sample_age, issued.captured
-        command = _make_applied(issued.made, issued.sent, arrived, now, until, *ages)
-        drive.applied.append(command)
+        made, sent, sample_age, captured = issued
+        drive.applied.append(_make_applied(made, sent, arrived, now, until, sample_age, captured))
 
     def drive_ordered(self, drive: DriveLog) -> None:
         """An operator shall drive a robot."""

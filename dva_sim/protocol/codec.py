@@ -39,6 +39,7 @@ _TICK = "(0|[1-9][0-9]{0,15})"
 _CODE = "(0|[1-9][0-9]{0,2})"
 _TEXT = "([ -%'-;=?-~]{0,256})"
 _NAME = "([ -%'-;=?-~]{1,64})"
+_ADDRESS = f"({limits.pattern('Address')})"
 _MODE = f"({'|'.join(choices('Mode'))})"
 
 
@@ -78,10 +79,13 @@ _HOLDER = (
     f"(?:<Code>{_CODE}</Code>)?</RobotHolder>"
 )
 _REPLY = f"<reply><Answers>{_NATURAL}</Answers><Code>{_CODE}</Code><Text>{_TEXT}</Text></reply>"
+_DESCRIPTION = (
+    f"<DeviceLabel>{_NAME}</DeviceLabel><DeviceType>{_NAME}</DeviceType><IpAddr>{_ADDRESS}</IpAddr>"
+)
 
 
-def _simple(payload: str) -> str:
-    return f"<SimpleMsg>{_HEADER}<SessionID>{_SESSION}</SessionID>{payload}</SimpleMsg>"
+def _simple(payload: str, kind: str = "SimpleMsg") -> str:
+    return f"<{kind}>{_HEADER}<SessionID>{_SESSION}</SessionID>{payload}</{kind}>"
 
 
 def _set_teleop(groups: _Groups) -> m.SetTeleOp | None:
@@ -121,6 +125,11 @@ def _person(groups: _Groups) -> m.PersonStatus:
     return m.PersonStatus(activity.decode(), m.Position(float(latitude), float(longitude)))
 
 
+def _registration(groups: _Groups) -> m.Registration:
+    label, device_type, address = groups
+    return m.Registration(label.decode(), device_type.decode(), address.decode())
+
+
 def _reply(groups: _Groups) -> m.Reply | None:
     answers, code, text = groups
     if int(answers) > MAX_UINT32:
@@ -137,6 +146,7 @@ def _whole(kind: str) -> _Match:
 
 _LAST: Final = 26
 """So many last bytes tell the kinds apart, which is quicker than trying every pattern."""
+_REGISTERS: Final = b"</IpAddr></RegMsg></msg>"
 
 _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] = {
     b"</Timestamp></HBMsg></msg>"[-_LAST:]: (_whole(_HEARTBEAT), lambda groups: m.Heartbeat()),
@@ -145,12 +155,13 @@ _READERS: Final[dict[bytes, tuple[_Match, Callable[[_Groups], m.Body | None]]]] 
     b"</RobotHolder></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_HOLDER)), _holder),
     b"</PersonStatus></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_PERSON)), _person),
     b"</reply></SimpleMsg></msg>"[-_LAST:]: (_whole(_simple(_REPLY)), _reply),
+    _REGISTERS: (_whole(_simple(_DESCRIPTION, "RegMsg")), _registration),
 }
 
 
 def read_canonical(data: bytes) -> m.Message | None:
     """The message, if this is one of those known here; else None, which says nothing about it."""
-    reader = _READERS.get(data[-_LAST:])
+    reader = _READERS.get(data[-_LAST:]) or _READERS.get(data[-len(_REGISTERS) :])
     if reader is None:
         return None
     match, read_body = reader

@@ -203,10 +203,13 @@ class Ticks:
         self._now_us = now_us
         due = now_us // self._tick_us
         tick, dt, awake = self._tick, self.dt, self._awake
+        stand: list[Body] = []
         while tick < due and awake:
-            stand = [body for body in awake if not body.push(tick, dt)]
-            for body in stand:
-                del awake[body]
+            for body in awake:
+                if not body.push(tick, dt):
+                    stand.append(body)
+            while stand:
+                del awake[stand.pop()]
             if awake:
                 self._step(dt)
             self._tick = tick = tick + 1

@@ -27,6 +27,7 @@ KNOWN = [
     message(m.PersonStatus("walking", m.Position(38.66, -9.2))),
     message(m.RobotHolder(TABLET, "tablet", 12.5, m.STALE)),
     message(m.RobotHolder(None, None, 0.0)),
+    message(m.Registration("robot-1", "Robot", "192.168.1.20:5555")),
 ]
 SEEDS = [encode(one) for one in KNOWN]
 SAMPLES = sorted((Path(__file__).parents[2] / "protocol" / "samples" / "valid").glob("*.xml"))
@@ -40,6 +41,7 @@ known_bodies = st.one_of(
             m.RobotHolder,
             m.PersonStatus,
             m.Reply,
+            m.Registration,
         )
     )
 )
@@ -76,6 +78,7 @@ def test_the_messages_of_a_drive_are_read_without_the_parser(sent):
         message(m.Reply(0, m.BAD_MESSAGE, "~ \"'!" * 42)),
         message(m.RobotStatus("Idle", m.Position(89.9, -179.9), -999999.9, 0.0, 0.0, 0)),
         message(m.RobotHolder(None, "n" * 64, 999_999.9, 999)),
+        message(m.Registration("~" * 64, "x", "255.255.255.255:65534")),
     ],
 )
 def test_what_a_drive_can_say_at_its_bounds_is_read_without_the_parser(sent):

@@ -158,6 +158,8 @@ class Looking:
 
     def _event_in(self, seen: Observation) -> SeenHazard | None:
         """The event, if it is in the picture."""
+        if not seen.hazards:
+            return None
         near = (h for h in seen.hazards if math.dist((h.x, h.y), self._place) < MATCH_WITHIN)
         return next((h for h in near if h.kind == self._kind), None)
 

@@ -287,12 +287,13 @@ class RobotAgent:
         """What the camera sees now."""
         now = self.device.clock.now
         self._world.advance_to(now)
-        pose = self.body.pose()
-        view = self._setup.view
-        hazards, visibility = view.look(*pose, self._setup.hazards(now)), view.visibility(*pose)
-        speed, turn_rate = self.body.speed, self.body.turn_rate
-        tick = self.controller.tick(now)
-        return make_observation(tick, *pose, speed, turn_rate, hazards, visibility)
+        body, view, tick = self.body, self._setup.view, self.controller.tick(now)
+        x, y, heading = body.pose()
+        hazards = view.look(x, y, heading, self._setup.hazards(now))
+        visibility = view.visibility(x, y, heading)
+        return make_observation(
+            tick, x, y, heading, body.speed, body.turn_rate, hazards, visibility
+        )
 
     def expect(self, pattern: Pattern) -> None:
         """From the next drive on, commands come by another pattern.
@@ -448,7 +449,8 @@ class RobotAgent:
             self._fared = code
         if holder != self._told[0]:
             self._held_since = self.device.clock.now
-        if (holder, self._fares if self._fares in m.OBEYS_NO_MORE else m.OK) != self._told:
+        fares = self._fares
+        if (holder, fares if fares in m.OBEYS_NO_MORE else m.OK) != self._told:
             self._publish_holder()
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import chain, repeat
 from math import cos, sin
@@ -17,6 +17,7 @@ from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.yaml_files import load_yaml
 
 GRAVITY: Final = 9.80665  # [m/s^2]
+WHOLE: Final = 1.5 * 2.0**52  # added and taken away again: what `round` does, four times as fast
 TICK: Final = 2.0**-12  # of the clock that tells when a sample is taken [s]
 WARMING_K: Final = 5.0  # how much warmer or colder a session is, standard deviation; assumed
 
@@ -108,6 +109,7 @@ class Accelerometer:
     Attributes:
         period: Mean time between two samples [s].
         offset: Of this copy, as it was when new [m/s^2].
+        interval: Tells the time from the sample before to the next one [s]; called once for each.
     """
 
     def __init__(
@@ -128,22 +130,14 @@ class Accelerometer:
         self._drift = mg * part.drift_mg_per_sqrt_min * math.sqrt(self.period / 60.0)
         self._errors = self._drawn(noise, part.noise, block)
         self._step, self._range = mg * part.resolution_mg, GRAVITY * part.range_g
-        spread, most = jitter * self.period, 0.4 * self.period
-        self._late = _lateness(times, spread, most, block) if jitter else None
-        self._was_late = 0.0
+        intervals = _intervals(times, self.period, jitter, block) if jitter else repeat(self.period)
+        self.interval: Callable[[], float] = intervals.__next__
         self.begin_session()
 
     def begin_session(self) -> None:
         """The phone is taken into the hand anew: it is warmer or colder than when calibrated."""
         x, y, z = self._sessions.normal(0.0, self._warming, 3).tolist()
         self._x, self._y, self._z = self.offset[0] + x, self.offset[1] + y, self.offset[2] + z
-
-    def interval(self) -> float:
-        """Time from the sample before to the next one [s]; asked once for each."""
-        if self._late is None:
-            return self.period
-        was, self._was_late = self._was_late, next(self._late)
-        return self.period + (self._was_late - was)
 
     def sample(self, pitch: float, roll: float) -> Triple:
         """What the part tells of a phone at rest at these angles [rad]: x, y, z [m/s^2]."""
@@ -154,7 +148,9 @@ class Accelerometer:
         z += self._z + flat * cos(roll)
         step, most = self._step, self._range
         if step:
-            x, y, z = round(x / step) * step, round(y / step) * step, round(z / step) * step
+            x = (x / step + WHOLE - WHOLE) * step
+            y = (y / step + WHOLE - WHOLE) * step
+            z = (z / step + WHOLE - WHOLE) * step
         if -most < x < most and -most < y < most and -most < z < most:
             return x, y, z
         return _cut(x, most), _cut(y, most), _cut(z, most)
@@ -175,14 +171,23 @@ class Accelerometer:
         return chain.from_iterable(blocks())
 
 
-def _lateness(rng: np.random.Generator, spread: float, most: float, block: int) -> Iterator[float]:
-    """How late each sample is [s]; cut off so that none overtakes another, in ticks of a clock."""
+def _intervals(
+    rng: np.random.Generator, period: float, jitter: float, block: int
+) -> Iterator[float]:
+    """From each sample to the next [s]: how late one is, is cut off so that none overtakes another.
 
-    def late() -> list[float]:
-        cut = np.clip(rng.normal(0.0, spread, block), -most, most)
-        return (np.round(cut / TICK) * TICK).tolist()  # type: ignore[no-any-return]
+    It is in ticks of a clock.
+    """
 
-    return chain.from_iterable(late() for _ in repeat(None))
+    def blocks() -> Iterator[list[float]]:
+        last, most = 0.0, 0.4 * period
+        while True:
+            cut = np.clip(rng.normal(0.0, jitter * period, block), -most, most)
+            late = np.round(cut / TICK) * TICK
+            yield (period + np.diff(late, prepend=last)).tolist()
+            last = late[-1]
+
+    return chain.from_iterable(blocks())
 
 
 def _cut(value: float, most: float) -> float:

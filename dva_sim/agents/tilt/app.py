@@ -185,14 +185,16 @@ class TiltApp:
         self._advance(now)
         if not self._ideal and self._batch is None:
             if not self._watches:
-                self.shown = self._mapping.command(*self._filter.value(), 0.0)
+                level, turn = self._filter.value()
+                self.shown = self._mapping.command(level, turn, 0.0)
             self._captured = self._trail.captured()
             self._stems_from = self._sampled_at - self._trail.age * self._period
         level, turn = self.shown
-        key = round(level), int(turn)
-        if key == self._last_key and not self.keeps_alive:
-            return None
-        self._last_key = key
+        if not self.keeps_alive:
+            key = round(level), int(turn)
+            if key == self._last_key:
+                return None
+            self._last_key = key
         age = now - self._stems_from
         speed = level * SPEED_PER_LEVEL
         return _make_command(speed, math.radians(turn), age, self._captured)

@@ -212,8 +212,9 @@ class NoFilter(Filter):
 def median(values: Iterable[float]) -> float:
     """Of a short list: `sorted` is many times faster than `numpy.median` here."""
     ordered = sorted(values)
-    middle, is_odd = divmod(len(ordered), 2)
-    if is_odd:
+    count = len(ordered)
+    middle = count >> 1
+    if count & 1:
         return ordered[middle]
     return 0.5 * (ordered[middle - 1] + ordered[middle])
 

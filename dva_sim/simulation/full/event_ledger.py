@@ -17,10 +17,11 @@ from dva_sim.protocol import messages as m
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
+UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
+IN_HAND: Final = State.ASSIGNED, State.ON_SCENE
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
-OF_EVENTS = b"<EventReport>", b"<OrderProgress>", b"<SensorValue>", b"<RegMsg>", b"<FalseAlarm>"
-_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"
-"""What it wants to hear that reaches the DVA, and what it wants to read that the DVA sends."""
+_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"  # of what the DVA sends
+OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # the most of what reaches the DVA
 Broken = tuple[str, str]
 
 
@@ -94,8 +95,8 @@ class EventLedger:
     # --- what is said --------------------------------------------------------------------
 
     def hears(self, source: str, message: m.Message | None, now: float) -> None:
-        """Something about events has reached the DVA; `source` has really sent it."""
-        if message is None or message.source != source:
+        """Something has reached the DVA; `source` has really sent it."""
+        if message is None or message.source != source or isinstance(message.body, OF_NO_EVENT):
             return
         match message.body:
             case m.SensorValue():
@@ -200,13 +201,14 @@ class EventLedger:
             yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
         if min(book.counts.values()) < 0:
             yield "S6", "a count of events is below zero"
-        for state in (State.PENDING, State.ASSIGNED, State.ON_SCENE):
-            count = sum(e.state is state for e in book.open.values())
+        states = [event.state for event in book.open.values()]
+        for state in UNSETTLED:
+            count = states.count(state)
             if count != book.counts[state]:
                 yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
         for number in book.open.keys() & book.closed.keys():
             yield "S6", f"event {number} is open and closed"
-        for number in self._open - book.open.keys() - book.closed.keys():
+        for number in self._open.difference(book.open, book.closed):
             yield "S6", f"event {number} was open, and is in no book"
         self._open = set(book.open)
         every = (*book.open.values(), *book.closed.values())
@@ -226,13 +228,13 @@ class EventLedger:
             if not self._is_found(event, finding, now):
                 yield "S6", f"event {event.number} is {finding}, and nobody there has said so"
         for steps in (STEPS, ACT_STEPS):
-            times = [event.times[step] for step in steps if step in event.times]
+            times = [time for time in map(event.times.get, steps) if time is not None]
             if times != sorted(times):
                 yield "S7", f"times of event {event.number} are out of order"
 
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
         """Waiting ends when somebody takes it up, and begins anew when it is confirmed."""
-        found = FOUND & (event.times.keys() | {event.state.value})
+        found = FOUND.intersection(event.times, (event.state.value,))
         old = old or Seen(found - FOUND, (), now, now)
         word, hands = self._word(event.number), _in_hand(event)
         taken = bool(word.taken.intersection(hands))
@@ -261,7 +263,7 @@ def _answers(asked: dict[Any, Any], data: bytes) -> bool:
 
 def _in_hand(event: Event) -> tuple[str | None, ...]:
     """Who has an event in hand that is not settled; who stands by has not."""
-    if event.state in (State.ASSIGNED, State.ON_SCENE):
+    if event.state in IN_HAND:
         return "look", event.holder, event.responder
     if event.open and event.state is State.CONFIRMED and event.actor is not None:
         return "act", event.actor

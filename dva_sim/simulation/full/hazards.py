@@ -169,7 +169,7 @@ class RunHazards:
     """
 
     def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+        self.stage, self._clock = stage, stage.clock
         self.incidents = draw_incidents(stage.scenario.events, stage.site, stage.streams)
         self._real = {n: i for n, i in enumerate(self.incidents) if not i.false_alarm}
         self.surroundings = Surroundings(stage.site, [i.hazard for i in self._real.values()])
@@ -204,9 +204,12 @@ class RunHazards:
 
     def is_hazy(self) -> bool:
         """Whether smoke is in anybody's sight now."""
-        return self.surroundings.is_hazy(self.stage.clock.now)
+        return self.surroundings.is_hazy(self._clock.now)
 
     def _going_on(self, now: float) -> list[RunHazard]:
         """What has begun, is real, and was not dealt with yet."""
-        over = self.contained.get
-        return [i for n, i in self._real.items() if i.start <= now < over(n, math.inf)]
+        going_on = []
+        for number, incident in self._real.items():
+            if incident.start <= now < self.contained.get(number, math.inf):
+                going_on.append(incident)
+        return going_on

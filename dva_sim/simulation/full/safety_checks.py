@@ -8,7 +8,6 @@ itself. `CHECKED` says which rules it holds that against.
 
 from __future__ import annotations
 
-import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,7 +22,7 @@ from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.simulation.full.event_ledger import OF_EVENTS, PENDING_SLACK, EventLedger
+from dva_sim.simulation.full.event_ledger import PENDING_SLACK, EventLedger
 from dva_sim.simulation.scenario import RobotConfig
 from dva_sim.worlds.bodies import G
 
@@ -58,8 +57,6 @@ CHECKED_IN_SHORT: Final = (
 )
 
 Broken = tuple[str, str]
-# As everybody here writes them, but any other would do no harm.
-_NUMBER_AND_SOURCE = re.compile(rb"<MessageID>(\d+)</MessageID><SourceID>([^<]+)</SourceID>")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -111,7 +108,7 @@ class Witness:
         ordered: When the newest order that was accepted had arrived.
         does: What that was, by sender and session; nothing once that was ended.
         owner: Who gave it.
-        newest: Sender, session and number of the newest command that was accepted.
+        newest: Sender and session, and number, of the newest command that was accepted.
         allowed: Until when that lets it move.
         offset: What is to be added to its own clock to have the time.
         last_mission: When it was last on a mission that it may be on.
@@ -130,7 +127,7 @@ class Witness:
     ordered: float = -1.0
     does: Doing | None = None
     owner: str | None = None
-    newest: tuple[str, int | None, int] = "", None, 0
+    newest: tuple[tuple[str, int | None], int] = ("", None), 0
     allowed: float = 0.0
     offset: float | None = None
     last_mission: float = 0.0
@@ -248,23 +245,20 @@ class SafetyAudit:
                 witness.offset = data.captured - data.observation.tick / 1000
         elif to in self._robots and to not in self.deaf:
             self._reaches_robot(now, source, to, data)
-        elif to == self._dva and any(what in data for what in OF_EVENTS):
+        elif to == self._dva:
             self._ledger.hears(source, _read(data), now)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
-        witness = self.witness(robot)
-        command = _NUMBER_AND_SOURCE.search(data) if b"<SetTeleOp>" in data else None
-        if command is not None:
-            witness.arrivals.setdefault((command[2].decode(), int(command[1])), now)
+        witness, message = self.witness(robot), _read(data)
+        if message is None:
+            return
+        key = message.source, message.message_id
+        if isinstance(message.body, m.SetTeleOp):
+            witness.arrivals.setdefault(key, now)
             if len(witness.arrivals) > MOST_KEPT:
                 witness.arrivals.popitem(last=False)
             return
-        message = _read(data)
-        if message is None:
-            return
-        witness.unanswered.setdefault(
-            (message.source, message.message_id), Unanswered(message, now, source)
-        )
+        witness.unanswered.setdefault(key, Unanswered(message, now, source))
         if source == self._dva and isinstance(message.body, m.PermissionGrant):
             grant = message.body
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
@@ -379,9 +373,10 @@ class SafetyAudit:
             found.append(("S2", f"obeys {source} while it is driven by hand"))
         elif witness.does != (source, session, "teleoperation"):
             found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
-        if witness.newest[:2] == (source, session) and number <= witness.newest[2]:
+        speaker, known = witness.newest
+        if speaker == (source, session) and number <= known:
             found.append(("S1", "obeys a command again, or after a newer one"))
-        witness.newest = source, session, number
+        witness.newest = (source, session), number
         arrived = witness.arrivals.pop((source, number), command.arrived)
         witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
@@ -392,7 +387,8 @@ class SafetyAudit:
             witness.allowed = witness.allowed if witness.allowed < oldest else oldest
             if pictured > command.time + ROUNDED:
                 found.append(("S1", "obeys a command behind a picture that was not taken yet"))
-        self._report(found, command.time, self._robots[command.robot].device.label)
+        if found:
+            self._report(found, command.time, self._robots[command.robot].device.label)
 
     def by_hand(self, done: ByHand) -> None:
         """Somebody drives a robot at the robot itself: no message tells of that."""
@@ -465,22 +461,23 @@ def broken_by_wish(
         yield "S1", f"is asked to move for {late:.2f} s longer than it may"
 
 
-def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
-    """Rules that the motion of a robot breaks now."""
+def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> list[Broken]:
+    """Rules that the motion of a robot breaks now; what was pushed breaks none."""
     spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
-    pushed, stopping = _pushed(robot, now), _stopping(robot)
-    if abs(speed) > MOVING and not pushed:
-        allowed = max(witness.allowed, witness.last_mission)
+    found: list[Broken] = []
+    if abs(speed) > MOVING:
+        allowed, stopping = max(witness.allowed, witness.last_mission), _stopping(robot)
         if now > allowed + stopping:
-            yield "S1", f"moves at {speed:.2f} m/s, {now - allowed:.1f} s after it had to stop"
+            late = f"{now - allowed:.1f} s after it had to stop"
+            found.append(("S1", f"moves at {speed:.2f} m/s, {late}"))
         if witness.stopped > witness.ordered and now > witness.stopped + stopping:
-            since = now - witness.stopped
-            yield "S3", f"moves at {speed:.2f} m/s, {since:.1f} s after an emergency"
+            late = f"{now - witness.stopped:.1f} s after an emergency"
+            found.append(("S3", f"moves at {speed:.2f} m/s, {late}"))
     # Comparisons that a nan fails, too; nobody drives backwards.
     forward = -MOVING <= speed <= spec.max_speed * SLACK
-    within = forward and abs(turn_rate) <= spec.max_turn_rate * SLACK
-    if not within and not pushed:
-        yield "S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"
+    if not (forward and abs(turn_rate) <= spec.max_turn_rate * SLACK):
+        found.append(("S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"))
+    return [] if found and _pushed(robot, now) else found
 
 
 def _taken_by_hand(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
@@ -509,6 +506,7 @@ def _end(witness: Witness, session: int, when: float) -> None:
 
 
 def _read(data: bytes) -> m.Message | None:
+    """What whoever gets it reads, too: the same bytes are read once."""
     try:
         return decode(data)
     except ProtocolError:

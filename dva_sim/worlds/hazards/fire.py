@@ -296,7 +296,6 @@ class FireField(SolvedField):
         super().__init__(fire, site)
         self._sight, self._fire = Sight(site.walls), fire
         self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
-        self._known: tuple[March | None, float, float, bool] = None, 0.0, 0.0, False
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
@@ -368,21 +367,22 @@ class FireField(SolvedField):
         """See `HazardField`: whether there is smoke at breathing height anywhere.
 
         Volumes change on straight lines from one state of the field to the next, so that it is
-        enough to look at both, once.
+        enough to look at both, each once for all runs that share it.
         """
         if self.room == NOWHERE or time <= self._start:
             return False
         march, age = self.march(time)
-        known, since, until, hazy = self._known
-        if march is not known or not since <= age < until:
-            after = march.after(age)
-            hazy = self._is_hazy(march.states[after - 1]) or self._is_hazy(march.states[after])
-            self._known = march, march.ages[after - 1], march.ages[after], hazy
-        return hazy
+        after = march.after(age)
+        return self._is_hazy(march, after - 1) or self._is_hazy(march, after)
 
-    def _is_hazy(self, state: Floats) -> bool:
-        bottoms = self.building.spaces.ceiling * (1.0 - self._filled(state[:-1])[1])
-        return not bottoms.min() > BREATHING_HEIGHT + BLUR / 2 + 1e-6
+    def _is_hazy(self, march: March, number: int) -> bool:
+        hazy = march.hazy.get(number)
+        if hazy is None:
+            share = self._filled(march.states[number][:-1])[1]
+            bottoms = self.building.spaces.ceiling * (1.0 - share)
+            hazy = not bottoms.min() > BREATHING_HEIGHT + BLUR / 2 + 1e-6
+            march.hazy[number] = hazy
+        return hazy
 
     def haze(self, places: SitePoints, time: float) -> Floats:
         """See `HazardField`."""

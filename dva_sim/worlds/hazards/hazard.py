@@ -196,11 +196,15 @@ class March:
         state: At age 0.
         step: From a state at an age [s] to the one `dt` [s] later; it changes nothing.
         paces: Until which age, in which steps [s].
+
+    Attributes:
+        hazy: Whether a state impairs anybody's sight, by its number: as far as that was asked.
     """
 
     def __init__(self, state: Floats, step: Step, paces: Paces = PACES) -> None:
         self._step, self.paces = step, paces
         self.ages, self.states = [0.0], [state]
+        self.hazy: dict[int, bool] = {}
 
     def around(self, age: float) -> tuple[Floats, Floats, float]:
         """The states before and after an age [s], and the weight of the later one."""
@@ -212,7 +216,7 @@ class March:
         """The first state that is later than an age [s], from 1 on."""
         while self.ages[-1] <= age:
             self._advance()
-        return max(1, bisect_right(self.ages, age))
+        return bisect_right(self.ages, age, 1)
 
     def at(self, age: float) -> Floats:
         """The state at an age [s], between two steps on the straight line."""

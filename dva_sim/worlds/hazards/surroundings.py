@@ -75,7 +75,10 @@ class Surroundings:
 
     def is_hazy(self, time: float) -> bool:
         """Whether smoke is at eye height anywhere at `time` [s]: quick, as cameras ask often."""
-        return any(field.is_hazy(time) for field in self._fields)
+        for field in self._fields:  # noqa: SIM110 - a generator takes as long as the answer
+            if field.is_hazy(time):
+                return True
+        return False
 
     def optical_depth(self, a: Point, b: Point, time: float) -> float:
         """Extinction by smoke along the straight line between two places, at eye height."""

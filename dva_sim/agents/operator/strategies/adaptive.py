@@ -65,7 +65,8 @@ class Adaptive(Strategy):
         left = route.remaining(seen.x, seen.y) - stop_before
         left = left if left > 0.0 else 0.0
         delay = view.delay if view.delay > SHORTEST else SHORTEST
-        pace = min(self._most, person.caution * FARTHEST_LOOK / delay)
+        pace, most = person.caution * FARTHEST_LOOK / delay, self._most
+        pace = pace if pace < most else most
         turn = 1.0 / gain_at(person.crossover, person.margin, delay)
         count = left / self._moves.trusted
         waiting = self._waiting(left, count if count > 1.0 else 1.0, delay)

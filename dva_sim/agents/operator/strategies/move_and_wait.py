@@ -145,11 +145,15 @@ class MoveAndWait(Strategy):
     A move of a robot turns towards a place ahead and goes there straight, as far as the person's
     errors of heading and hand leave it near its way. A move of a cursor goes all the way to the
     target; through a tunnel as far as the hand's noise leaves it inside.
+
+    Attributes:
+        trusted: How far a robot is driven in one move [m].
     """
 
     def __init__(self, person: Person, reach: Reach) -> None:
         super().__init__(person, reach)
         self.moves = Moves(person.reaction)
+        self.trusted = OFF / max(person.heading_error + person.motor_noise, SHORTEST)
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
@@ -193,11 +197,6 @@ class MoveAndWait(Strategy):
     def workload(self) -> Mapping[str, float]:
         """How often the person waited to see the result of a move, and that it always does so."""
         return {"waits": float(self.moves.waits), "move_and_wait_share": 1.0}
-
-    @property
-    def trusted(self) -> float:
-        """How far a robot is driven in one move [m]."""
-        return OFF / max(self.person.heading_error + self.person.motor_noise, SHORTEST)
 
     def trusted_in(self, half_width: float) -> float:
         """How far a cursor is moved in a tunnel in one move [m]."""
