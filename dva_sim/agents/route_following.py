@@ -64,10 +64,13 @@ class _Leg(NamedTuple):
     length: float
 
 
+_make_leg = maker(_Leg)
+
+
 def _leg(ax: float, ay: float, bx: float, by: float) -> _Leg:
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
-    return _Leg(ax, ay, dx, dy, square, math.sqrt(square))
+    return _make_leg(ax, ay, dx, dy, square, math.sqrt(square))
 
 
 class _Place(NamedTuple):
@@ -102,7 +105,7 @@ class _Line:
     """
 
     def __init__(self, points: NDArray[np.float64]) -> None:
-        corners = [(float(x), float(y)) for x, y in points]
+        corners: list[tuple[float, float]] = np.asarray(points, float).tolist()
         steps = np.hypot(*np.diff(points, axis=0).T)
         self.legs = [_leg(*start, *end) for start, end in pairwise(corners)]
         self.at: list[float] = [0.0, *np.cumsum(steps).tolist()]
