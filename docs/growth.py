@@ -27,10 +27,16 @@ SIZES: dict[str, tuple[int, ...]] = {
     "robots": (1, 10, 100, 1000),
     "guards": (1, 10, 100, 300),
     "bystanders": (1, 10, 100, 300),
+    "fires": (1, 10, 100),
+    "floods": (1, 10, 100),
+    "leaks": (1, 10, 100),
+    "evacuation": (1, 30, 100, 300),
     "devices": (100, 1_000, 10_000),
     "rows": (100, 1_000, 10_000, 100_000),
 }
 SECONDS = {"robots": 20.0, "guards": 10.0, "bystanders": 10.0}  # simulated [s]
+HAZARDS = {"fires": "fire", "floods": "flood", "leaks": "gas_leak"}
+PERSONS = (("guards", 100), ("bystanders", 1), ("bystanders", 30), ("bystanders", 300))
 ROOM_M = 5.0  # side of the room that each has
 YARD_M = 20.0  # depth of the yard beside the rooms, where it burns
 LATITUDE, LONGITUDE = 38.66, -9.2
@@ -89,36 +95,70 @@ def write_site(folder: Path, places: int) -> Path:
     return site
 
 
+def model_in(folder: Path, site: Path, counts: dict[str, int], *more: str) -> tuple[Any, Any]:
+    """A run's model and scenario: so many robots, guards and bystanders, and more lines."""
+    from dva_sim.kernel.yaml_files import load_yaml
+    from dva_sim.simulation.models import model_of
+
+    lines = [f"site: {{name: {site}}}", "control: supervisory"]
+    lines += [f"{kind.removesuffix('s')}: {{count: {count}}}" for kind, count in counts.items()]
+    (folder / "run.yaml").write_text("\n".join([*lines, *more]))
+    document = load_yaml(folder / "run.yaml")
+    model = model_of(document)
+    return model, model.build(document, {})
+
+
+def burning(count: int, hazard: str, seconds: float) -> list[str]:
+    """Hazards of a kind in the yard, from the first second on."""
+    events = ", ".join([f"{{kind: {hazard}, at_s: 1, room: Yard}}"] * count)
+    return [f"horizon_s: {seconds}", f"events: [{events}]"]
+
+
 def a_run(kind: str, size: int, folder: Path) -> Costs:
     """A run with so many robots on patrol, guards or bystanders."""
-    from dva_sim.kernel.yaml_files import load_yaml
-    from dva_sim.simulation.models import model_for, model_of
-
     costs = Costs()
     counts = {"robots": 0, "guards": 0 if kind == "robots" else 1, "bystanders": 0} | {kind: size}
-    lines = [
-        f"site: {{name: {write_site(folder, size)}}}",
-        f"robot: {{count: {counts['robots']}}}",
-        f"guard: {{count: {counts['guards']}}}",
-        f"bystander: {{count: {counts['bystanders']}}}",
-        "control: supervisory",
-        f"horizon_s: {SECONDS[kind]}",
-        "events: [{kind: fire, at_s: 1, room: Yard}]",
-    ]
+    more = burning(1, "fire", SECONDS[kind])
     if kind == "robots":
         rounds = ((n, n, n % size + 1) for n in range(1, size + 1))
-        lines += ["patrols:"]
-        lines += [f"  - {{robot: robot-{n}, places: [Room {a}, Room {b}]}}" for n, a, b in rounds]
-    (folder / "run.yaml").write_text("\n".join(lines))
-    document = load_yaml(folder / "run.yaml")
+        more += ["patrols:"]
+        more += [f"  - {{robot: robot-{n}, places: [Room {a}, Room {b}]}}" for n, a, b in rounds]
+    site = write_site(folder, size)
     with costs.of("prepare"):
-        model = model_of(document)
-        scenario = model.build(document, {})
+        model, scenario = model_in(folder, site, counts, *more)
         model.rehearse(scenario, 1)
     with costs.of("run"):
-        recording = model_for(scenario).simulate(scenario, 1)
+        recording = model.simulate(scenario, 1)
     with costs.of("measure"):
         model.rows(recording)
+    return costs
+
+
+def hazards_and_persons(kind: str, size: int, folder: Path) -> Costs:
+    """Runs of 10 s with so many hazards and ever more persons; fields are solved before."""
+    costs = Costs()
+    for who, persons in PERSONS:
+        counts = {"robots": 0, "guards": 1, "bystanders": 0} | {who: persons}
+        more = burning(size, HAZARDS[kind], 10.0)
+        model, scenario = model_in(folder, write_site(folder, persons), counts, *more)
+        model.simulate(scenario, 1)
+        with costs.of(f"{persons} {who if persons > 1 else who.removesuffix('s')}"):
+            model.simulate(scenario, 1)
+    return costs
+
+
+def an_evacuation(kind: str, size: int, folder: Path) -> Costs:
+    """120 s of the shipped scenario with so many bystanders."""
+    from dva_sim.simulation import scenario as scenarios
+    from dva_sim.simulation.full import run
+
+    costs = Costs()
+    changes = {"bystander.count": size, "horizon_s": 120.0}
+    with costs.of("prepare"):
+        scenario = scenarios.build(scenarios.load(kind), changes)
+        run.rehearse(scenario, 1)
+    with costs.of("run"):
+        run.simulate(scenario, 1)
     return costs
 
 
@@ -240,6 +280,8 @@ MEASURED: dict[str, Callable[[str, int, Path], Costs]] = {
     "robots": a_run,
     "guards": a_run,
     "bystanders": a_run,
+    **dict.fromkeys(HAZARDS, hazards_and_persons),
+    "evacuation": an_evacuation,
     "devices": the_dva,
     "rows": a_study,
 }

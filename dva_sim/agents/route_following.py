@@ -95,7 +95,7 @@ class _Line:
     """
 
     def __init__(self, points: NDArray[np.float64]) -> None:
-        corners = [(float(x), float(y)) for x, y in points]
+        corners: list[tuple[float, float]] = np.asarray(points, float).tolist()
         steps = np.hypot(*np.diff(points, axis=0).T)
         self.legs = [_leg(*start, *end) for start, end in pairwise(corners)]
         self.at: list[float] = [0.0, *np.cumsum(steps).tolist()]

@@ -16,7 +16,8 @@ References:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from heapq import heappop, heappush
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -55,6 +56,7 @@ KEEPS_OFF: Final = 1.0  # around a bad place of a way [m]
 TRIES: Final = 3  # to find a way around bad places
 CLOSE: Final = 10.0  # so far one goes through bad air to the end, if it gets no worse; assumed [m]
 WITHIN: Final = 0.05  # of the line of an exit, still indoors [m]
+ROUNDING: Final = 1e-6  # a straight way of many steps may seem so much shorter than it is [m]
 
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
@@ -122,10 +124,8 @@ def _keeping(
     """The nearest refuge on a way that keeps some limits, around more and more bad places."""
     avoid: tuple[Disc, ...] = ()
     for _ in range(TRIES):
-        ways = [(refuge, planner.path(here, refuge, avoid)) for refuge in refuges]
-        there = [(_length(way), refuge, way) for refuge, way in ways if way is not None]
         found: dict[Point, None] = {}
-        for _, refuge, way in sorted(there, key=lambda one: one[0]):
+        for refuge, way in _nearest_first(planner, here, refuges, avoid):
             judged = [_judge(way, one, CLOSE) for one in limits[:-1]]
             judged.append(_judge(way, limits[-1], math.inf))
             if all(will_do for will_do, _ in judged):
@@ -135,6 +135,25 @@ def _keeping(
             return None
         avoid = (*avoid, *(Disc(x, y, KEEPS_OFF) for x, y in found))
     return None
+
+
+def _nearest_first(
+    planner: Planner, here: Point, refuges: Sequence[Point], avoid: Sequence[Disc]
+) -> Iterator[tuple[Point, Floats]]:
+    """Refuges that can be reached and the ways there, the shortest first.
+
+    No way is shorter than the straight line: none is planned before a known one that is.
+    """
+    known: list[tuple[float, int, Floats]] = []
+    for straight, number in sorted((math.dist(here, at), n) for n, at in enumerate(refuges)):
+        while known and known[0][0] < straight - ROUNDING:
+            _, nearest, way = heappop(known)
+            yield refuges[nearest], way
+        way_there = planner.path(here, refuges[number], avoid)
+        if way_there is not None:
+            heappush(known, (_length(way_there), number, way_there))
+    for _, nearest, way in sorted(known, key=lambda one: one[:2]):
+        yield refuges[nearest], way
 
 
 def _judge(way: Floats, limit: StrainLimit, close: float) -> tuple[bool, list[Point]]:

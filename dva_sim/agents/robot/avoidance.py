@@ -237,9 +237,17 @@ def _number(name: str) -> tuple[int, str]:
 
 def _to_the_left(points: Floats) -> Floats:
     """Unit vectors to the left of a line, shape `(n, 2)`."""
-    ahead = np.gradient(points, axis=0) if len(points) > 1 else np.array([[1.0, 0.0]])
+    ahead = _gradient(points) if len(points) > 1 else np.array([[1.0, 0.0]])
     length = np.maximum(np.hypot(ahead[:, 0], ahead[:, 1]), 1e-9)[:, None]
     return np.asarray(np.stack([-ahead[:, 1], ahead[:, 0]], 1) / length)
+
+
+def _gradient(points: Floats) -> Floats:
+    """As NumPy's along a line `(n, 2)`, which takes five times as long."""
+    between = np.empty_like(points)
+    between[1:-1] = (points[2:] - points[:-2]) / 2.0
+    between[0], between[-1] = points[1] - points[0], points[-1] - points[-2]
+    return between
 
 
 def _shifts(way: Floats, offset: float, sides: Floats, holds: Floats) -> Floats:

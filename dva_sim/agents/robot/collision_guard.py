@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.kernel.makers import maker
 from dva_sim.worlds.bodies import RobotBody
 from dva_sim.worlds.physics import PersonBody, World
 
@@ -53,6 +54,9 @@ class Nearby(NamedTuple):
     keep: float
 
 
+_make_nearby = maker(Nearby)
+
+
 def who_is_near(
     world: World, body: RobotBody, within: float, sees: Callable[[Point, Point], bool]
 ) -> tuple[Nearby, ...]:
@@ -67,12 +71,13 @@ def who_is_near(
     here = body.x, body.y
     found = []
     for other, _ in world.neighbours(*here, within):
-        if other is not body and sees(here, (other.x, other.y)):
+        if other is body:
+            continue
+        x, y = other.x, other.y
+        if sees(here, (x, y)):
             person = isinstance(other, PersonBody)
             kind, keep = ("person", PERSONAL) if person else ("robot", KEEP_ROBOT)
-            found.append(
-                Nearby(kind, other.name, other.x, other.y, *other.velocity, other.radius, keep)
-            )
+            found.append(_make_nearby(kind, other.name, x, y, *other.velocity, other.radius, keep))
     return tuple(found)
 
 

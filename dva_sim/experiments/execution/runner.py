@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -86,12 +86,13 @@ def run_study(
             carried_out, stopped = _run_rounds(study, todo, session)
             with checkpoint.alone():
                 _tidy(out)
-                write_tables(out, carried_out, checkpoint.tables)
                 manifest["runs"] = len({job.key for job in carried_out})
                 manifest["stopped"] = stopped
                 manifest["failures"] = failures(carried_out, checkpoint.failures())
-                manifest["tables"] = digests(out / TABLES)
-                write_json(out / MANIFEST, manifest)
+                if not _is_written(out, manifest):
+                    write_tables(out, carried_out, checkpoint.tables)
+                    manifest["tables"] = digests(out / TABLES)
+                    write_json(out / MANIFEST, manifest)
         facts = {"cores": executors.cores(), "jobs": workers.width, "started": started.isoformat()}
         facts |= {"wall_s": time.perf_counter() - clock}
         write_json(out / MACHINE, machine(carried_out, checkpoint.costs()) | facts)
@@ -226,6 +227,20 @@ def _workers(jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
         raise ConfigError("give the number of processes or a scheduler, not both")
     with DaskCluster(scheduler) as cluster:
         yield cluster
+
+
+def _is_written(out: Path, manifest: Mapping[str, Any]) -> bool:
+    """Whether this program has written the tables of these very runs, and nobody has changed them.
+
+    What a run has made never changes once it is kept. So the same runs, with the same failures,
+    make the same tables; only a program that is being changed may write them in another way.
+    """
+    try:
+        found = json.loads((out / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    asked = json.loads(json.dumps({**manifest, "tables": digests(out / TABLES)}))
+    return bool(found == asked and not manifest["versions"]["dirty"])
 
 
 def _tidy(out: Path) -> None:

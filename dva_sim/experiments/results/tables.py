@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import tempfile
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
+from contextlib import ExitStack
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,6 @@ from dva_sim.experiments.study.parts import REPEATS
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.simulation.models import Tables
 
-if TYPE_CHECKING:
-    from duckdb import DuckDBPyConnection
-
-
 _BATCH_ROWS = 20_000
 _BEFORE_LEVELS = ("part", "cell", "config")
 _BEHIND_LEVELS = ("is_reference", "person", "trial", "seed")
@@ -30,6 +26,7 @@ DESIGN_COLUMNS = (*_BEFORE_LEVELS, *_BEHIND_LEVELS)
 Value = bool | int | float | str | None
 Row = dict[str, Value]
 TablesOf = Callable[[RunKey], Tables | None]
+Columns = dict[str, set[type]]
 
 
 def write_tables(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) -> None:
@@ -37,7 +34,8 @@ def write_tables(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) ->
 
     Rows are in the order of `jobs`: part, cell, person, trial. The runs of repeats make a table
     of their own. Memory stays bounded: rows pass in batches through a database file that is
-    removed afterwards.
+    removed afterwards. Each run is read once; once more only if its first rows do not show what
+    all the others hold.
 
     Args:
         folder: Of the results.
@@ -55,12 +53,10 @@ def write_tables(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) ->
         with tempfile.TemporaryDirectory(prefix=".tables-", dir=folder) as name:
             own = [job for job in jobs if not job.is_repeat]
             repeats = [job for job in jobs if job.is_repeat]
-            made = [
-                _write(Path(name), table, kinds, _rows(own, tables_of, table))
-                for table, kinds in _columns(own, tables_of).items()
-            ]
-            if kinds := _columns(repeats, tables_of).get("runs"):
-                made.append(_write(Path(name), REPEATS, kinds, _rows(repeats, tables_of, "runs")))
+            made = _write(Path(name), own, tables_of)
+            made += _write(
+                Path(name), repeats, lambda key: {REPEATS: (tables_of(key) or {}).get("runs", [])}
+            )
             for path in made:
                 path.replace(target / path.name)
         for stale in set(target.glob("*.parquet")) - {target / path.name for path in made}:
@@ -87,27 +83,107 @@ def design_row(job: StudyRun) -> Row:
     }
 
 
-def _rows(jobs: Iterable[StudyRun], tables_of: TablesOf, table: str) -> Iterator[Row]:
-    for job in jobs:
-        design = design_row(job)
-        for row in (tables_of(job.key) or {}).get(table, ()):
-            yield design | row
-
-
-def _columns(jobs: Iterable[StudyRun], tables_of: TablesOf) -> dict[str, dict[str, str]]:
-    """The SQL type of every column of every table, in the order first met."""
+def _write(folder: Path, jobs: Sequence[StudyRun], tables_of: TablesOf) -> list[Path]:
+    """All tables of some runs."""
     factors = dict.fromkeys(factor for job in jobs for factor, _ in job.cell)
-    order = (*_BEFORE_LEVELS, *factors, *_BEHIND_LEVELS)
-    kinds: dict[str, dict[str, set[type]]] = {}
+    design: Columns = {c: set() for c in (*_BEFORE_LEVELS, *factors, *_BEHIND_LEVELS)}
+    tables: dict[str, _Table] = {}
+    with ExitStack() as stack:
+        for name, rows in _rows(jobs, tables_of):
+            if name not in tables:
+                tables[name] = stack.enter_context(_Table(folder, name, design))
+            tables[name].add(rows)
+        again = {
+            name: stack.enter_context(table.anew())
+            for name, table in tables.items()
+            if not table.is_whole()
+        }
+        for name, rows in _rows(jobs, tables_of) if again else ():
+            if name in again:
+                again[name].add(rows)
+        return [table.save() for table in (tables | again).values()]
+
+
+def _rows(jobs: Iterable[StudyRun], tables_of: TablesOf) -> Iterator[tuple[str, list[Row]]]:
+    """The rows of each table of each run, with the columns that say which run it was."""
     for job in jobs:
         design = design_row(job)
         for table, rows in (tables_of(job.key) or {}).items():
             if rows:
-                seen = kinds.setdefault(table, defaultdict(set, {c: set() for c in order}))
-                for row in (design, *rows):
-                    for column, value in row.items():
-                        seen[column].add(type(value))
-    return {t: {c: _sql_type(types) for c, types in seen.items()} for t, seen in kinds.items()}
+                yield table, [design | row for row in rows]
+
+
+class _Table:
+    """One table, made with the columns and types that its first batch of rows shows.
+
+    Its database is its own and single-threaded, and its batches are of one size: so its bytes do
+    not depend on the machine's mood.
+
+    Args:
+        folder: Where its file goes, and meanwhile its database.
+        name: Its name.
+        seen: What its columns are known to hold, in their order; others are met in rows.
+    """
+
+    def __init__(self, folder: Path, name: str, seen: Columns) -> None:
+        self._folder, self._name = folder, name
+        self._seen = {column: set(types) for column, types in seen.items()}
+        self._waiting: list[Row] = []
+        self._kinds: dict[str, str] = {}  # of the table in the database, once it is made
+        self._fits = True
+
+    def __enter__(self) -> _Table:
+        import duckdb
+
+        config: dict[str, str | bool | int | float | list[str]]
+        config = {"threads": 1, "preserve_insertion_order": True}
+        apart = tempfile.mkdtemp(dir=self._folder)
+        self._database = duckdb.connect(str(Path(apart) / "rows.duckdb"), config=config)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._database.close()
+
+    def add(self, rows: list[Row]) -> None:
+        """Take some rows in."""
+        self._waiting += rows
+        while len(self._waiting) >= _BATCH_ROWS:
+            self._pass_on()
+
+    def is_whole(self) -> bool:
+        """Whether no row had a column or a type that the table was made without."""
+        self._pass_on()
+        return self._fits
+
+    def anew(self) -> _Table:
+        """The same without rows, to be made for all that has been seen."""
+        return _Table(self._folder, self._name, self._seen)
+
+    def save(self) -> Path:
+        """Write it; the file."""
+        self._pass_on()
+        path = self._folder / f"{self._name}.parquet"
+        self._database.execute("COPY rows TO $1 (FORMAT parquet, COMPRESSION zstd)", [str(path)])
+        return path
+
+    def _pass_on(self) -> None:
+        """A batch of what waits goes to the database, as long as the table there fits."""
+        batch, self._waiting = self._waiting[:_BATCH_ROWS], self._waiting[_BATCH_ROWS:]
+        columns = dict.fromkeys(chain(self._seen, *batch))
+        values = {column: [row.get(column) for row in batch] for column in columns}
+        for column, found in values.items():
+            self._seen.setdefault(column, set()).update(map(type, found))
+        kinds = {column: _sql_type(types) for column, types in self._seen.items()}
+        if not self._kinds:
+            told = ", ".join(f"{quoted(column)} {kind}" for column, kind in kinds.items())
+            self._database.execute(f"CREATE TABLE rows ({told})")
+            self._kinds = kinds
+        self._fits = self._fits and kinds == self._kinds
+        if self._fits and batch:
+            arrays = {column: _array(values[column], kind) for column, kind in kinds.items()}
+            self._database.register("batch", arrays)
+            self._database.execute("INSERT INTO rows SELECT * FROM batch")
+            self._database.unregister("batch")
 
 
 def _sql_type(types: set[type]) -> str:
@@ -116,29 +192,6 @@ def _sql_type(types: set[type]) -> str:
     if float in types or types <= {type(None)}:
         return "DOUBLE"
     return "BIGINT" if int in types else "BOOLEAN"
-
-
-def _write(folder: Path, table: str, kinds: dict[str, str], rows: Iterator[Row]) -> Path:
-    """One table, single-threaded so that its bytes do not depend on the machine's mood."""
-    import duckdb
-
-    path = folder / f"{table}.parquet"
-    config: dict[str, str | bool | int | float | list[str]]
-    config = {"threads": 1, "preserve_insertion_order": True}
-    with duckdb.connect(str(folder / f"{table}.duckdb"), config=config) as connection:
-        columns = ", ".join(f"{quoted(c)} {kind}" for c, kind in kinds.items())
-        connection.execute(f"CREATE TABLE rows ({columns})")
-        while batch := list(islice(rows, _BATCH_ROWS)):
-            _insert(connection, kinds, batch)
-        connection.execute("COPY rows TO $1 (FORMAT parquet, COMPRESSION zstd)", [str(path)])
-    return path
-
-
-def _insert(connection: DuckDBPyConnection, kinds: dict[str, str], batch: list[Row]) -> None:
-    arrays = {c: _array([row.get(c) for row in batch], kind) for c, kind in kinds.items()}
-    connection.register("batch", arrays)
-    connection.execute("INSERT INTO rows SELECT * FROM batch")
-    connection.unregister("batch")
 
 
 def _array(values: list[Value], kind: str) -> NDArray[Any]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +19,7 @@ Integers = NDArray[np.int64]
 
 LONGEST = 12.0  # longer corridors do not fill from end to end at once: they are parted [m]
 NOWHERE = -1  # in no space
+KEPT_PLACES = 64  # of which it is known where in the building they are
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +62,11 @@ class Building:
     grid: OccupancyGrid
     labels: NDArray[np.int16]
 
-    def space_at(self, x: float, y: float) -> int:
-        """Index of the space around a point [m], or `NOWHERE`."""
-        return int(self.grid.look_up(self.labels, x, y, NOWHERE))
+    @cached_property
+    def space_at(self) -> Callable[[float, float], int]:
+        """Index of the space around a point [m], or `NOWHERE`; all hazards ask of one in turn."""
+        look_up, labels = self.grid.look_up, self.labels
+        return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(labels, x, y, NOWHERE)))
 
 
 class SitePoints:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from dva_sim.kernel.makers import maker
+
 AMBIENT: Final = 20.0  # temperature of the air where nothing burns [deg C]
 BREATHING_HEIGHT: Final = 1.5  # of a person's mouth and eyes [m]
 
@@ -31,6 +33,7 @@ class Conditions(NamedTuple):
     explosive: float = 0.0
 
 
+make_conditions = maker(Conditions)
 CLEAR = Conditions()
 
 
@@ -56,7 +59,7 @@ def together(a: Conditions, b: Conditions) -> Conditions:
     References:
         H. Le Chatelier, Annales des Mines 19 (1891) 388: limits of mixed gases.
     """
-    return Conditions(
+    return make_conditions(
         max(a.temperature, b.temperature, AMBIENT),
         a.heat_flux + b.heat_flux,
         a.extinction + b.extinction,

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from dva_sim.worlds.hazards.building import NOWHERE, Building, Floats, SitePoints
-from dva_sim.worlds.hazards.conditions import AMBIENT, BREATHING_HEIGHT, CLEAR, Conditions
+from dva_sim.worlds.hazards.conditions import (
+    AMBIENT,
+    BREATHING_HEIGHT,
+    CLEAR,
+    Conditions,
+    make_conditions,
+)
 from dva_sim.worlds.hazards.detectors import (
     HEAT_ALARM,
     LATEST,
@@ -124,9 +130,8 @@ class Fire(Hazard):
         References:
             Point-source model: SFPE Handbook of Fire Protection Engineering, 5th ed., chapter 66.
         """
-        distance = max(math.dist(self.position, point), self.radius(time), 0.1)
         radiated = RADIATIVE_FRACTION * self.heat_release(time)
-        return float(radiated / (4.0 * math.pi * distance * distance))
+        return _radiant(radiated, math.dist(self.position, point), self.radius(time))
 
     def radius(self, time: float) -> float:
         """See `Hazard`: radius of the burning floor."""
@@ -296,6 +301,11 @@ class FireField(SolvedField):
         super().__init__(fire, site)
         self._sight, self._fire = Sight(site.walls), fire
         self._seen: tuple[SitePoints, NDArray[np.bool_]] | None = None
+        self._flames = lru_cache(1)(
+            lambda time: (RADIATIVE_FRACTION * fire.heat_release(time), fire.radius(time))
+        )
+        self._layers: dict[int, Layer | None] = {}  # at the moment that was asked for last
+        self._layers_at = math.nan, math.nan
 
     def at(self, x: float, y: float, time: float) -> Conditions:
         """See `HazardField`."""
@@ -303,22 +313,33 @@ class FireField(SolvedField):
             return CLEAR
         heat = 0.0
         if time < self.until and self._sight.between((x, y), self._fire.position):
-            heat = self._fire.heat_flux(time, (x, y))
+            radiated, radius = self._flames(time)
+            heat = _radiant(radiated, math.dist(self._fire.position, (x, y)), radius)
         space = self.building.space_at(x, y)
         layer = self.layer(space, time) if space >= 0 else None
         if layer is None:
             return Conditions(AMBIENT, heat)
         heat += _glow(layer.temperature, layer.extinction * layer.depth)
         share = _within(layer.bottom)
-        return Conditions(
+        return make_conditions(
             AMBIENT + share * (layer.temperature - AMBIENT),
             heat,
             share * layer.extinction,
             share * layer.co,
+            0.0,
+            0.0,
+            0.0,
         )
 
     def layer(self, space: int, time: float) -> Layer | None:
-        """The smoke in a space; None if there is none."""
+        """The smoke in a space; None if there is none. Who is there meets the same."""
+        if (time, self.until) != self._layers_at:
+            self._layers_at, self._layers = (time, self.until), {}
+        if space not in self._layers:
+            self._layers[space] = self._layer(space, time)
+        return self._layers[space]
+
+    def _layer(self, space: int, time: float) -> Layer | None:
         if self.room == NOWHERE or time <= self._fire.start:
             return None
         before, after, weight = self.states(time)
@@ -431,6 +452,12 @@ class FireField(SolvedField):
     def solve(self) -> tuple[March, Step]:
         """See `SolvedField`."""
         return _smoke(self.building, self._fire.growth, self._fire.peak, self.room)
+
+
+def _radiant(radiated: float, distance: float, radius: float) -> float:
+    """Radiant heat so far from the middle of flames that have a radius [m], in [kW/m^2]."""
+    distance = max(distance, radius, 0.1)
+    return float(radiated / (4.0 * math.pi * distance * distance))
 
 
 def _within(bottom: float) -> float:

@@ -32,15 +32,16 @@ References:
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.worlds.hazards.building import NOWHERE, Building
+from dva_sim.worlds.hazards.building import KEPT_PLACES, NOWHERE, Building
 from dva_sim.worlds.maps import FREE, OccupancyGrid
 
 Floats = NDArray[np.float64]
@@ -71,9 +72,11 @@ class Mesh:
     nodes: NDArray[np.int32]
     grid: OccupancyGrid
 
-    def node_at(self, x: float, y: float) -> int:
+    @cached_property
+    def node_at(self) -> Callable[[float, float], int]:
         """The node around a point [m]; -1 in walls and outdoors."""
-        return int(self.grid.look_up(self.nodes, x, y, -1))
+        look_up, nodes = self.grid.look_up, self.nodes
+        return lru_cache(KEPT_PLACES)(lambda x, y: int(look_up(nodes, x, y, -1)))
 
     def nearest(self, x: float, y: float) -> int:
         """The node around a point [m], or the one nearest to it."""

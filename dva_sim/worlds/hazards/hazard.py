@@ -245,6 +245,8 @@ class SolvedField(HazardField):
         self.room = self.building.space_at(*hazard.position)
         self._start = hazard.start
         self._own: tuple[float, March] | None = None
+        self._moment = math.nan, math.nan  # of the states that were asked for last
+        self._states: tuple[Floats, Floats, float]
 
     def solve(self) -> tuple[March, Step]:
         """The states with the source, shared from age 0 on; and the step without it."""
@@ -266,9 +268,14 @@ class SolvedField(HazardField):
         return self._own[1], age - stopped
 
     def states(self, time: float) -> tuple[Floats, Floats, float]:
-        """The states before and after `time` [s], and the weight of the later one."""
-        march, age = self.march(time)
-        return march.around(age)
+        """The states before and after `time` [s], and the weight of the later one.
+
+        Everybody asks at the same moments.
+        """
+        if (time, self.until) != self._moment:
+            march, age = self.march(time)
+            self._moment, self._states = (time, self.until), march.around(age)
+        return self._states
 
     def state(self, time: float) -> Floats:
         """The state at `time` [s], between two steps on the straight line."""
