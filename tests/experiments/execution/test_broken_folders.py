@@ -18,6 +18,7 @@ from dva_sim.experiments.execution.dry_run import dry_run
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.results.results import JOURNAL, Results
+from dva_sim.experiments.results.tables import write_tables
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
 TESTS = Path(kit.__file__).parent
@@ -42,6 +43,29 @@ def test_what_is_damaged_or_gone_is_made_again_from_the_journal(
         run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
         assert kit.files(out) == whole
         assert (out / "machine.json").read_text().startswith("{")
+
+
+@pytest.mark.parametrize("is_dirty", [False, None, True])
+def test_tables_that_are_written_are_left_alone_unless_the_program_is_being_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_dirty: bool | None
+) -> None:
+    state = {"commit": None, "dirty": is_dirty}
+    monkeypatch.setattr("dva_sim.experiments.results.manifest.program_state", lambda: state)
+    study, out = kit.study_in(tmp_path), tmp_path / "out"
+    run_study(study, out, jobs=1, episode=kit.cheap)
+    whole, written = kit.files(out), []
+    monkeypatch.setattr(
+        "dva_sim.experiments.execution.runner.write_tables",
+        lambda *words: written.append(write_tables(*words)),
+    )
+
+    run_study(study, out, jobs=1, episode=never)
+    assert len(written) == bool(is_dirty)
+    state["commit"] = "of another version"
+    run_study(study, out, jobs=1, episode=never)
+    assert len(written) == bool(is_dirty) + 1
+    state["commit"] = None
+    assert kit.files(run_study(study, out, jobs=1, episode=never)) == whole
 
 
 def test_a_damaged_table_is_told_with_its_file(out: Path) -> None:
@@ -72,6 +96,7 @@ def test_a_disk_that_fills_up_at_the_manifest_is_told(
     tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = kit.files(out)
+    (out / "manifest.json").unlink()
 
     def instead(folder: Path) -> None:
         (folder / f".manifest.json.{os.getpid()}").symlink_to("/dev/full")
@@ -168,6 +193,7 @@ def test_the_tables_lock_ends_with_the_runner_that_holds_it(tmp_path: Path, out:
     def full(*_: object) -> None:
         raise DvaSimError("the disk is full")
 
+    (out / "manifest.json").unlink()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("dva_sim.experiments.execution.runner.write_tables", full)
         with pytest.raises(DvaSimError, match="full"):
