@@ -15,8 +15,10 @@ DEMO := results/demo
 # compiles all modules again.
 export PYTHONDONTWRITEBYTECODE =
 
-# A file of tests runs in one process; as many share the files as there are cores, and one more.
-PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -p no:benchmark
+# As many processes as there are cores share the files of tests; but pages are drawn by several
+# processes of the browser already, and their tests run alone.
+SHARED := -n auto --dist loadfile --no-loadscope-reorder
+PYTEST := $(BIN)/python -m pytest -p no:benchmark
 
 help:  ## say what can be made
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -34,25 +36,26 @@ published: $(RUNTIME)  ## the main study at its published size, and its report: 
 
 test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."
-	@$(PYTEST) -m "not system and not soak and not browser"
+	@$(PYTEST) $(SHARED) -m "not system and not soak and not browser"
 
 test-all: $(DEV)  ## all tests
-	@echo "Running the tests, those in a browser as well ..."
+	@echo "Running those in a browser, then all others ..."
 	@$(BIN)/python tests/chromium.py
-	@$(PYTEST)
+	@$(PYTEST) tests/console/browser
+	@$(PYTEST) $(SHARED) -m "not browser"
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
-	@$(PYTEST) -m contract
+	@$(PYTEST) $(SHARED) -m contract
 
 test-system: $(DEV)  ## programs as users start them, with real processes, sockets and signals
-	@$(PYTEST) -m system
+	@$(PYTEST) $(SHARED) -m system
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@$(BIN)/python tests/chromium.py
 	@$(PYTEST) tests/console/browser
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
-	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
+	@DVA_SIM_SEARCH=20 $(PYTEST) $(SHARED) -m "soak or hypothesis"
 
 check: $(DEV)  ## lint, format, types, import contracts
 	@echo "Checking style, types and import contracts ..."

@@ -1,6 +1,5 @@
 """What holds for all tests: how they are shared between processes, and how many may be skipped."""
 
-import os
 import signal
 
 import pytest
@@ -10,7 +9,7 @@ from skips import pytest_sessionfinish
 
 __all__ = ["pytest_sessionfinish"]
 
-DEAR = "browser", "live", "system"
+DEAR = "live", "system"
 """Folders whose files take long: they come first, so that all processes end at the same time."""
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -20,11 +19,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 settings.register_profile("search", search())
 settings.load_profile("search")
-
-
-def pytest_xdist_auto_num_workers() -> int:
-    """One more than there are cores: a test often waits for a program or a page."""
-    return (os.cpu_count() or 1) + 1
 
 
 @pytest.hookimpl(trylast=True)

@@ -15,7 +15,7 @@ from chromium import chromium
 from patience import PATIENCE_S, becomes
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-CUT = "ERR_INCOMPLETE_CHUNKED_ENCODING"  # a camera's stream has ended with its world
+ENDED = "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_REFUSED"  # with a page's world
 FAKE = Path(__file__).parents[1] / "fake_world.py"
 
 MOMENT_MS = 1000 * PATIENCE_S / 2
@@ -72,9 +72,9 @@ def running(folder: Path, command: list[str]) -> Iterator[World]:
         process.wait(PATIENCE_S)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def fake(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., World]]:
-    """Invented worlds, each started once for all tests that want it."""
+    """Invented worlds, each started once for all tests of a file that want it."""
     known: dict[tuple[str, ...], tuple[Any, World]] = {}
     folder = tmp_path_factory.mktemp("worlds")
 
@@ -134,7 +134,7 @@ class Visit:
         return tab
 
     def _note(self, kind: str, text: str) -> None:
-        if kind == "error" and CUT not in text:
+        if kind == "error" and not any(why in text for why in ENDED):
             self.errors.append(text)
 
 
