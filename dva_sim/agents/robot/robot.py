@@ -291,9 +291,8 @@ class RobotAgent:
         x, y, heading = body.pose()
         hazards = view.look(x, y, heading, self._setup.hazards(now))
         visibility = view.visibility(x, y, heading)
-        return make_observation(
-            tick, x, y, heading, body.speed, body.turn_rate, hazards, visibility
-        )
+        motion = body.speed, body.turn_rate
+        return make_observation(tick, x, y, heading, *motion, hazards, visibility)
 
     def expect(self, pattern: Pattern) -> None:
         """From the next drive on, commands come by another pattern.
@@ -325,7 +324,6 @@ class RobotAgent:
     def is_moving(self) -> bool:
         """Whether its wheels turn now."""
         self._world.advance_to(self.device.clock.now)
-        # The turn rate is the cheaper question.
         return abs(self.body.turn_rate) > STANDING or abs(self.body.speed) > STANDING
 
     def hang(self) -> None:

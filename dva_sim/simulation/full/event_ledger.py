@@ -234,7 +234,7 @@ class EventLedger:
 
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
         """Waiting ends when somebody takes it up, and begins anew when it is confirmed."""
-        found = FOUND.intersection(event.times, (event.state.value,))
+        found = FOUND.intersection((*event.times, event.state.value))
         old = old or Seen(found - FOUND, (), now, now)
         word, hands = self._word(event.number), _in_hand(event)
         taken = bool(word.taken.intersection(hands))
