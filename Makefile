@@ -15,10 +15,10 @@ DEMO := results/demo
 # compiles all modules again.
 export PYTHONDONTWRITEBYTECODE =
 
-# As many processes as there are cores share the files of tests; but pages are drawn by several
-# processes of the browser already, and their tests run alone.
-SHARED := -n auto --dist loadfile --no-loadscope-reorder
-PYTEST := $(BIN)/python -m pytest -p no:benchmark
+# Two processes share the tests; but pages are drawn by several processes of the browser already,
+# and their tests run alone.
+PYTEST := $(BIN)/python -m pytest --halves
+BROWSER := $(BIN)/python -m pytest tests/console/browser
 
 help:  ## say what can be made
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -36,26 +36,26 @@ published: $(RUNTIME)  ## the main study at its published size, and its report: 
 
 test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the tests ..."
-	@$(PYTEST) $(SHARED) -m "not system and not soak and not browser"
+	@$(PYTEST) -m "not system and not soak and not browser"
 
 test-all: $(DEV)  ## all tests
 	@echo "Running those in a browser, then all others ..."
 	@$(BIN)/python tests/chromium.py
-	@$(PYTEST) tests/console/browser
-	@$(PYTEST) $(SHARED) -m "not browser"
+	@$(BROWSER)
+	@$(PYTEST) -m "not browser"
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
-	@$(PYTEST) $(SHARED) -m contract
+	@$(PYTEST) -m contract
 
 test-system: $(DEV)  ## programs as users start them, with real processes, sockets and signals
-	@$(PYTEST) $(SHARED) -m system
+	@$(PYTEST) -m system
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@$(BIN)/python tests/chromium.py
-	@$(PYTEST) tests/console/browser
+	@$(BROWSER)
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
-	@DVA_SIM_SEARCH=20 $(PYTEST) $(SHARED) -m "soak or hypothesis"
+	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
 
 check: $(DEV)  ## lint, format, types, import contracts
 	@echo "Checking style, types and import contracts ..."

@@ -2,15 +2,12 @@
 
 import signal
 
-import pytest
+from halves import pytest_addoption, pytest_configure
 from hypothesis import settings
 from searching import search
 from skips import pytest_sessionfinish
 
-__all__ = ["pytest_sessionfinish"]
-
-DEAR = "live", "system"
-"""Folders whose files take long: they come first, so that all processes end at the same time."""
+__all__ = ["pytest_addoption", "pytest_configure", "pytest_sessionfinish"]
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # As for a command that a script starts with `&`: then nothing that is started here would hear
@@ -19,8 +16,3 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 settings.register_profile("search", search())
 settings.load_profile("search")
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: not set(DEAR).intersection(item.path.parts))
