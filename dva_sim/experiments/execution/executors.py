@@ -123,25 +123,63 @@ class LocalProcesses(Workers):
         context = multiprocessing.get_context(_FAMILY)
         context.set_forkserver_preload([_FIRST, task.__module__])
         kind = ProcessPoolExecutor if task.__module__ == "__main__" else _WithoutScript
-        pool = kind(min(width, self.width), context, initializer=_begin)
-        self._pool = pool
-        try:
-            yield pool
-        except BaseException:
-            for process in list((pool._processes or {}).values()):
-                process.kill()
-            raise
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+        pool = self._pool = kind(min(width, self.width), context, initializer=_begin)
+        with _ctrl_c_held_back(self._kill) as self._let_through:
+            try:
+                yield pool
+            except BaseException:
+                self._kill()
+                raise
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
+
+    def _kill(self) -> None:
+        for process in list((self._pool._processes or {}).values()):
+            process.kill()
 
     def look_after(self, is_idle: bool) -> None:
-        """End a process that has been stopped for some time: another one does what it had."""
+        """End a process that has been stopped for some time: another one does what it had.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C was pressed.
+        """
+        self._let_through()
         pids = set(self._pool._processes or {})
         stopped = {pid for pid in pids if is_idle and _is_stopped(pid)}
         for pid in stopped & self._stopped:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         self._stopped = stopped
+
+
+@contextmanager
+def _ctrl_c_held_back(at_once: Callable[[], object]) -> Iterator[Callable[[], None]]:
+    """Ctrl-C does something at once, and is raised where the block lets it through, or at its end.
+
+    Raised anywhere, it may leave a lock of the pool locked for ever: the pool's own thread would
+    wait for that, and this one for the pool's.
+    """
+    is_pressed = False
+
+    def press(*_: object) -> None:
+        nonlocal is_pressed
+        is_pressed = True
+        at_once()
+
+    def let_through() -> None:
+        if is_pressed:
+            raise KeyboardInterrupt
+
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield let_through
+        return
+    signal.signal(signal.SIGINT, press)
+    try:
+        yield let_through
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    let_through()
 
 
 class _WithoutScript(ProcessPoolExecutor):

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import wait
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +163,22 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, starte
     assert "of 42 runs, which are kept; the same command goes on from there" in said
     assert 3 <= dry_run(kit.study_in(tmp_path), out).done < kit.RUNS
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
+
+
+def test_ctrl_c_while_a_lock_of_the_pool_is_taken_ends_the_run_all_the_same(tmp_path, monkeypatch):
+    """Raised there it would leave the lock taken; then nobody could end the pool."""
+
+    def wait_and_press(futures, **words):
+        for future in futures:
+            future._condition.acquire()
+            os.kill(os.getpid(), signal.SIGINT)
+            future._condition.release()
+        return wait(futures, **words)
+
+    monkeypatch.setattr(scheduling, "wait", wait_and_press)
+    with pytest.raises(KeyboardInterrupt, match="which are kept; the same command goes on"):
+        run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=kit.cheap)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_two_runners_on_one_folder_do_not_disturb_each_other(tmp_path, plain, started):
