@@ -11,6 +11,9 @@ from playwright.sync_api import Browser, sync_playwright
 NAMES = "chromium", "chromium-browser", "google-chrome"
 """Not its headless shell, which has no sensors of motion."""
 
+NOT_SHOWN = "WebUIOmniboxPopup", "WebUIOmniboxAimPopup"
+"""Pages of its own that it keeps ready for an address bar, a second of work for each window."""
+
 MISSING = "tests in a browser need Chromium: apt-get install chromium (make test leaves them out)"
 
 
@@ -30,7 +33,7 @@ def installed() -> str:
 def chromium() -> Iterator[Browser]:
     """It runs, without a screen. No asyncio is possible meanwhile."""
     with sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu"]
+        arguments = ["--no-sandbox", "--disable-gpu", f"--disable-features={','.join(NOT_SHOWN)}"]
         browser = playwright.chromium.launch(executable_path=installed(), args=arguments)
         yield browser
         browser.close()

@@ -21,8 +21,8 @@ Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was l
 
 def check_recording(path: Path) -> Found:
     """What is wrong with a recording, and doubts: its messages, and the decisions it holds."""
-    from dva_sim.recordings import read_recording  # late: start-up
     from dva_sim.recordings.audit_log import verify_plain  # late: start-up
+    from dva_sim.recordings.reading import read_recording  # late: start-up
 
     try:
         opened = read_recording(path)

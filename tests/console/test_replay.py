@@ -19,9 +19,9 @@ from dva_sim.core.events import Event, State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings import write_recording
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
 from dva_sim.recordings.reading import read_recording
+from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 from dva_sim.simulation.full.stage import DVA
 

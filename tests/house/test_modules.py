@@ -3,6 +3,7 @@
 import ast
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -36,6 +37,15 @@ def imported(path: Path) -> Iterator[str]:
     return imports_of(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
+@cache
+def imported_early() -> dict[str, set[str]]:
+    """What each module imports when it is imported."""
+    return {
+        name: set(imports_of(ast.parse(path.read_text(encoding="utf-8")).body))
+        for name, path in MODULES.items()
+    }
+
+
 def test_no_module_is_part_of_a_circle_of_imports():
     graph = {name: set(imported(path)) - {name} for name, path in MODULES.items()}
     try:
@@ -46,11 +56,10 @@ def test_no_module_is_part_of_a_circle_of_imports():
 
 def test_a_late_import_is_for_start_up_and_says_so():
     """One of what is loaded by then anyway would save nothing."""
-    early, late = {}, []
+    early, late = imported_early(), []
     for name, path in MODULES.items():
         text = path.read_text(encoding="utf-8")
         tree, lines = ast.parse(text), text.splitlines()
-        early[name] = set(imports_of(tree.body))
         late += [
             (name, node, lines[node.lineno - 1])
             for node in ast.walk(tree)
@@ -90,6 +99,16 @@ def loaded_with(name: str, early: dict[str, set[str]]) -> set[str]:
                 known.add(module)
                 open_.append(module)
     return known
+
+
+def test_the_web_process_serves_without_what_simulates():
+    """Else each console costs as much memory again, and a second more until it is there."""
+    loaded = loaded_with("dva_sim.console.web.__main__", imported_early())
+    assert "dva_sim.recordings.audit_log" in loaded
+    assert {name for name in loaded if name.startswith(SIMULATES)} == set()
+
+
+SIMULATES = tuple(f"dva_sim.{room}." for room in ("agents", "core", "network", "simulation"))
 
 
 def test_no_module_is_longer_than_600_lines():

@@ -22,7 +22,7 @@ from dva_sim.live import recording
 from dva_sim.live.recording import Keeper, LiveRecorder, Outlet, TraceFile, finish
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
-from dva_sim.recordings import read_recording
+from dva_sim.recordings.reading import read_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import dva_server
 from dva_sim.simulation.full.dva_trace import TracedDva, replay_dva, traced

@@ -16,7 +16,7 @@ from programs import Programs, wait_until
 from dva_sim.agents.robot.decision_log import replay
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
-from dva_sim.recordings import read_recording
+from dva_sim.recordings.reading import read_recording
 
 pytestmark = [
     pytest.mark.system,

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from recordings.runs import drill, drive, evacuation
 
-from dva_sim.recordings import write_recording
+from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 
 

@@ -15,7 +15,7 @@ from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import HAZARD, look_of
 from dva_sim.experiments.report.figures.site_map import TypicalRun, WorstRun, kind_of
 from dva_sim.experiments.report.figures.style import styled
-from dva_sim.recordings import write_recording
+from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 
 VALUES = [61.0, 70.0, 95.0]  # of three persons, each with a recording: the last is the worst

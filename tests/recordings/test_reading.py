@@ -12,9 +12,10 @@ from recordings.runs import drill, drive, evacuation, run_of
 
 from dva_sim import __version__
 from dva_sim.kernel.errors import ConfigError, DvaSimError
-from dva_sim.recordings import read_recording, write_recording, writing
+from dva_sim.recordings import writing
 from dva_sim.recordings.pictures.stills import still
-from dva_sim.recordings.reading import read_lapse
+from dva_sim.recordings.reading import read_lapse, read_recording
+from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
 from dva_sim.simulation.full.measures import tables_of

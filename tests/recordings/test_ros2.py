@@ -8,7 +8,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.recordings import read_recording
+from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.ros2 import write_bag
 
 

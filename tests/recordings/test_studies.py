@@ -20,7 +20,7 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.recordings import read_recording
+from dva_sim.recordings.reading import read_recording
 
 STUDY = """\
 question: Which is quicker?

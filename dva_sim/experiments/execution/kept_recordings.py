@@ -199,7 +199,7 @@ class Rerun:
         Raises:
             DvaSimError: the file cannot be written, or the run is not what it was.
         """
-        from dva_sim.recordings import write_recording  # late: start-up
+        from dva_sim.recordings.writing import write_recording  # late: start-up
 
         assert isinstance(job.scenario, Scenario)
         name, run = name_of(job), simulate(job.scenario, job.seed, keep_traffic=True)

@@ -17,8 +17,9 @@ from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import resolved
 from dva_sim.network.patterns import known_patterns
-from dva_sim.recordings import Opened, check_target, read_recording, write_recording
 from dva_sim.recordings.pictures import Wanted, joined
+from dva_sim.recordings.reading import Opened, read_recording
+from dva_sim.recordings.writing import check_target, write_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, simulate
 from dva_sim.simulation.models import AnyScenario, Model, Tables, model_for, model_of

@@ -15,8 +15,8 @@ from playwright.sync_api import Page, expect
 from programs import Program, Programs, all_gone_after
 
 from dva_sim.protocol.mistakes import check_message
-from dva_sim.recordings import read_recording
 from dva_sim.recordings.audit_log import read_rows
+from dva_sim.recordings.reading import read_recording
 
 DELAY_S = 0.25
 NEAR_M = 2.5  # of the fire: there it can be seen

@@ -14,8 +14,8 @@ from playwright.sync_api import Page, expect
 from programs import Programs, all_gone_after
 from recordings.runs import drill, drive
 
-from dva_sim.recordings import write_recording
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
+from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 
 
