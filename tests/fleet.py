@@ -9,9 +9,9 @@ from functools import cache
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
+from dva_sim.agents.robot.loops import Surrounded
 from dva_sim.agents.robot.manoeuvres import Sensed
 from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
-from dva_sim.agents.robot.robot import Surrounded
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.bodies import RobotBody
 from dva_sim.worlds.drives import DriveSpec

@@ -1,7 +1,4 @@
-"""A robot on site: its controller bound to body, computer, camera and network.
-
-It runs two loops by itself: missions, and the collision guard around whoever drives it.
-"""
+"""A robot on site: its controller bound to body, computer, camera and network."""
 
 from __future__ import annotations
 
@@ -11,7 +8,6 @@ from dataclasses import dataclass, field
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
 from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
 from dva_sim.agents.robot import command_queue as queue
-from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby, who_is_near
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
 from dva_sim.agents.robot.controller import (
     ENDS,
@@ -25,136 +21,15 @@ from dva_sim.agents.robot.controller import (
 )
 from dva_sim.agents.robot.decision_log import HANGS, LEASE_ENDS, MISSION_ENDS, DecisionLog
 from dva_sim.agents.robot.field_of_view import FieldOfView, HazardSpot
-from dva_sim.agents.robot.manoeuvres import Sensed
-from dva_sim.agents.robot.missions import PERIOD, MissionGoal, Pilot, PilotStep
+from dva_sim.agents.robot.loops import CollisionGuardedDrive, MissionLoop, Surrounded
 from dva_sim.agents.robot.sensors import SensorPort, SensorSubscriptions
-from dva_sim.agents.route_following import Reach
-from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog, make_accepted
 from dva_sim.network.messaging import Request, Subscription
 from dva_sim.network.patterns import Pattern
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.bodies import RobotBody
-from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.physics import World
 from dva_sim.worlds.planning import Planner
-
-SENSOR_REACH = 8.0  # in which others are seen [m]; assumed, as that of the lidar
-
-
-class Surrounded:
-    """A robot's body among others: what its loops look at and act on.
-
-    Args:
-        clock: The run's clock.
-        world: The physics.
-        body: The robot's own.
-        planner: Its map.
-    """
-
-    def __init__(self, clock: Clock, world: World, body: RobotBody, planner: Planner) -> None:
-        self.clock, self.world, self.body, self.planner = clock, world, body, planner
-        spec = body.spec
-        self.guard = CollisionGuard(body.radius, spec.max_deceleration, planner.room_at)
-        self.reach = Reach(spec.max_speed, spec.max_turn_rate)
-
-    def nearby(self) -> tuple[Nearby, ...]:
-        """Who is in sight now."""
-        return who_is_near(self.world, self.body, SENSOR_REACH, self.planner.line_of_sight)
-
-
-class CollisionGuardedDrive:
-    """Obeys set points as far as the collision guard allows, looking again all the time.
-
-    Args:
-        around: The robot and who is near.
-        controller: Says whether it is still driven.
-    """
-
-    def __init__(self, around: Surrounded, controller: RobotController) -> None:
-        self._around, self._controller = around, controller
-        self._wanted = TimedSetPoint(0.0, 0.0, 0.0)
-        self._looking = False
-
-    def take(self, wanted: TimedSetPoint) -> None:
-        """A new set point: in force at once, and guarded until it expires."""
-        self._wanted = wanted
-        if self._looking:
-            self._apply()
-        else:
-            self._looking = True
-            self._around.clock.every(PERIOD, self._look)
-
-    def _look(self) -> bool:
-        driven = self._controller.mode is TELEOPERATION
-        self._looking = driven and self._around.clock.now < self._wanted.until
-        if self._looking:
-            self._apply()
-        return self._looking
-
-    def _apply(self) -> None:
-        around, (speed, turn_rate, until) = self._around, self._wanted
-        around.world.advance_to(around.clock.now)
-        slower = around.guard.limit(around.body.pose(), speed, turn_rate, around.nearby())
-        around.body.drive(slower, turn_rate, until)
-
-
-class MissionLoop:
-    """Drives missions, one at a time.
-
-    Args:
-        around: The robot and who is near.
-        controller: Told how the mission stands.
-        observe: What is in the picture now.
-        charge: Share of the battery's charge that is left.
-        on_news: Told when the mission stands otherwise than before.
-    """
-
-    def __init__(
-        self,
-        around: Surrounded,
-        controller: RobotController,
-        observe: Callable[[], Observation],
-        charge: Callable[[], float],
-        on_news: Callable[[], object],
-    ) -> None:
-        self._around, self._controller, self._observe = around, controller, observe
-        self._charge, self._on_news = charge, on_news
-        self._base = around.body.x, around.body.y
-        self._number = 0
-
-    def begin(self, mission: Mission, frame: GeoFrame) -> None:
-        """Drive a mission until it ends, or the robot is told something else."""
-        body, around = self._around.body, self._around
-        errand = MissionGoal.of(mission, frame.to_xy, self._base)
-        pilot = Pilot(
-            errand,
-            around.planner,
-            around.guard,
-            name=body.name,
-            reach=around.reach,
-            turning_radius=body.motors.turning_radius,
-        )
-        self._number += 1
-        number = self._number
-
-        def step() -> bool:
-            if self._controller.mode is not Mode.MISSION or number != self._number:
-                return False  # stopped, or another mission has begun since
-            self._obey(pilot.step(self._look()))
-            return True
-
-        around.clock.every(PERIOD, step)
-
-    def _look(self) -> Sensed:
-        view, around = self._observe(), self._around
-        return Sensed(around.clock.now, view, around.nearby(), around.body.jammed, self._charge())
-
-    def _obey(self, step: PilotStep) -> None:
-        self._around.body.drive(*step.intent, self._around.clock.now + 2 * PERIOD)
-        if self._controller.mission_stands(step.state, step.left, step.reason):
-            self._on_news()
-
 
 HOLDERS_ONLY = m.StartTeleOp | m.StopTeleOp | m.SetTeleOp | Mission | m.CancelMission
 DVAS_ONLY = m.PermissionGrant | m.PermissionRevocation | m.TaskAnnouncement | m.TaskAward
@@ -249,10 +124,8 @@ class RobotAgent:
         self.refuses: int | None = None
         self.blind = False
         self._fared, self._held_since = m.OK, 0.0
-        self._told: tuple[str | None, int] = (
-            None,
-            m.WRONG_MODE,
-        )  # who holds it, and how that fares
+        # Who holds it, and how that fares, as was published last.
+        self._told: tuple[str | None, int] = (None, m.WRONG_MODE)
         self.inbox = CommandQueue(
             device.clock,
             setup.service,
