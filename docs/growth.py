@@ -124,6 +124,8 @@ def a_run(kind: str, size: int, folder: Path) -> Costs:
         more += ["patrols:"]
         more += [f"  - {{robot: robot-{n}, places: [Room {a}, Room {b}]}}" for n, a, b in rounds]
     site = write_site(folder, size)
+    import dva_sim.simulation.models  # noqa: F401  what every program loads does not count
+
     with costs.of("prepare"):
         model, scenario = model_in(folder, site, counts, *more)
         model.rehearse(scenario, 1)
