@@ -8,7 +8,7 @@ from dva_sim.kernel import early_stop
 NEW_OBJECTS = 20_000
 """So many, and not 700, before circles among them are looked for.
 
-What is loaded stays: looking at it again and again took a fifteenth of the time to begin.
+What is loaded stays: looking at it again and again took a twelfth of the time to begin.
 """
 
 
