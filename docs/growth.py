@@ -116,6 +116,8 @@ def burning(count: int, hazard: str, seconds: float) -> list[str]:
 
 def a_run(kind: str, size: int, folder: Path) -> Costs:
     """A run with so many robots on patrol, guards or bystanders."""
+    import dva_sim.simulation.models  # noqa: F401  what every program loads does not count
+
     costs = Costs()
     counts = {"robots": 0, "guards": 0 if kind == "robots" else 1, "bystanders": 0} | {kind: size}
     more = burning(1, "fire", SECONDS[kind])
@@ -124,8 +126,6 @@ def a_run(kind: str, size: int, folder: Path) -> Costs:
         more += ["patrols:"]
         more += [f"  - {{robot: robot-{n}, places: [Room {a}, Room {b}]}}" for n, a, b in rounds]
     site = write_site(folder, size)
-    import dva_sim.simulation.models  # noqa: F401  what every program loads does not count
-
     with costs.of("prepare"):
         model, scenario = model_in(folder, site, counts, *more)
         model.rehearse(scenario, 1)

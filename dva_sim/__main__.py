@@ -6,7 +6,7 @@ from typing import NoReturn
 from dva_sim.kernel import early_stop
 
 NEW_OBJECTS = 20_000
-"""So many, and not 700, before circles among them are looked for.
+"""So many are made before Python looks for reference cycles among them; by itself it looks at 700.
 
 What is loaded stays: looking at it again and again took a twelfth of the time to begin.
 """

@@ -11,8 +11,17 @@ from playwright.sync_api import Browser, sync_playwright
 NAMES = "chromium", "chromium-browser", "google-chrome"
 """Not its headless shell, which has no sensors of motion."""
 
-NOT_SHOWN = "WebUIOmniboxPopup", "WebUIOmniboxAimPopup"
-"""Pages of its own that it keeps ready for an address bar, a second of work for each window."""
+ADDRESS_BAR = "WebUIOmniboxPopup", "WebUIOmniboxAimPopup"
+"""Pages of its own that it keeps ready for it: a second of work for each window."""
+
+ASK_THE_NETWORK = (
+    "HttpsUpgrades",
+    "MediaRouter",
+    "NetworkTimeServiceQuerying",
+    "OptimizationHints",
+    "PreconnectToSearch",
+)
+"""Playwright switches them off, too; but our list takes the place of its own."""
 
 MISSING = "tests in a browser need Chromium: apt-get install chromium (make test leaves them out)"
 
@@ -33,7 +42,8 @@ def installed() -> str:
 def chromium() -> Iterator[Browser]:
     """It runs, without a screen. No asyncio is possible meanwhile."""
     with sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu", f"--disable-features={','.join(NOT_SHOWN)}"]
+        off = ",".join((*ADDRESS_BAR, *ASK_THE_NETWORK))
+        arguments = ["--no-sandbox", "--disable-gpu", f"--disable-features={off}"]
         browser = playwright.chromium.launch(executable_path=installed(), args=arguments)
         yield browser
         browser.close()
