@@ -209,6 +209,7 @@ class Page:
         self.ws = served.socket(path, token)
         self.you = self.next("you")
         self.client: str = self.you["client"]
+        self.key: str = self.you["key"]
 
     def next(self, *kinds: str) -> Line:
         """The next message of some kinds."""
@@ -219,7 +220,7 @@ class Page:
 
     def driving(self) -> ClientConnection:
         """Its driving socket."""
-        return self.served.socket(f"/ws/drive?client={self.client}", self.token)
+        return self.served.socket(f"/ws/drive?key={self.key}", self.token)
 
     def close(self) -> None:
         self.ws.close()

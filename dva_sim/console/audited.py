@@ -144,8 +144,11 @@ class Audited:
 
 
 def name_of_page(client: str) -> str:
-    """What somebody is called of whom nothing is known but the page."""
-    return f"page {client.partition('-')[0]}" if client != "rest" else "program"
+    """Return the fallback name of a page or a program that has no device."""
+    number = client.partition("-")[0]
+    if number.startswith("c"):
+        return f"page {number}"
+    return number if number == "program" else f"program {number}"
 
 
 def _short(value: Any) -> Any:

@@ -48,7 +48,7 @@ class Hand:
         options["additional_headers"] = {"Authorization": f"Bearer {token}"}
         self.state = connect(f"ws://{place}/ws/state", **options).__enter__()
         you = json.loads(self.state.recv(PATIENCE_S))
-        address = f"ws://{place}/ws/drive?client={you['client']}"
+        address = f"ws://{place}/ws/drive?key={you['key']}"
         self.drive = connect(address, **options).__enter__()
         self._reader = Thread(target=self._look, daemon=True)
         self._reader.start()

@@ -102,7 +102,7 @@ def test_what_was_decided_without_an_answer_is_told_once_the_dva_publishes_it(
 
 
 def test_without_a_name_one_is_called_by_ones_page(page: AttachedPage) -> None:
-    assert page.ask("event_note", client="rest", event=1, text="smoke")["ok"]
+    assert page.ask("event_note", client="program-drive", event=1, text="smoke")["ok"]
     assert page.ask("room_join", client="c2", name="")["text"].startswith("you are supervise-1")
     page.actions.take({"id": "bye-1", "client": "c2", "do": "release"})
     page.let(1.0)

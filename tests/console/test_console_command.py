@@ -57,7 +57,7 @@ class Client:
         self._state = self._open.enter_context(reach(f"{web}/ws/state"))
         you = json.loads(self._state.recv())
         self.id = you["client"]
-        self._drive = self._open.enter_context(reach(f"{web}/ws/drive?client={self.id}"))
+        self._drive = self._open.enter_context(reach(f"{web}/ws/drive?key={you['key']}"))
         self._count, self.seat = 0, None
 
     def do(self, what, **about):

@@ -58,13 +58,15 @@ def ready(served: Served) -> None:
 class Viewer:
     """Somebody who looks at a stream, part by part."""
 
-    def __init__(self, served: Served, label: str = "robot-1", small: bool = False) -> None:
+    def __init__(
+        self, served: Served, label: str = "robot-1", small: bool = False, token: str = ""
+    ) -> None:
         self.raw = socket.socket()
         self.raw.settimeout(PATIENCE_S)
         if small:
             self.raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         self.raw.connect(("127.0.0.1", served.port))
-        path = f"/camera/{label}.mjpg?token={served.look}"
+        path = f"/camera/{label}.mjpg?token={token or served.look}"
         self.raw.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
         self.file = _Unchunked(self.raw)
         self.head = self.file.head
@@ -79,6 +81,19 @@ class Viewer:
         picture = self.file.read(int(headers["Content-Length"]))
         assert self.file.read(2) == b"\r\n"
         return headers, picture
+
+    def ended(self, wait: bool = True) -> bool:
+        """Whether the server has closed the connection, whatever was sent before."""
+        try:
+            if wait:
+                while self.raw.recv(1 << 16):
+                    pass
+                return True
+            ready = select.poll()
+            ready.register(self.raw, select.POLLHUP | select.POLLERR)
+            return bool(ready.poll(0))
+        except ConnectionResetError:
+            return True
 
     def close(self) -> None:
         with suppress(OSError):
@@ -267,3 +282,34 @@ def test_a_question_about_the_stream_is_answered_without_it(console):
     answer = console.ask("/camera/robot-1.mjpg", "HEAD", token=console.look)
     assert answer.status == 200
     assert answer.headers["content-type"].startswith("multipart/x-mixed-replace")
+
+
+def test_64_viewers_keep_out_their_like_and_not_a_higher_role(console):
+    console.asked_so_far()
+    viewers = [Viewer(console, "robot-4") for _ in range(64)]
+    path = "/camera/robot-4.mjpg"
+    assert console.ask(path, token=console.look).status == 503
+    late = Viewer(console, "robot-4", token=console.drive)
+    assert "http/1.1 200 ok" in late.head[0]
+    console.show(3, 1, jpeg(1))
+    assert late.part()[1] == jpeg(1)
+    assert viewers[0].ended()
+    assert viewers[1].part()[1] == jpeg(1)
+    for viewer in (late, *viewers):
+        viewer.close()
+    while console.next_asked("watch")["robots"] != []:
+        pass
+
+
+@pytest.mark.system
+def test_a_viewer_that_does_not_take_its_pictures_is_cut(console):
+    stuck = Viewer(console, "robot-5", small=True)
+    quick = Viewer(console, "robot-5")
+    number, ends = 0, time.monotonic() + PATIENCE_S
+    while not stuck.ended(wait=False) and time.monotonic() < ends:
+        number += 1
+        console.show(4, number, jpeg(number % 200, 200_000))
+        assert quick.part()[0]["X-Frame-Number"] == str(number)
+        time.sleep(0.05)
+    assert time.monotonic() < ends
+    stuck.close(), quick.close()

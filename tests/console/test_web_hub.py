@@ -31,7 +31,7 @@ def test_after_the_end_no_page_is_let_in_that_would_take_the_world_for_lost():
         client = hub.clients.join(Role.DRIVE, "")
         hub.simulation.why = "the console was ended"
         hub.simulation.ended.set()
-        sees, drives = Asking(), Asking(client=client.name)
+        sees, drives = Asking(), Asking(key=client.key)
         await hub.see(sees, Role.DRIVE)
         await hub.drive(drives, Role.DRIVE)
         return [sees.told, drives.told]

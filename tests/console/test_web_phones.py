@@ -78,7 +78,7 @@ def phone(console):
     """A phone's two sockets, by https; its name, and its socket for driving."""
     with wss(console, "/ws/state", console.phone) as state:
         you = json.loads(state.recv(PATIENCE_S))
-        with wss(console, f"/ws/drive?client={you['client']}", console.phone) as drive:
+        with wss(console, f"/ws/drive?key={you['key']}", console.phone) as drive:
             yield you, drive
 
 
@@ -184,10 +184,10 @@ def test_what_a_phone_asks_reaches_the_world_and_the_answer_comes_back_whole(con
     you, drive = phone
     drive.send(json.dumps({"id": "reg-1", "do": "phone_register", **REGISTER}))
     asked = console.next_asked("phone_register")
-    by = {"id": "reg-1", "client": you["client"], "role": "phone"}
+    by = {"id": f"{you['client']}/reg-1", "client": you["client"], "role": "phone"}
     assert asked == {"do": "phone_register", **by, **REGISTER}
     more = {"phone": {"id": "02:00", "label": "my phone", "address": "127.0.0.1:5700"}}
-    console.say({"k": "done", "id": "reg-1", "ok": True, "text": "registered", **more})
+    console.say({"k": "done", "id": asked["id"], "ok": True, "text": "registered", **more})
     assert json.loads(drive.recv(PATIENCE_S))["phone"] == more["phone"]
 
 
@@ -213,19 +213,19 @@ def test_an_emergency_of_a_phone_is_for_its_own_robot_unless_it_says_otherwise(c
 
 
 def test_an_emergency_goes_through_though_the_socket_of_its_page_is_gone(console):
-    body = {"robots": [0], "client": "c999-gone", "id": "late-1"}
+    body = {"robots": [0], "key": "of-a-page-that-is-gone", "id": "late-1"}
     with ThreadPoolExecutor(1) as other:
         told = other.submit(ask, console, "/api/emergency", "POST", body, console.phone)
         asked = console.next_asked("emergency")
         console.say({"k": "done", "id": asked["id"], "ok": True, "text": "stops"})
         assert told.result(PATIENCE_S).json["ok"]
-    assert (asked["client"], asked["robots"]) == ("rest", [0])
+    assert (asked["client"], asked["robots"]) == ("program-phone", [0])
 
 
 def test_a_phone_that_is_gone_stops(console):
     with wss(console, "/ws/state", console.phone) as state:
         you = json.loads(state.recv(PATIENCE_S))
-        with wss(console, f"/ws/drive?client={you['client']}", console.phone):
+        with wss(console, f"/ws/drive?key={you['key']}", console.phone):
             pass
         assert console.next_asked("gone")["client"] == you["client"]
 
@@ -233,14 +233,15 @@ def test_a_phone_that_is_gone_stops(console):
 def test_a_page_that_lost_its_connection_unnoticed_keeps_its_name_and_a_copy_gets_another(console):
     """As on a change of network: the old connection is dead, and nobody has said so here."""
     with wss(console, "/ws/state?page=one", console.phone) as old:
-        name = json.loads(old.recv(PATIENCE_S))["client"]
-        with wss(console, f"/ws/state?client={name}&page=copy", console.phone) as copy:
+        you = json.loads(old.recv(PATIENCE_S))
+        name, key = you["client"], you["key"]
+        with wss(console, f"/ws/state?key={key}&page=copy", console.phone) as copy:
             assert json.loads(copy.recv(PATIENCE_S))["client"] != name
-        with wss(console, f"/ws/state?client={name}&page=one", console.phone) as again:
+        with wss(console, f"/ws/state?key={key}&page=one", console.phone) as again:
             assert json.loads(again.recv(PATIENCE_S))["client"] == name
             with pytest.raises(ConnectionClosed):
                 list(old)
-            with wss(console, f"/ws/drive?client={name}", console.phone):  # it is still here
+            with wss(console, f"/ws/drive?key={key}", console.phone):  # it is still here
                 console.say({"k": "seat", "seat": name, "drives": [], "phase": "held"})
                 while json.loads(again.recv(PATIENCE_S)).get("phase") != "held":
                     pass

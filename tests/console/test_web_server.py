@@ -130,10 +130,10 @@ def test_a_websocket_needs_a_token_and_to_drive_the_right_one(console):
     assert page.you["role"] == "look"
     for token in (console.look, console.drive):
         with pytest.raises(InvalidStatus) as error:
-            console.socket(f"/ws/drive?client={page.client}", token)
+            console.socket(f"/ws/drive?key={page.key}", token)
         assert error.value.response.status_code == 403
     with pytest.raises(InvalidStatus):
-        console.socket("/ws/drive?client=c999", console.drive)
+        console.socket("/ws/drive?key=c999", console.drive)
     page.close()
 
 
@@ -222,8 +222,10 @@ def test_a_hostile_label_is_data(console):
         ({"id": "a", "action": "take", "arguments": {"robots": [77]}}, 400),
         ({"id": "", "action": "start", "arguments": {}}, 400),
         ({"action": "start", "arguments": {}}, 400),
-        ({"id": "a", "action": "start", "arguments": [], "client": "c0"}, 400),
-        ({"id": "a", "action": "start", "client": "c0-0"}, 400),
+        ({"id": "a", "action": "start", "arguments": []}, 400),
+        ({"id": "a", "action": "start", "client": "c0-0"}, 403),
+        ({"id": "a", "action": "start", "key": "c0-0"}, 403),
+        ({"id": "a", "action": "start", "key": None}, 403),
         (b" " * 16385, 413),
     ],
 )
@@ -258,14 +260,15 @@ def test_headers_without_end_are_refused(console):
 
 def test_an_action_answers_when_the_simulation_has(console):
     def simulate():
-        asked = console.next_asked("take")
-        by = {"client": "rest", "id": "rest-1", "role": "drive"}
-        assert asked == {"do": "take", "robots": [1], **by}
-        console.say({"k": "done", "t": 1, "id": "rest-1", "ok": False, "text": "BUSY since 0:12"})
+        asked = console.next_asked("pattern")
+        by = {"client": "program-drive", "id": "program-drive/rest-1", "role": "drive"}
+        assert asked == {"do": "pattern", "robot": 1, "name": "req-rep", **by}
+        console.say({"k": "done", "id": asked["id"], "ok": False, "text": "BUSY since 0:12"})
 
     thread = Thread(target=simulate)
     thread.start()
-    body = {"id": "rest-1", "action": "take", "arguments": {"robots": ["robot-2"]}}
+    arguments = {"robot": "robot-2", "name": "req-rep"}
+    body = {"id": "rest-1", "action": "pattern", "arguments": arguments}
     answer = console.ask("/api/actions", "POST", body, console.drive)
     thread.join()
     assert answer.status == 200
@@ -285,11 +288,12 @@ def test_an_action_over_the_driving_socket_and_its_seat(console):
     with page.driving() as drive:
         drive.send(json.dumps({"id": "d1", "do": "take", "robots": [0]}))
         asked = console.next_asked("take")
-        assert (asked["client"], asked["id"]) == (page.client, "d1")
-        console.say({"k": "done", "t": 5, "id": "d1", "ok": True, "text": "taken"})
+        assert (asked["client"], asked["id"]) == (page.client, f"{page.client}/d1")
+        console.say({"k": "done", "t": 5, "id": asked["id"], "ok": True, "text": "taken"})
         console.say({"k": "seat", "t": 5, "seat": page.client, "phase": "held", "drives": []})
         heard = [json.loads(drive.recv(PATIENCE_S)) for _ in range(2)]
         assert [line["k"] for line in heard] == ["done", "seat"]
+        assert heard[0]["id"] == "d1"
         drive.send(json.dumps({"do": "input", "n": 1, "speed": 1, "turn": -0.5, "held": True}))
         assert console.next_asked("input")["turn"] == -0.5
         drive.send(json.dumps({"id": "d2", "do": "take", "robots": [99]}))
@@ -317,7 +321,7 @@ def test_a_second_driving_socket_of_a_page_takes_over_from_rest(console):
     assert console.next_asked("gone")["client"] == page.client
     first.send(json.dumps({"id": "f1", "do": "start"}))
     second.send(json.dumps({"id": "s1", "do": "start"}))
-    assert console.next_asked("start")["id"] == "s1"
+    assert console.next_asked("start")["id"] == f"{page.client}/s1"
     second.close()
     page.close()
 
@@ -325,7 +329,7 @@ def test_a_second_driving_socket_of_a_page_takes_over_from_rest(console):
 def test_a_page_that_says_it_goes_is_heard_as_its_last_request(console):
     page = console.page()
     console.asked_so_far()
-    body = {"action": "gone", "client": page.client}
+    body = {"action": "gone", "key": page.key}
     assert console.ask("/api/actions", "POST", body, console.drive).status == 200
     assert console.next_asked("gone")["client"] == page.client
     page.close()
@@ -416,12 +420,12 @@ def test_a_page_that_comes_back_has_its_old_name(console):
     page = console.page()
     page.close()
     console.next_asked("gone")
-    back = console.socket(f"/ws/state?client={page.client}", console.drive)
+    back = console.socket(f"/ws/state?key={page.key}", console.drive)
     assert json.loads(back.recv(PATIENCE_S))["client"] == page.client
-    twin = console.socket(f"/ws/state?client={page.client}", console.drive)
+    twin = console.socket(f"/ws/state?key={page.key}", console.drive)
     assert json.loads(twin.recv(PATIENCE_S))["client"] != page.client  # a copy of an open page
     twin.close(), back.close()
-    other = console.socket(f"/ws/state?client={page.client}", console.look)
+    other = console.socket(f"/ws/state?key={page.key}", console.look)
     assert json.loads(other.recv(PATIENCE_S))["client"] != page.client
     other.close()
 
@@ -497,7 +501,7 @@ def test_64_pages_are_served_and_one_more_is_told_so():
     with serving() as served, ExitStack() as stack:
         pages = [stack.enter_context(served.page(served.look).ws) for _ in range(64)]
         with pytest.raises(InvalidStatus) as error:
-            served.socket("/ws/state", served.drive)
+            served.socket("/ws/state", served.look)
         assert error.value.response.status_code == 503
         assert error.value.response.headers["referrer-policy"] == "no-referrer"
         served.say(places(7, [0, 1, 1, 1, 1]))

@@ -94,8 +94,9 @@ def test_an_answer_goes_to_all_who_asked_the_same():
         asked = {"id": "a", "do": "start", "client": "c1"}
         waiting = [asyncio.ensure_future(simulation.answer(asked)) for _ in range(2)]
         await asyncio.sleep(0)
-        say(end, {"k": "done", "id": "a", "ok": True, "text": "yes"})
-        assert [line["text"] for line in await asyncio.gather(*waiting)] == ["yes", "yes"]
+        say(end, {"k": "done", "id": "c1/a", "ok": True, "text": "yes"})
+        found = [(line["id"], line["text"]) for line in await asyncio.gather(*waiting)]
+        assert found == [("a", "yes"), ("a", "yes")]
         end.setblocking(False)
         assert end.recv(1000).count(b"\n") == 1
 
@@ -106,15 +107,15 @@ def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
     async def story(simulation, clock, end):
         told = []
         for number in range(MOST_PENDING):
-            simulation.ask({"id": f"{number}", "do": "start"}, told.append)
+            simulation.ask({"id": f"{number}", "do": "start", "client": "c1"}, told.append)
             end.recv(1000)
-        simulation.ask({"id": f"{MOST_PENDING}", "do": "start"}, told.append)
+        simulation.ask({"id": f"{MOST_PENDING}", "do": "start", "client": "c1"}, told.append)
         assert [line["id"] for line in told] == [f"{MOST_PENDING}"]
         assert "too much" in told[0]["text"]
         say(end, {"k": "bye", "why": "over"})
         await simulation.ended.wait()
         assert [line["text"] for line in told[1:]] == ["over"] * MOST_PENDING
-        simulation.ask({"id": "after", "do": "start"}, told.append)
+        simulation.ask({"id": "after", "do": "start", "client": "c1"}, told.append)
         assert (told[-1]["id"], told[-1]["text"]) == ("after", "over")
 
     play(story)

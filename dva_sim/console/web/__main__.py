@@ -16,6 +16,7 @@ from dva_sim.console.web.app import make_app
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.listener import fitting_places
 from dva_sim.console.web.phones import NoCertificate
 from dva_sim.console.web.server import listen, make_server, serve
 from dva_sim.console.web.simulation import Simulation
@@ -80,10 +81,12 @@ async def run(options: argparse.Namespace) -> None:
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
     app = make_app(access, hub, cameras, files, door, audit, options.report)
-    serves = [serve(make_server(app), sock, over)]
+    listeners = 2 if phones else 1
+    serves = [serve(make_server(app), sock, fitting_places(listeners), over)]
     if phones:
         app = make_app(phones.access, hub, cameras, files, door, audit)
-        serves.append(serve(make_server(app, phones.certificate), phones.sock, over))
+        server = make_server(app, phones.certificate)
+        serves.append(serve(server, phones.sock, fitting_places(listeners), over))
     await asyncio.gather(*serves)
     telling.cancel()
     simulation.close()

@@ -9,9 +9,11 @@ from typing import Any
 
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.checks import (
+    MOST_ROBOTS,
     BadMessage,
     Check,
     Labels,
+    NotAllowed,
     flag,
     maybe,
     number,
@@ -88,12 +90,15 @@ _CALIBRATE = {
     "keep": flag,
 }
 _OPTIONAL = ("ios", "keep")
+# Pictures that the page has drawn last: a robot's index and when the picture was taken [ms].
+_SEEN_PICTURES = several(several(number(0, 1e13), 2, 2), 0, MOST_ROBOTS)
 _SAMPLES = {
     "n": whole(0, 2**53),
     "at": several(number(0, 1e13), 1, MOST_SAMPLES),
     "xyz": several(_AXES, 1, MOST_SAMPLES),
     "hand": flag,
     "orientation": one_of(0, 90, 180, 270),
+    "seen": _SEEN_PICTURES,
 }
 _REPORT = {
     "kind": one_of("fire", "gas_leak", "flood"),
@@ -185,12 +190,13 @@ _INPUT = {
     "speed": number(0, 1),
     "turn": number(-1, 1),
     "held": flag,
+    "seen": _SEEN_PICTURES,
 }
 # Those that have no answer.
 SILENT: Known = {
-    "input": (_INPUT, tuple(_INPUT)),
-    "manual": (_INPUT, tuple(_INPUT)),
-    "samples": (_SAMPLES, tuple(_SAMPLES)),
+    "input": (_INPUT, tuple(key for key in _INPUT if key != "seen")),
+    "manual": (_INPUT, tuple(key for key in _INPUT if key != "seen")),
+    "samples": (_SAMPLES, tuple(key for key in _SAMPLES if key != "seen")),
     "gone": ({}, ()),
 }
 # The least role that may ask for it; whoever acts at all may ask for the others. A phone changes
@@ -212,14 +218,14 @@ def check_role(role: Role, name: Any) -> None:
     """Whether somebody may ask for an action at all.
 
     Raises:
-        BadMessage: not by this address.
+        NotAllowed: not by this address.
     """
     if not role.acts:
-        raise BadMessage("this address may only look")
+        raise NotAllowed("this address may only look")
     least = NEEDS.get(name, Role.PHONE) if isinstance(name, str) else Role.PHONE
     if role < least:
         own = "a phone's address" if role is Role.PHONE else "this address"
-        raise BadMessage(f"{own} may not {plain(name)}; an address {_FOR[least]} may")
+        raise NotAllowed(f"{own} may not {plain(name)}; an address {_FOR[least]} may")
 
 
 _FOR = {Role.DRIVE: "for driving", Role.DISPATCH: "for dispatch", Role.SUPERVISE: "to supervise"}

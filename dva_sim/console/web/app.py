@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
 from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
+from dva_sim.console.web.sockets import place_of
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.console.web.streaming import PictureStream
 
@@ -44,6 +46,8 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 OPEN = "/healthz"
+EMERGENCY = "/api/emergency"
+UNLIMITED = (OPEN, EMERGENCY)  # answered however many connections are in use
 # Pages that people open, each with the file that is shown.
 PAGES = {"/": "index.html", "/phone": "phone.html", "/guard": "guard.html"}
 _WORDS = """<!doctype html>
@@ -80,13 +84,20 @@ class Doorkeeper:
             await send(message)
 
         answer = self._refusal(scope)
-        if answer is None:
-            await self._app(scope, receive, send_with_headers)
-        elif scope["type"] == "http":
-            await answer(scope, receive, send_with_headers)
-        else:
-            ws = WebSocket(scope, receive, send_with_headers)
-            await ws.send_denial_response(answer)
+        place, role = place_of(scope), scope.get(ROLE, Role.NOBODY)
+        is_limited = scope["path"] not in UNLIMITED
+        if not place.begin(role, time.monotonic(), is_limited=is_limited):
+            answer = answer or problem(503, "too many connections are in use")
+        try:
+            if answer is None:
+                await self._app(scope, receive, send_with_headers)
+            elif scope["type"] == "http":
+                await answer(scope, receive, send_with_headers)
+            else:
+                ws = WebSocket(scope, receive, send_with_headers)
+                await ws.send_denial_response(answer)
+        finally:
+            place.end(time.monotonic())
 
     def _refusal(self, scope: Scope) -> Response | None:
         """The answer to whoever may not ask; else the role is noted in the scope."""
@@ -183,14 +194,18 @@ class Pages:
         robot = self._robot(request)
         if not self._cameras.draws:
             return problem(503, "no picture: nobody draws")
-        if self._cameras.is_full():
+        if request.method == "HEAD":
+            return Response(headers=NOT_KEPT, media_type=PictureStream.media_type)
+        viewer = self._cameras.admit(robot, request.scope[ROLE])
+        if viewer is None:
             return problem(503, "64 viewers are looking already")
-        return PictureStream(self._cameras, robot)
+        return PictureStream(self._cameras, viewer)
 
     async def still(self, request: Request) -> Response:
         """`GET /camera/LABEL.jpg`."""
         robot = self._robot(request)
-        picture = None if self._cameras.is_full() else await self._cameras.one(robot)
+        viewer = self._cameras.admit(robot, request.scope[ROLE])
+        picture = None if viewer is None else await self._cameras.one(viewer)
         if picture is None:
             return problem(503, "no picture")
         headers = headers_of(picture) | NOT_KEPT
@@ -285,7 +300,7 @@ def make_app(
         Route("/api/logs/{name}/export", _for(Role.DRIVE, logs.export)),
         Route("/api/logs/{name}/{number:int}", _for(Role.DRIVE, logs.entry)),
         Route("/api/actions", _for(Role.PHONE, rest.action), methods=["POST"]),
-        Route("/api/emergency", _for(Role.PHONE, rest.emergency), methods=["POST"]),
+        Route(EMERGENCY, _for(Role.PHONE, rest.emergency), methods=["POST"]),
         WebSocketRoute("/ws/state", see),
         WebSocketRoute("/ws/drive", drive),
     ]

@@ -10,8 +10,10 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import AsyncGenerator, Callable, Iterable
+from dataclasses import dataclass
 
 from dva_sim.console.frames import ALIVE, Picture, Unpacker
+from dva_sim.console.web.access import Role
 from dva_sim.console.web.pipes import PipeEnd
 from dva_sim.console.web.simulation import Simulation
 
@@ -23,6 +25,21 @@ REPEATED = 1.0  # so often is said again who is watched [s]
 ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
 FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
 MOST_VIEWERS = 64
+
+
+@dataclass(eq=False)
+class Viewer:
+    """Somebody who looks at the pictures of a robot.
+
+    Attributes:
+        robot: Which, by its index.
+        role: What the viewer may do.
+        is_over: Whether the viewer has to leave, or has left.
+    """
+
+    robot: int
+    role: Role
+    is_over: bool = False
 
 
 class CameraStreams:
@@ -42,7 +59,8 @@ class CameraStreams:
         self._unpacker = Unpacker()
         self._newest: dict[int, tuple[Picture, float]] = {}
         self._drawn = asyncio.Condition()
-        self._viewers: Counter[int] = Counter()
+        self._viewers: dict[Viewer, None] = {}  # in the order in which they came
+        self._lingering: Counter[int] = Counter()
         self._told: frozenset[int] = frozenset()
         self._deadline = 0.0
         self._ok = True
@@ -97,7 +115,8 @@ class CameraStreams:
 
     def tell(self, again: bool = False) -> None:
         """Say who is watched, if that is new."""
-        robots = frozenset(self._viewers) | frozenset(self._said())
+        looked_at = {viewer.robot for viewer in self._viewers}
+        robots = frozenset(looked_at | self._lingering.keys()) | frozenset(self._said())
         new = robots != self._told
         if new:
             self._told = robots
@@ -105,63 +124,78 @@ class CameraStreams:
         if new or (again and robots):
             self._pipe.send({"do": "watch", "watch": sorted(robots)})
 
-    def _look(self, robot: int) -> None:
-        self._viewers[robot] += 1
+    def admit(self, robot: int, role: Role) -> Viewer | None:
+        """Return a new viewer; None if there are too many, and none of a lower role.
+
+        One of a lower role has to leave for one of a higher role.
+        """
+        if len(self._viewers) >= MOST_VIEWERS:
+            least = min(self._viewers, key=lambda viewer: viewer.role)
+            if least.role >= role:
+                return None
+            least.is_over = True
+            self.leave(least)
+            self._wake()
+        viewer = Viewer(robot, role)
+        self._viewers[viewer] = None
         self.tell()
+        return viewer
 
-    def _look_away(self, robot: int) -> None:
-        asyncio.get_running_loop().call_later(LINGERS, self._away, robot)
+    def leave(self, viewer: Viewer) -> None:
+        """A viewer is gone; the robot is drawn a little longer. May be repeated."""
+        if viewer in self._viewers:
+            del self._viewers[viewer]
+            self._lingering[viewer.robot] += 1
+            asyncio.get_running_loop().call_later(LINGERS, self._linger_no_more, viewer.robot)
 
-    def _away(self, robot: int) -> None:
-        self._viewers[robot] -= 1
-        if not self._viewers[robot]:
-            del self._viewers[robot]
+    def _linger_no_more(self, robot: int) -> None:
+        self._lingering[robot] -= 1
+        self._lingering = +self._lingering
+        if robot not in self._lingering and all(v.robot != robot for v in self._viewers):
             self._newest.pop(robot, None)
         self.tell()
 
-    def is_full(self) -> bool:
-        """Whether nobody more may look."""
-        return self._viewers.total() >= MOST_VIEWERS
-
     # --- pictures out --------------------------------------------------------------------
 
-    async def stream(self, robot: int) -> AsyncGenerator[bytes, None]:
-        """Pictures of a robot as parts of a response, each newer than the one before."""
-        self._look(robot)
+    async def stream(self, viewer: Viewer) -> AsyncGenerator[bytes, None]:
+        """Pictures as parts of a response, each newer than the one before."""
         try:
             yield f"--{BOUNDARY}\r\n".encode()
             shown: Picture | None = None
-            while (picture := await self._after(robot, shown)) is not None:
+            while (picture := await self._after(viewer, shown)) is not None:
                 if shown is not None and picture.number > shown.number + 1:
                     self.skipped += picture.number - shown.number - 1
                 shown = picture
                 yield part(picture)
         finally:
-            self._look_away(robot)
+            self.leave(viewer)
 
-    async def one(self, robot: int) -> Picture | None:
-        """The newest picture of a robot; None if there is none for too long."""
-        known = self._newest.get(robot)
-        if known is not None and time.monotonic() - known[1] < FRESH:
-            return known[0]
-        self._look(robot)
+    async def one(self, viewer: Viewer) -> Picture | None:
+        """The newest picture; None if there is none for too long."""
         try:
+            known = self._newest.get(viewer.robot)
+            if known is not None and time.monotonic() - known[1] < FRESH:
+                return known[0]
             async with asyncio.timeout(ONE_WITHIN if self.draws else 0.0):
-                return await self._after(robot, known[0] if known else None)
+                return await self._after(viewer, known[0] if known else None)
         except TimeoutError:
             return None
         finally:
-            self._look_away(robot)
+            self.leave(viewer)
 
-    async def _after(self, robot: int, shown: Picture | None) -> Picture | None:
+    async def _after(self, viewer: Viewer, shown: Picture | None) -> Picture | None:
         """The newest picture once it is another one; None if there will be no more."""
+        robot = viewer.robot
 
         def is_new() -> bool:
             return robot in self._newest and self._newest[robot][0] is not shown
 
+        def is_over() -> bool:
+            return self._is_over or viewer.is_over
+
         async with self._drawn:
-            await self._drawn.wait_for(lambda: self._is_over or is_new())
-        return None if self._is_over else self._newest[robot][0]
+            await self._drawn.wait_for(lambda: is_over() or is_new())
+        return None if is_over() else self._newest[robot][0]
 
     def close(self) -> None:
         """Take no more pictures, and end all streams."""

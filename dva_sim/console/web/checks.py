@@ -18,6 +18,10 @@ class BadMessage(ValueError):
     """What was asked for makes no sense; the message is one line for whoever asked."""
 
 
+class NotAllowed(BadMessage):
+    """The asking token does not allow it."""
+
+
 def number(low: float, high: float) -> Check:
     """A number within limits."""
 

@@ -1,11 +1,17 @@
-"""Who looks and who drives: the pages that are open, and their names."""
+"""Pages that are open, and programs: their names, which all may see, and keys, which nobody may.
+
+The name says in the state and in the audit log who sits in a seat. Only the key, which the server
+draws and shows to its owner alone, opens the seat.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import hmac
 import secrets
 from collections import deque
 from collections.abc import Iterable
+from typing import Any
 
 from starlette.websockets import WebSocket
 
@@ -15,6 +21,8 @@ from dva_sim.console.web.state import RunState
 
 MOST_CLIENTS = 64
 REMEMBERED = 30.0  # a page that is gone may come back under its name for so long [s]
+MOST_PROGRAMS = 64
+PROGRAM_REMEMBERED = 600.0  # a program's seat is given back after this without a request [s]
 
 
 class Driver:
@@ -52,23 +60,27 @@ class Driver:
 
 
 class Client:
-    """A page.
+    """A page, or a program that sits in a seat.
 
     Attributes:
-        name: By which the simulation knows it; nobody can guess another's.
+        name: By which the simulation knows it, and everybody who may look.
+        key: Opens its seat; never shown to others.
         role: What it may do.
         feed: What it gets.
         wake: Set when there may be something for it.
         watches: Robots whose pictures it says it looks at.
         driver: Its driving socket, if it has one.
         is_here: Whether its state socket is open.
-        page: What the page calls itself until it is loaded anew; empty: nothing.
+        page: What the page calls itself until it is loaded again; empty: nothing.
         ws: Its state socket, while that is open.
+        asked: When a program made its newest request [s].
     """
 
     def __init__(self, name: str, role: Role, state: RunState, page: str = "") -> None:
         self.name, self.role, self.page = name, role, page
+        self.key = secrets.token_urlsafe(24)
         self.ws: WebSocket | None = None
+        self.asked = 0.0
         self.feed = PageFeed(state, name, role >= Role.DRIVE)
         self.wake = asyncio.Event()
         self.watches: frozenset[int] = frozenset()
@@ -89,34 +101,85 @@ class Clients:
         self._count = 0
 
     def here(self) -> list[Client]:
-        """Those whose state socket is open."""
+        """Pages whose state socket is open."""
         return [client for client in self._all.values() if client.is_here]
 
+    def yielding(self, role: Role) -> Client | None:
+        """Return the page that makes room for one of a role: of a lower role, idle ones first."""
+        lesser = [client for client in self.here() if client.role < role]
+        return min(lesser, key=lambda each: (each.role, each.driver is not None), default=None)
+
     def is_full(self) -> bool:
-        """Whether nobody more is let in."""
+        """Whether no place for a page is free."""
         return len(self.here()) >= MOST_CLIENTS
 
-    def join(self, role: Role, name: str = "", page: str = "") -> Client:
+    def join(self, role: Role, key: str = "", page: str = "") -> Client:
         """Let a page in, under its old name if it was here a moment ago and is not any more.
 
-        A copy of a page that is open has the same name, and gets another: they would drive the
+        A copy of a page that is open has the same key, and gets another: they would drive the
         same robots. The very page that is open may come again, when it has lost its connection
         before we know of that.
+
+        Args:
+            role: Shown by its token.
+            key: Of the page that it was; empty: none.
+            page: What it calls itself.
         """
-        known = self._all.get(name)
+        known = self._by_key(key)
         if known is not None and known.role is role and _may_come_again(known, page):
             known.is_here, known.page = True, page
             known.feed = PageFeed(self._state, known.name, role >= Role.DRIVE)
             return known
+        return self._add(Client(self._new_name("c"), role, self._state, page))
+
+    def add_program(self, role: Role, now: float) -> Client | None:
+        """Return a new program, or None if there are too many.
+
+        Args:
+            role: Shown by its token.
+            now: Time [s].
+        """
+        if sum(1 for client in self._all.values() if client.asked) >= MOST_PROGRAMS:
+            return None
+        program = self._add(Client(self._new_name("p"), role, self._state))
+        program.is_here, program.asked = False, now
+        return program
+
+    def silent_programs(self, now: float) -> list[Client]:
+        """Return the programs that have made no request for long, and forget them."""
+        long_ago = now - PROGRAM_REMEMBERED
+        silent = [client for client in self._all.values() if 0.0 < client.asked < long_ago]
+        for client in silent:
+            del self._all[client.name]
+        return silent
+
+    def remove(self, program: Client) -> None:
+        """Forget a program."""
+        self._all.pop(program.name, None)
+
+    def _new_name(self, kind: str) -> str:
         self._count += 1
-        client = Client(f"c{self._count}-{secrets.token_hex(4)}", role, self._state, page)
+        return f"{kind}{self._count}-{secrets.token_hex(4)}"
+
+    def _add(self, client: Client) -> Client:
         self._all[client.name] = client
         return client
 
-    def find(self, name: str) -> Client | None:
+    def _by_key(self, key: str) -> Client | None:
+        shown = key.encode("utf-8", "replace")
+        fits = [c for c in self._all.values() if hmac.compare_digest(shown, c.key.encode())]
+        return fits[0] if fits else None
+
+    def named(self, name: str) -> Client | None:
         """The page of a name, if it is here."""
         client = self._all.get(name)
         return client if client is not None and client.is_here else None
+
+    def find(self, key: Any, role: Role) -> Client | None:
+        """The page or program that a key belongs to, if its token has the same role as before."""
+        client = self._by_key(key) if isinstance(key, str) else None
+        is_there = client is not None and (client.is_here or client.asked)
+        return client if client is not None and is_there and client.role is role else None
 
     def leave(self, client: Client) -> None:
         """Its state socket is closed; its name is kept a while."""

@@ -48,7 +48,7 @@ class Hub:
     def _changed(self, kind: str, line: dict[str, Any]) -> None:
         """Something is new: who drives gets the newest of its seat at once."""
         if kind == "seat":
-            client = self.clients.find(str(line["seat"]))
+            client = self.clients.named(str(line["seat"]))
             if client is not None and client.driver is not None:
                 client.driver.seat("{" + body_of(line))
         self.clients.wake()
@@ -57,17 +57,18 @@ class Hub:
 
     async def see(self, ws: WebSocket, role: Role) -> None:
         """Serve a state socket until it closes."""
-        if self.clients.is_full():
+        if not self._make_room(role):
             await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
             return
         if await self._is_over(ws):
             return
-        name, page = (ws.query_params.get(key, "")[:64] for key in ("client", "page"))
-        client = self.clients.join(role, name, page)
+        key, page = (ws.query_params.get(name, "")[:64] for name in ("key", "page"))
+        client = self.clients.join(role, key, page)
         if client.ws is not None:  # the page has lost that one, and we did not know
-            wire_of(client.ws).drop(STUCK, "the page has come again")
+            wire_of(client.ws.scope).drop(STUCK, "the page has come again")
         client.ws = ws
-        client.feed.put({"k": "you", "client": client.name, "role": role.name.lower()})
+        you = {"client": client.name, "key": client.key, "role": role.name.lower()}
+        client.feed.put({"k": "you", **you})
 
         def hear(text: str) -> None:
             self._hear_looker(client, text)
@@ -79,6 +80,17 @@ class Hub:
         finally:
             if client.ws is ws:
                 self._leave(client)
+
+    def _make_room(self, role: Role) -> bool:
+        """Whether another page of a role may come in; one of a lower role may have to leave."""
+        if not self.clients.is_full():
+            return True
+        least = self.clients.yielding(role)
+        if least is None or least.ws is None:
+            return False
+        least.is_here = False
+        wire_of(least.ws.scope).drop(STUCK, "somebody with a higher role needed this place")
+        return True
 
     def _hear_looker(self, client: Client, text: str) -> None:
         said = read(text)
@@ -118,19 +130,35 @@ class Hub:
     async def _forget(self, client: Client) -> None:
         await asyncio.sleep(REMEMBERED)
         if self.clients.forget(client) and client.role.acts:
-            state = self.simulation.state
-            for what in ("release", "guard_leave")[: 1 + (client.name in state.guards)]:
-                key = f"bye-{what}-{client.name}"
-                self.simulation.send({"id": key, "client": client.name, "do": what})
-            state.forget_seat(client.name)
+            self._give_back(client)
+
+    def _give_back(self, client: Client) -> None:
+        """What a page or program held that is gone for good, others may have."""
+        state = self.simulation.state
+        for what in ("release", "guard_leave")[: 1 + (client.name in state.guards)]:
+            key = f"bye-{what}-{client.name}"
+            self.simulation.send({"id": key, "client": client.name, "do": what})
+        state.forget_seat(client.name)
+
+    def new_program(self, role: Role) -> Client | None:
+        """A seat for a program; None if there are too many."""
+        now = time.monotonic()
+        for silent in self.clients.silent_programs(now):
+            self._give_back(silent)
+        return self.clients.add_program(role, now)
+
+    def dismiss(self, program: Client) -> None:
+        """Take back a seat that a program has not come to use."""
+        self.clients.remove(program)
+        self._give_back(program)
 
     # --- driving -------------------------------------------------------------------------
 
     async def drive(self, ws: WebSocket, role: Role) -> None:
         """Serve a driving socket until it closes; then its robots stop."""
-        client = self.clients.find(ws.query_params.get("client", ""))
-        if not role.acts or client is None or client.role is not role:
-            why = "may only look" if role is Role.LOOK else "no page of that name is open"
+        client = self.clients.find(ws.query_params.get("key", ""), role)
+        if not role.acts or client is None or not client.is_here:
+            why = "may only look" if role is Role.LOOK else "no open page has this key"
             await ws.send_denial_response(PlainTextResponse(why, 403))
             return
         if await self._is_over(ws):
@@ -194,7 +222,7 @@ class Hub:
         """Send and receive until one of both ends; nothing of it is left behind."""
         self._open.add(ws)
         if self.simulation.ended.is_set():  # while it was being accepted
-            wire_of(ws).drop(LEAVING, self.simulation.why)
+            wire_of(ws.scope).drop(LEAVING, self.simulation.why)
         tasks = [
             asyncio.ensure_future(self._send(ws, wake, following)),
             asyncio.ensure_future(self._receive(ws, hear, bucket)),
@@ -216,7 +244,7 @@ class Hub:
                 if text is None:
                     await wake.wait()
                 elif not await say(ws, text):
-                    wire_of(ws).drop(STUCK, "nothing was read for 5 s")
+                    wire_of(ws.scope).drop(STUCK, "nothing was read for 5 s")
                     return
 
     async def _receive(self, ws: WebSocket, hear: Hear, bucket: Bucket) -> None:
@@ -229,14 +257,14 @@ class Hub:
                     raise BadMessage("too many messages")
                 hear(text)
             except BadMessage as error:
-                wire_of(ws).drop(REFUSED, str(error)[:100])
+                wire_of(ws.scope).drop(REFUSED, str(error)[:100])
                 return
 
     async def close(self, why: str) -> None:
         """Tell all pages that it is over."""
         line = encode({"k": "bye", "why": why})
         for ws in list(self._open):
-            wire = wire_of(ws)
+            wire = wire_of(ws.scope)
             if not wire.waiting:
                 with suppress(Exception):
                     await ws.send_text(line)

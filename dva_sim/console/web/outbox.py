@@ -7,7 +7,8 @@ from collections import deque
 from typing import Any
 
 URGENT = ("emergency", "gone")
-MOST = 64  # actions that may wait, of each kind
+MOST = 64  # actions that may wait
+MOST_URGENT = 4096  # emergency stops and ends of drives that may wait, if the simulation hangs
 MOST_BATCHES = 8  # of samples that may wait, of a phone: at 40 ms each, as long as a drive lasts
 
 Asked = dict[str, Any]
@@ -43,8 +44,9 @@ class OutgoingLines:
         if kind == "gone":
             self._newest.pop((client, "input"), None)
             self._samples.pop(client, None)
-        queue = self._urgent if kind in URGENT else self._actions
-        if len(queue) >= MOST:
+        is_urgent = kind in URGENT
+        queue = self._urgent if is_urgent else self._actions
+        if len(queue) >= (MOST_URGENT if is_urgent else MOST):
             self.refused += 1
             return False
         queue.append(asked)

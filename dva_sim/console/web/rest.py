@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import secrets
+import time
 from typing import Any
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
+from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import MOST_BYTES, asked_of, check_role, id_of, read
-from dva_sim.console.web.checks import BadMessage
+from dva_sim.console.web.checks import BadMessage, NotAllowed
 from dva_sim.console.web.hub import Hub
+from dva_sim.console.web.simulation import Answer
 from dva_sim.console.web.state import RunState
 from dva_sim.worlds.geo import GeoFrame
 
 NOT_KEPT = {"Cache-Control": "no-store"}
 ROLE = "dva_sim.role"  # what is known of who asks, in a request's scope
-PROGRAM = "rest"  # the client of all requests that come from no page
+BODY_WITHIN = 10.0  # [s]
+PROGRAM = "program"  # with its role: the client of a request without a key
+# Actions that need a seat, or another thing of one's own, from then on.
+SEATING = ("take", "take_over", "manual_take", "phone_register", "guard_join", "room_join")
 
 
 def state_of(state: RunState, clients: int) -> dict[str, Any]:
@@ -117,66 +124,78 @@ class Rest:
     async def action(self, request: Request) -> Response:
         """`POST /api/actions`."""
         try:
-            said = await body_of_request(request)
+            said, role = await body_of_request(request), request.scope[ROLE]
             name = said.get("action")
+            client = self._client(said, role)
             if name == "gone":
-                return self._gone(said)
-            if problem_of := _not_by(request, name):
-                return problem_of
+                self._simulation.send({"do": "gone", "client": client})
+                return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
+            check_role(role, name)
             asked = asked_of(name, said.get("arguments", {}), self._simulation.labels)
-            asked["role"] = request.scope[ROLE].name.lower()
-            return await self._do(asked, said)
+            key = id_of(said.get("id"))
+            if name in SEATING and "key" not in said:
+                return await self._do_in_new_seat(asked, key, role)
+            return self._answer(await self._do(asked, key, client, role))
+        except NotAllowed as error:
+            return problem(403, str(error))
         except BadMessage as error:
             return problem(400, str(error))
 
     async def emergency(self, request: Request) -> Response:
         """`POST /api/emergency`: all robots, or some; before all else."""
         try:
-            said = await body_of_request(request)
-            said.setdefault("id", secrets.token_hex(8))
-            if not self._is_here(said.get("client")):
-                said.pop("client", None)  # whose socket has just broken may still stop a robot
+            said, role = await body_of_request(request), request.scope[ROLE]
             given = {"robots": said.get("robots", "all")}
             asked = asked_of("emergency", given, self._simulation.labels)
-            return await self._do(asked | {"role": request.scope[ROLE].name.lower()}, said)
+            known = self._hub.clients.find(said.get("key"), role)  # else anybody's, all the same
+            client = known.name if known is not None else _program(role)
+            key = id_of(said.get("id", secrets.token_hex(8)))
+            return self._answer(await self._do(asked, key, client, role))
         except BadMessage as error:
             return problem(400, str(error))
 
-    def _gone(self, said: dict[str, Any]) -> Response:
-        """A page says with its last breath that it goes; nothing is answered to that."""
-        self._simulation.send({"do": "gone", "client": self._client(said)})
-        return JSONResponse({"ok": True, "text": ""}, headers=NOT_KEPT)
-
-    def _client(self, said: dict[str, Any]) -> str:
-        """Who asks: a page that is open, or a program.
+    def _client(self, said: dict[str, Any], role: Role) -> str:
+        """The name of the page or program that asks.
 
         Raises:
-            BadMessage: no such page.
+            NotAllowed: it shows no key that belongs to a seat of its role.
         """
-        name = said.get("client", PROGRAM)
-        if name != PROGRAM and not self._is_here(name):
-            raise BadMessage("client: no page of that name is open")
-        return str(name)
+        if "key" in said:
+            known = self._hub.clients.find(said["key"], role)
+            if known is None:
+                raise NotAllowed("key: no open page and no program of this role has this key")
+            if known.asked:
+                known.asked = time.monotonic()
+            return known.name
+        if "client" in said:
+            raise NotAllowed("client: a name opens no seat; the key of that page or program does")
+        return _program(role)
 
-    def _is_here(self, name: Any) -> bool:
-        return isinstance(name, str) and self._hub.clients.find(name) is not None
+    async def _do_in_new_seat(self, asked: Answer, key: str, role: Role) -> Response:
+        """A program sits down: the answer has the key for its later requests."""
+        program = self._hub.new_program(role)
+        if program is None:
+            return problem(503, "too many programs have a seat")
+        line = await self._do(asked, key, program.name, role)
+        if not line.get("ok"):
+            self._hub.dismiss(program)
+            return self._answer(line)
+        return self._answer(line | {"client": program.name, "key": program.key})
 
-    async def _do(self, asked: dict[str, Any], said: dict[str, Any]) -> Response:
+    async def _do(self, asked: Answer, key: str, client: str, role: Role) -> Answer:
         """Ask the simulation, and wait until it has answered."""
-        asked["client"] = self._client(said)
-        asked["id"] = id_of(said.get("id"))
-        line = await self._simulation.answer(asked)
+        return await self._simulation.answer(
+            asked | {"id": key, "client": client, "role": role.name.lower()}
+        )
+
+    def _answer(self, line: Answer) -> Response:
         body = {"id": line["id"], "ok": bool(line.get("ok")), "text": line.get("text", "")}
+        body |= {name: line[name] for name in ("client", "key") if name in line}
         return JSONResponse(body, 504 if line.get("late") else 200, headers=NOT_KEPT)
 
 
-def _not_by(request: Request, name: Any) -> Response | None:
-    """The answer to an address that may not ask for this; None if it may."""
-    try:
-        check_role(request.scope[ROLE], name)
-    except BadMessage as error:
-        return problem(403, str(error))
-    return None
+def _program(role: Role) -> str:
+    return f"{PROGRAM}-{role.name.lower()}"
 
 
 async def body_of_request(request: Request) -> dict[str, Any]:
@@ -193,10 +212,13 @@ async def body_of_request(request: Request) -> dict[str, Any]:
         raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
     data = bytearray()
     try:
-        async for piece in request.stream():
-            data += piece
-            if len(data) > MOST_BYTES:
-                raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
+        async with asyncio.timeout(BODY_WITHIN):
+            async for piece in request.stream():
+                data += piece
+                if len(data) > MOST_BYTES:
+                    raise TooStrange(413, f"the body is longer than {MOST_BYTES} bytes")
+    except TimeoutError:
+        raise TooStrange(408, f"the body has not arrived within {BODY_WITHIN:g} s") from None
     except ClientDisconnect:
         raise TooStrange(400, "the body is not whole") from None
     try:

@@ -13,11 +13,11 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from dva_sim.console.web.actions import MOST_BYTES
-from dva_sim.console.web.sockets import WireProtocol
+from dva_sim.console.web.listener import WAITING, Listener
+from dva_sim.console.web.places import Place, Places
+from dva_sim.console.web.sockets import HttpProtocol
 from dva_sim.kernel.errors import ConfigError
 
-WAITING = 128  # connections that are not accepted yet
-MOST_CONNECTIONS = 400
 SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
 SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
 PING = 10.0  # [s]
@@ -52,6 +52,10 @@ def listen(host: str, port: int) -> socket.socket:
 class Server(uvicorn.Server):
     """A server that is ended by whoever started it, not by signals of its own."""
 
+    def protocol(self, place: Place) -> HttpProtocol:
+        """Return what serves a connection."""
+        return HttpProtocol(place, config=self.config, server_state=self.server_state, app_state={})
+
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         """Leave signals to the process."""
@@ -66,8 +70,7 @@ def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
     config = uvicorn.Config(
         app,
         ssl_certfile=certificate,
-        http="h11",
-        ws=WireProtocol,
+        http=HttpProtocol,
         ws_max_size=MOST_BYTES,
         ws_ping_interval=PING,
         ws_ping_timeout=PING,
@@ -78,7 +81,6 @@ def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
         access_log=False,
         proxy_headers=False,
         server_header=False,
-        limit_concurrency=MOST_CONNECTIONS,
         timeout_keep_alive=15,
         timeout_graceful_shutdown=0,
         h11_max_incomplete_event_size=MOST_BYTES,
@@ -89,7 +91,7 @@ def make_server(app: ASGIApp, certificate: Path | None = None) -> Server:
 class _Complaints(logging.StreamHandler):  # type: ignore[type-arg]
     """A mistake of ours in full, the first times; what clients sent, and how they ended, not."""
 
-    NOISE = ("Invalid", "Cancel", "Exceeded", "Unsupported", "No supported", "ASGI callable")
+    NOISE = ("Invalid", "Cancel", "Unsupported", "No supported", "ASGI callable")
 
     def __init__(self) -> None:
         super().__init__()
@@ -104,11 +106,16 @@ class _Complaints(logging.StreamHandler):  # type: ignore[type-arg]
             super().emit(record)
 
 
-async def serve(server: Server, sock: socket.socket, ended: asyncio.Event) -> None:
+async def serve(server: Server, sock: socket.socket, places: Places, ended: asyncio.Event) -> None:
     """Serve until the end."""
-    serving = asyncio.ensure_future(server.serve(sockets=[sock]))
+    server.config.load()
+    listener = Listener(sock, server.protocol, server.config.ssl, places)
+    accepting = asyncio.ensure_future(listener.run())
+    serving = asyncio.ensure_future(server.serve(sockets=[]))  # the listener accepts in its place
     waiting = asyncio.ensure_future(ended.wait())
-    await asyncio.wait({serving, waiting}, return_when=asyncio.FIRST_COMPLETED)
+    tasks = {accepting, serving, waiting}
+    await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     server.should_exit = True
+    accepting.cancel()
     waiting.cancel()
     await serving

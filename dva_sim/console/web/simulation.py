@@ -1,7 +1,7 @@
 """What the web process knows of the simulation, and asks of it: state, and answers to come.
 
-An answer belongs to the id of its question. Whoever repeats a question waits for the same answer;
-the simulation does what is asked once.
+An answer belongs to the id of its question. A repeated question waits for the same answer; the
+simulation does once what is asked.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 from dva_sim.console.web.actions import CONTROL_ROOM
 from dva_sim.console.web.checks import Labels
-from dva_sim.console.web.outbox import Asked
+from dva_sim.console.web.outbox import URGENT, Asked
 from dva_sim.console.web.pipes import Lines, PipeEnd
 from dva_sim.console.web.state import RunState
 
@@ -38,7 +38,8 @@ OVER_THE_LINK = (
 )
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
-MOST_PENDING = 256  # questions without an answer
+MOST_PENDING = 256  # questions without an answer; an emergency stop is always asked for
+MOST_WAITING = 4  # for the same answer
 
 Answer = dict[str, Any]
 Told = Callable[[Answer], object]
@@ -131,22 +132,31 @@ class Simulation:
         return self._pipe.send(asked)
 
     def ask(self, asked: Asked, told: Told) -> None:
-        """Ask for something; `told` gets the answer: there may be no room, or nobody there."""
-        key = asked["id"]
+        """Ask for something; `told` gets the answer: there may be no room, or nobody there.
+
+        Ids are those of the client that asks: the same id of another one is another question.
+        """
+        given = asked["id"]
+        key = f"{asked['client']}/{given}"
+
+        def answered(line: Answer) -> None:
+            told(line | {"id": given})
+
         if self.ended.is_set():
-            told({"k": "done", "id": key, "ok": False, "text": self.why})
+            answered({"k": "done", "ok": False, "text": self.why})
             return
+        is_urgent = asked["do"] in URGENT
         waiting = self._pending.get(key)
-        if waiting is not None and len(waiting) < 4:
-            waiting.append(told)
+        if waiting is not None and len(waiting) < MOST_WAITING:
+            waiting.append(answered)
             return
-        full = waiting is not None or len(self._pending) >= MOST_PENDING
-        if full or not self._pipe.send(asked):
-            told({"k": "done", "id": key, "ok": False, "text": "too much is asked at once"})
+        full = waiting is not None or (len(self._pending) >= MOST_PENDING and not is_urgent)
+        if full or not self._pipe.send(asked | {"id": key}):
+            answered({"k": "done", "ok": False, "text": "too much is asked at once"})
             return
-        self._pending[key] = [told]
+        self._pending[key] = [answered]
         patience = LONG if asked["do"] in OVER_THE_LINK else PATIENCE
-        asyncio.get_running_loop().call_later(patience, self._give_up, key, told, patience)
+        asyncio.get_running_loop().call_later(patience, self._give_up, key, answered, patience)
 
     def _give_up(self, key: str, told: Told, patience: float) -> None:
         if told in self._pending.get(key, ()):

@@ -1,4 +1,4 @@
-"""A response that goes on until its viewer leaves, or takes nothing for too long."""
+"""A response that goes on until its viewer leaves, or is too slow for the pictures."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from contextlib import aclosing, suppress
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from dva_sim.console.web.camera import BOUNDARY, CameraStreams
+from dva_sim.console.web.camera import BOUNDARY, CameraStreams, Viewer
+from dva_sim.console.web.sockets import wire_of
 
-STALLED = 20.0  # a viewer that takes nothing for so long is gone [s]
+STALLED = 5.0  # a viewer that has not taken a picture within this is cut [s]
 
 
 class PictureStream(Response):
@@ -18,23 +19,22 @@ class PictureStream(Response):
 
     Args:
         cameras: All pictures.
-        robot: Whose.
+        viewer: Who looks.
     """
 
     media_type = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
 
-    def __init__(self, cameras: CameraStreams, robot: int) -> None:
-        super().__init__(headers={"Cache-Control": "no-store"})
+    def __init__(self, cameras: CameraStreams, viewer: Viewer) -> None:
+        super().__init__(headers={"Cache-Control": "no-store", "Connection": "close"})
         del self.headers["content-length"]
-        self._cameras, self._robot = cameras, robot
+        self._cameras, self._viewer = cameras, viewer
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send until the viewer leaves."""
+        """Send until the viewer leaves, or is cut."""
+        wire = wire_of(scope)
+        wire.transport.set_write_buffer_limits(high=0)  # a picture has to be taken before the next
         start = {"type": "http.response.start", "status": 200, "headers": self.raw_headers}
         await send(start)
-        if scope["method"] == "HEAD":
-            await send({"type": "http.response.body"})
-            return
         tasks = [asyncio.ensure_future(self._send(send)), asyncio.ensure_future(_left(receive))]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -42,10 +42,13 @@ class PictureStream(Response):
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            self._cameras.leave(self._viewer)
+            if wire.waiting:
+                wire.cut()
 
     async def _send(self, send: Send) -> None:
         with suppress(OSError, TimeoutError):
-            async with aclosing(self._cameras.stream(self._robot)) as parts:
+            async with aclosing(self._cameras.stream(self._viewer)) as parts:
                 async for part in parts:
                     message = {"type": "http.response.body", "body": part, "more_body": True}
                     async with asyncio.timeout(STALLED):

@@ -185,22 +185,36 @@ def test_a_connection_that_hangs_is_lost_after_three_attempts_and_the_robot_is_k
     assert len(hand.sent("phone_register")) == len(hand.sent("start")) == 1
 
 
-UNREACHED = """() => { window.stops = []; const usual = window.fetch;
+UNREACHED = """() => { window.stops = []; window.usual = window.fetch;
 window.fetch = (url, about) => url === '/api/emergency'
   ? (window.stops.push(JSON.parse(about.body).id), Promise.reject(new TypeError('no network')))
-  : usual(url, about); }"""
+  : window.usual(url, about); }"""
 
 
-def test_an_emergency_stop_that_reaches_nobody_is_tried_three_times_and_told(hand) -> None:
-    hand.register()
-    hand.take()
-    expect(hand.page.get_by_text("is in your hands")).to_be_visible()
+def test_an_emergency_stop_whose_request_reaches_nobody_goes_over_the_socket(hand) -> None:
+    hand.drive()
     hand.page.evaluate(UNREACHED)
     hand.tap("Emergency stop")
-    hand.alert("link lost: the emergency stop did not reach the console in 3 attempts")
+    assert becomes(lambda: not driving(hand))
+    assert becomes(lambda: len(hand.sent("emergency")) == 1)
+    assert hand.page.evaluate("window.stops") == [hand.sent("emergency")[0]["id"]]
+    expect(hand.page.get_by_text("not confirmed")).to_have_count(0)
+
+
+def test_an_emergency_stop_is_asked_for_again_in_red_until_it_is_confirmed(hand) -> None:
+    hand.drive()
+    hand.page.evaluate(UNREACHED)
+    hand.page.evaluate("window.hangs = true")
+    hand.tap("Emergency stop")
+    hand.alert("Emergency stop not confirmed")
+    hand.alert("Attempt 4")
     stops = hand.page.evaluate("window.stops")
-    assert len(stops) == 3
+    assert len(stops) >= 3
     assert len(set(stops)) == 1  # it is done once
+    hand.page.evaluate("window.fetch = window.usual")
+    expect(hand.page.get_by_text("not confirmed")).to_have_count(0)
+    hand.page.evaluate("window.hangs = false")
+    assert not driving(hand)
 
 
 def test_each_step_opens_the_next_and_wrong_fields_are_marked(hand) -> None:

@@ -117,7 +117,7 @@
  * @typedef {{t: number, seat: string, guard: number, label: string, doing: string,
  *   order: GuardOrder | null, alert: string}} Guard
  *
- * @typedef {{client: string, role: string}} You
+ * @typedef {{client: string, key: string, role: string}} You
  * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
  *   address: string}, devices?: Device[], proposal?: Proposal, event?: number, hand?: number}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection

@@ -6,8 +6,8 @@ import {
   tracks,
   windows, you,
 } from '../store.js';
-import { rememberClient } from './client_id.js';
 import { heardPong } from './round_trip.js';
+import { rememberKey } from './seat_key.js';
 import { hear, hearAnything } from './world_time.js';
 
 const STORY_KEPT = 200;
@@ -43,8 +43,8 @@ const LINES = {
     if (line.seat === you.value?.client) guard.value = line.label ? line : null;
   },
   you: (line) => {
-    you.value = { client: line.client, role: line.role };
-    rememberClient(line.client);
+    you.value = { client: line.client, key: line.key, role: line.role };
+    rememberKey(line.key);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
   devices: (line) => (devices.value = line.devices),

@@ -3,7 +3,7 @@ import { effect } from '../../vendor/preact.js';
 import { connection, mayDrive, reaches, you } from '../store.js';
 import { settle, socketLost } from './actions.js';
 import { apply } from './apply.js';
-import { PAGE, rememberedClient } from './client_id.js';
+import { PAGE, rememberedKey } from './seat_key.js';
 import { keepAsking } from './round_trip.js';
 import { isDriveSocket, replaceDriveSocket } from './wire.js';
 
@@ -31,8 +31,8 @@ function address(path) {
 
 /** Begin to listen, for as long as the page lives. */
 export function connect() {
-  const old = you.value?.client ?? rememberedClient();
-  const query = new URLSearchParams({ page: PAGE, ...(old && { client: old }) });
+  const old = you.value?.key ?? rememberedKey();
+  const query = new URLSearchParams({ page: PAGE, ...(old && { key: old }) });
   const socket = new WebSocket(address(`/ws/state?${query}`));
   count = NaN;
   state = socket;
@@ -115,31 +115,31 @@ export function look(logs, tables) {
 
 const isLooking = () => looked.tables.length > 0 || Object.keys(looked.logs).length > 0;
 
-/** Open the socket for driving whenever this page may, under the name that it has got. */
+/** Open the socket for driving whenever this page may, with the key of its seat. */
 export function keepDriveSocket() {
   effect(() => {
-    const client = mayDrive.value ? you.value?.client : null;
+    const key = mayDrive.value ? you.value?.key : null;
     reaches.value = false;
-    replaceDriveSocket(client ? open(client) : null);
+    replaceDriveSocket(key ? open(key) : null);
   });
 }
 
-/** @param {string} client */
-function open(client) {
-  const socket = new WebSocket(address(`/ws/drive?client=${encodeURIComponent(client)}`));
+/** @param {string} key */
+function open(key) {
+  const socket = new WebSocket(address(`/ws/drive?key=${encodeURIComponent(key)}`));
   socket.onopen = () => {
     if (isDriveSocket(socket)) reaches.value = true;
   };
   socket.onmessage = (event) => {
     const line = JSON.parse(event.data);
-    if (line.k === 'done') settle(line);
+    if (line.k === 'done') settle(line.id ?? '', line);
     else apply(line);
   };
   socket.onclose = () => {
     const unexpected = isDriveSocket(socket);
     if (unexpected) reaches.value = false;
     socketLost(unexpected);
-    if (unexpected) window.setTimeout(() => reopen(socket, client), LONGEST_WAIT_MS / 4);
+    if (unexpected) window.setTimeout(() => reopen(socket, key), LONGEST_WAIT_MS / 4);
   };
   return socket;
 }
@@ -147,8 +147,8 @@ function open(client) {
 /**
  * Unless another one has taken its place meanwhile.
  * @param {WebSocket} old
- * @param {string} client
+ * @param {string} key
  */
-function reopen(old, client) {
-  if (isDriveSocket(old) && you.value?.client === client) replaceDriveSocket(open(client));
+function reopen(old, key) {
+  if (isDriveSocket(old) && you.value?.key === key) replaceDriveSocket(open(key));
 }

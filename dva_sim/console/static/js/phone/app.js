@@ -1,9 +1,10 @@
 /** The frame of the five screens: where one is, how the link is, what is wrong, emergency stop. */
 import { html, render, useEffect, useRef } from '../../vendor/preact.js';
 import { connection, notice, scene, seat } from '../store.js';
-import { stopRobots } from '../net/actions.js';
+import { stopRobots } from '../net/emergency.js';
 import { interrupted } from '../drive/hold.js';
 import { Icon } from '../ui/icon.js';
+import { UnconfirmedStop } from '../ui/unconfirmed_stop.js';
 import { AuthenticationScreen } from './authentication.js';
 import { CalibrationScreen } from './calibration.js';
 import { choices } from './choices.js';
@@ -77,6 +78,7 @@ function Alerts() {
     interrupted.value && `${interrupted.value} The robot was stopped; start again when you are ready.`,
   ];
   return html`<div class="alerts" role="alert">
+    <${UnconfirmedStop} />
     ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
     ${notice.value && !texts.includes(notice.value) &&
     html`<p class="warning">${notice.value}

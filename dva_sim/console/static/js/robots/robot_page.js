@@ -1,7 +1,7 @@
 /** The windows of one robot: what it hears, how its wheels turn, and hands on it. */
 import { html, useEffect } from '../../vendor/preact.js';
 import { isPast, mayDrive, modeOf } from '../store.js';
-import { stopRobots } from '../net/actions.js';
+import { stopRobots } from '../net/emergency.js';
 import { watch } from '../net/sockets.js';
 import { CameraPicture } from '../drive/camera.js';
 import { Icon, ModeMark } from '../ui/icon.js';

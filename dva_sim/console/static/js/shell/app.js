@@ -17,6 +17,7 @@ import { RequestsPage } from '../requests/requests_page.js';
 import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
+import { UnconfirmedStop } from '../ui/unconfirmed_stop.js';
 import { Bar } from './bar.js';
 import { PhoneButton, PhoneCode } from './phones.js';
 import { addressOf, page } from './route.js';
@@ -116,10 +117,12 @@ function Warnings() {
   const limit = Math.round(1000 * (scene.value?.lag_limit_s ?? 0.25));
   const ended = !['open', 'connecting', 'lost'].includes(connection.value);
   return html`<div class="warnings" role="alert">
+    <${UnconfirmedStop} />
     ${held &&
-    html`<p class="warning">Robots are held: the world runs ${Math.round(1000 * lag)} ms behind
-      real time, and beyond ${limit} ms what you see is no longer what you steer. They can be
-      started again when it has caught up.</p>`}
+    html`<p class="warning">Robots were stopped: the world fell more than ${limit} ms behind real
+      time, so what you saw was no longer what you steered. ${lag > limit / 1000
+        ? `It is ${Math.round(1000 * lag)} ms behind now.`
+        : 'It has caught up.'} Driving is possible again once it has kept up for a moment.</p>`}
     ${connection.value === 'lost' &&
     html`<p class="warning">The connection to the world is lost; what you see is old. Robots that
       you drove have been stopped. Trying again …</p>`}

@@ -3,7 +3,8 @@ import { html } from '../../vendor/preact.js';
 import {
   clock, connection, isAttached, isModelled, isPast, link, maySteer, replay, scene, you,
 } from '../store.js';
-import { act, emergencyStop } from '../net/actions.js';
+import { act } from '../net/actions.js';
+import { emergencyStop } from '../net/emergency.js';
 import { roundTrip } from '../net/round_trip.js';
 import { pageAge, worldNow } from '../net/world_time.js';
 import { alarms } from '../map/shown.js';

@@ -1,5 +1,5 @@
 /** Keys that act on every page. */
-import { emergencyStop } from '../net/actions.js';
+import { emergencyStop } from '../net/emergency.js';
 import { isPast } from '../store.js';
 import { openHelp } from '../help/help.js';
 

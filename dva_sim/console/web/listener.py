@@ -1,0 +1,138 @@
+"""Accepts the connections of a port, a few at a time, and cuts those that stay silent.
+
+The event loop also carries what open pages ask for, an emergency stop among it, so a flood of new
+connections must not occupy it for long: a silent connection costs next to nothing, and no more than
+a few TLS handshakes are computed in a row.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import resource
+import socket
+import ssl
+import time
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from dva_sim.console.web.places import MOST, MOST_SERVED, SILENT, Place, Places
+
+WAITING: Final = 1024  # connections that are not accepted yet
+AT_ONCE: Final = 32  # connections accepted before the loop serves others again
+SERVED_AT_ONCE, HANDSHAKES_AT_ONCE = (
+    32,
+    4,
+)  # and of those that have said a word, without and with TLS
+SWEEP: Final = 1.0  # from one look at silent connections to the next [s]
+PAUSE: Final = 0.2  # when no file can be opened [s]
+SPARE_FILES: Final = 128  # that are no connections: pipes, pages' files, the audit log
+SHUTDOWN: Final = 1.0  # for the end of a TLS connection [s]
+
+
+def fitting_places(listeners: int) -> Places:
+    """Return the places of one of some ports: fewer where a process may open few files."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = listeners * MOST + SPARE_FILES
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        most = wanted if hard == resource.RLIM_INFINITY else min(hard, wanted)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))
+        wanted = max(soft, most)
+    most = min(MOST, max(16, (wanted - SPARE_FILES) // listeners))
+    return Places(most, MOST_SERVED * most // MOST)
+
+
+class Listener:
+    """Accepts connections of one port.
+
+    Args:
+        sock: A listening socket that does not block.
+        make: Makes the protocol of a connection.
+        context: For TLS; None: without.
+        places: Of the port's connections.
+    """
+
+    def __init__(
+        self,
+        sock: socket.socket,
+        make: Callable[[Place], asyncio.Protocol],
+        context: ssl.SSLContext | None,
+        places: Places,
+    ) -> None:
+        self._sock, self._make, self._context, self._places = sock, make, context, places
+        self._at_once = SERVED_AT_ONCE if context is None else HANDSHAKES_AT_ONCE
+        self._speaking: deque[tuple[socket.socket, Place]] = deque()
+        self._connecting: set[asyncio.Task[None]] = set()
+
+    async def run(self) -> None:
+        """Accept until cancelled."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._sock, self._accept)
+        try:
+            while True:
+                await asyncio.sleep(SWEEP)
+                self._places.sweep(time.monotonic())
+        finally:
+            loop.remove_reader(self._sock)
+            self._sock.close()
+            for place in list(self._places.taken):
+                if not place.is_served:
+                    place.drop()
+
+    def _accept(self) -> None:
+        for _ in range(AT_ONCE):
+            try:
+                connection, _ = self._sock.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError:  # no file is left, here or in the whole system
+                loop = asyncio.get_running_loop()
+                loop.remove_reader(self._sock)
+                loop.call_later(PAUSE, self._resume)
+                return
+            place = self._places.enter(time.monotonic())
+            place.drop = partial(self._close, connection)
+            asyncio.get_running_loop().add_reader(connection, self._heard, connection, place)
+
+    def _close(self, connection: socket.socket) -> None:
+        asyncio.get_running_loop().remove_reader(connection)
+        connection.close()
+
+    def _heard(self, connection: socket.socket, place: Place) -> None:
+        """A connection has said its first word."""
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(connection)
+        if not self._speaking:
+            loop.call_soon(self._serve_some)
+        self._speaking.append((connection, place))
+        place.busy = True  # until it can be read what it says
+
+    def _serve_some(self) -> None:
+        for _ in range(min(self._at_once, len(self._speaking))):
+            connection, place = self._speaking.popleft()
+            if place in self._places.taken:
+                task = asyncio.ensure_future(self._connect(connection, place))
+                place.drop = task.cancel
+                self._connecting.add(task)
+                task.add_done_callback(self._connecting.discard)
+        if self._speaking:
+            asyncio.get_running_loop().call_soon(self._serve_some)
+
+    def _resume(self) -> None:
+        if self._sock.fileno() >= 0:
+            asyncio.get_running_loop().add_reader(self._sock, self._accept)
+
+    async def _connect(self, connection: socket.socket, place: Place) -> None:
+        """Shake hands, where that is needed; the protocol serves the connection from then on."""
+        within = {} if self._context is None else _TLS
+        try:
+            await asyncio.get_running_loop().connect_accepted_socket(
+                lambda: self._make(place), connection, ssl=self._context, **within
+            )
+        except (OSError, asyncio.CancelledError):
+            place.leave()
+            connection.close()
+
+
+_TLS: Final = {"ssl_handshake_timeout": SILENT, "ssl_shutdown_timeout": SHUTDOWN}

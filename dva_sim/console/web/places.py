@@ -1,0 +1,114 @@
+"""Connections of a port: bounded in number, and the least important one makes room for a newcomer.
+
+Anybody can open a connection, so one on which no token was shown never keeps out another: it is cut
+after a few seconds, and at once if all places are taken. Connections with a token yield to those
+with a token of a higher role. Pure: without a clock and without sockets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from dva_sim.console.web.access import Role
+
+MOST = 512  # connections of a port
+MOST_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
+SILENT = 5.0  # without a token a connection is cut after this [s]
+IDLE = 20.0  # with one, between two requests [s]; longer than the server keeps it open itself
+
+
+@dataclass(eq=False)
+class Place:
+    """One connection.
+
+    Attributes:
+        places: The connections that it is one of.
+        since: When it was made, or its newest request began or ended [s].
+        role: The role that its newest request showed.
+        busy: Whether it is being set up, a request is in progress, or a WebSocket is open.
+        drop: Cuts the connection.
+    """
+
+    places: Places = field(repr=False)
+    since: float
+    role: Role = Role.NOBODY
+    busy: bool = False
+    drop: Callable[[], object] = field(default=lambda: None, repr=False)
+
+    @property
+    def is_served(self) -> bool:
+        """Whether a request with a token is in progress."""
+        return self.busy and self.role > Role.NOBODY
+
+    def begin(self, role: Role, now: float, *, is_limited: bool = True) -> bool:
+        """Note a request: False if it has to be refused, as too many are in progress.
+
+        Args:
+            role: Shown with the request.
+            now: Time [s].
+            is_limited: Whether the limit applies to it.
+        """
+        self.role, self.busy, self.since = role, True, now
+        return not (is_limited and self.is_served) or self.places.bear(self)
+
+    def end(self, now: float) -> None:
+        """Note that the request is answered, or its WebSocket is closed."""
+        self.busy, self.since = False, now
+
+    def leave(self) -> None:
+        """Note that the connection is closed; may be repeated."""
+        self.places.taken.pop(self, None)
+
+
+class Places:
+    """The connections of a port.
+
+    Args:
+        most: Connections at once.
+        most_served: Connections at once with a token and a request in progress.
+
+    Attributes:
+        taken: The connections, in the order in which they were made.
+        dropped: Number of connections that were cut, by the reason.
+    """
+
+    def __init__(self, most: int = MOST, most_served: int = MOST_SERVED) -> None:
+        self._most, self._most_served = most, most_served
+        self.taken: dict[Place, None] = {}
+        self.dropped = {"silent": 0, "for a newcomer": 0, "for a higher role": 0}
+
+    def enter(self, now: float) -> Place:
+        """Return the place of a new connection; if all are taken, another connection is cut."""
+        if len(self.taken) >= self._most:
+            free = [place for place in self.taken if not place.is_served]
+            self._drop(min(free or self.taken, key=_importance), "for a newcomer")
+        place = Place(self, now)
+        self.taken[place] = None
+        return place
+
+    def bear(self, place: Place) -> bool:
+        """Return whether a request may be served; a lower role's connection may be cut for it."""
+        served = [each for each in self.taken if each.is_served]
+        if len(served) <= self._most_served:
+            return True
+        least = min(served, key=_importance)
+        if least.role >= place.role:
+            return False
+        self._drop(least, "for a higher role")
+        return True
+
+    def sweep(self, now: float) -> None:
+        """Cut the connections that have been silent for too long."""
+        for place in list(self.taken):
+            if not place.is_served and now - place.since > (IDLE if place.role else SILENT):
+                self._drop(place, "silent")
+
+    def _drop(self, place: Place, why: str) -> None:
+        place.leave()
+        self.dropped[why] += 1
+        place.drop()
+
+
+def _importance(place: Place) -> tuple[Role, bool, float]:
+    return place.role, place.busy, place.since

@@ -1,0 +1,106 @@
+"""Connections that ask for nothing keep nobody out: an emergency stop and a page get through."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import ssl
+import subprocess
+import sys
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from console_served import serving
+from patience import PATIENCE_S
+from websockets.sync.client import connect
+
+FLOODING = Path(__file__).parents[1] / "flooding.py"
+COUNT = 700  # more than there are places
+
+
+@pytest.fixture(scope="module")
+def console(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("certificates")
+    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(folder))
+    with serving(*words) as served:
+        yield served
+
+
+@contextmanager
+def flooded(port, *words):
+    """So many connections, and a new one for each that is cut."""
+    command = [sys.executable, str(FLOODING), "127.0.0.1", str(port), str(COUNT), *words]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL) as process:
+        try:
+            assert process.stdout.readline() == b"open\n"
+            yield
+        finally:
+            process.stdin.close()
+            process.wait(PATIENCE_S)
+
+
+def stop(served, port, tls):
+    """An emergency stop by a request on a connection of its own; status and answer."""
+
+    def simulate():
+        asked = served.next_asked("emergency")
+        served.say({"k": "done", "id": asked["id"], "ok": True, "text": "stopped"})
+
+    thread = Thread(target=simulate)
+    thread.start()
+    kind = http.client.HTTPSConnection if tls else http.client.HTTPConnection
+    more = {"context": ssl._create_unverified_context()} if tls else {}
+    connection = kind("127.0.0.1", port, timeout=PATIENCE_S, **more)
+    headers = {"Content-Type": "application/json", "Authorization": f"Bearer {served.drive}"}
+    connection.request("POST", "/api/emergency", "{}", headers)
+    answer = connection.getresponse()
+    found = answer.status, json.loads(answer.read())
+    connection.close()
+    thread.join()
+    return found
+
+
+@pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
+def test_under_a_flood_of_connections_a_stop_and_a_page_get_through(console, tls):
+    port = int(console.serving["phone"].split(":")[2].split("/")[0]) if tls else console.port
+    more = {"ssl": ssl._create_unverified_context()} if tls else {}
+    scheme = "wss" if tls else "ws"
+    headers = {"Authorization": f"Bearer {console.drive}"}
+
+    def page():
+        return connect(f"{scheme}://127.0.0.1:{port}/ws/state", additional_headers=headers, **more)
+
+    with page() as before, flooded(port, *(["--tls"] if tls else [])):
+        for _ in range(3):
+            status, answer = stop(console, port, tls)
+            assert (status, answer["ok"]) == (200, True)
+        with page() as late:
+            assert json.loads(late.recv(PATIENCE_S))["k"] == "you"
+        console.say({"k": "story", "t": 1, "who": "a", "what": "b", "kind": "event"})
+        while json.loads(before.recv(PATIENCE_S))["k"] != "story":
+            pass  # a page that was open stays open
+
+
+@pytest.mark.system
+def test_a_silent_connection_is_cut_within_seconds_and_a_slow_request_too(console):
+    silent = socket.create_connection(("127.0.0.1", console.port), PATIENCE_S)
+    slow = socket.create_connection(("127.0.0.1", console.port), PATIENCE_S)
+    slow.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Slow: ")
+    for raw in (silent, slow):
+        with suppress(ConnectionResetError):
+            assert raw.recv(100) == b""
+        raw.close()
+
+
+@pytest.mark.system
+def test_a_body_that_does_not_come_is_not_waited_for_forever(console):
+    with socket.create_connection(("127.0.0.1", console.port), PATIENCE_S) as raw:
+        raw.sendall(
+            f"POST /api/actions HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+            f"Content-Length: 100\r\nAuthorization: Bearer {console.drive}\r\n\r\n".encode()
+        )
+        assert raw.recv(100).split()[1] == b"408"

@@ -1,0 +1,100 @@
+"""Which connection makes room for which: those without a token first, a higher role before all."""
+
+from __future__ import annotations
+
+from dva_sim.console.web.access import Role
+from dva_sim.console.web.places import IDLE, SILENT, Places
+
+
+def entered(places, now, cut, name):
+    """A connection that notes its name when it is cut."""
+    place = places.enter(now)
+    place.drop = lambda: cut.append(name)
+    return place
+
+
+def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
+    places, cut = Places(most=3, most_served=2), []
+    first = entered(places, 0.0, cut, "first")
+    for now in (1.0, 2.0):
+        entered(places, now, cut, f"at {now}")
+    assert first.begin(Role.LOOK, 3.0)
+    entered(places, 4.0, cut, "newcomer")
+    assert cut == ["at 1.0"]
+    assert len(places.taken) == 3
+
+
+def test_a_connection_that_is_being_set_up_outlives_one_that_has_said_nothing():
+    places, cut = Places(most=2, most_served=1), []
+    speaking = entered(places, 0.0, cut, "speaking")
+    speaking.busy = True
+    entered(places, 1.0, cut, "silent")
+    entered(places, 2.0, cut, "newcomer")
+    assert cut == ["silent"]
+
+
+def test_a_request_with_a_token_is_never_cut_for_a_newcomer():
+    places, cut = Places(most=2, most_served=1), []
+    page = entered(places, 0.0, cut, "page")
+    assert page.begin(Role.LOOK, 0.0)
+    for now in range(100):
+        entered(places, float(now), cut, "stranger")
+    assert set(cut) == {"stranger"}
+    assert places.dropped["for a newcomer"] == 99
+
+
+def test_silence_is_cut_after_seconds_and_idleness_with_a_token_later():
+    places, cut = Places(), []
+    entered(places, 0.0, cut, "silent")
+    idle = entered(places, 0.0, cut, "idle")
+    idle.begin(Role.DRIVE, 0.0)
+    slow = entered(places, 0.0, cut, "refused and slow")
+    slow.begin(Role.NOBODY, 0.0)
+    places.sweep(SILENT)
+    assert cut == []
+    idle.end(SILENT)
+    places.sweep(SILENT + 0.1)
+    assert cut == ["silent", "refused and slow"]
+    places.sweep(SILENT + IDLE + 0.1)
+    assert cut[2:] == ["idle"]
+
+
+def test_beyond_the_limit_a_lower_role_yields_and_the_same_role_is_refused():
+    places, cut = Places(most=10, most_served=2), []
+    lookers = [entered(places, float(n), cut, f"looker {n}") for n in range(3)]
+    assert [place.begin(Role.LOOK, 5.0 + n) for n, place in enumerate(lookers)] == [
+        True,
+        True,
+        False,
+    ]
+    lookers[2].end(9.0)
+    supervisor = entered(places, 9.0, cut, "supervisor")
+    assert supervisor.begin(Role.SUPERVISE, 9.0)
+    assert cut == ["looker 0"]
+
+
+def test_what_is_outside_the_limits_is_served_however_many_are():
+    places, cut = Places(most=10, most_served=1), []
+    assert entered(places, 0.0, cut, "page").begin(Role.SUPERVISE, 0.0)
+    assert not entered(places, 0.0, cut, "page").begin(Role.SUPERVISE, 0.0)
+    assert entered(places, 0.0, cut, "stop").begin(Role.DRIVE, 0.0, is_limited=False)
+    assert cut == []
+
+
+def test_more_stops_in_progress_than_there_are_places_let_a_newcomer_in_still():
+    places, cut = Places(most=3, most_served=1), []
+    for n in range(3):
+        assert entered(places, float(n), cut, n).begin(Role.DRIVE, float(n), is_limited=False)
+    entered(places, 9.0, cut, "newcomer")
+    assert cut == [0]
+
+
+def test_a_place_that_is_left_counts_no_more():
+    places, cut = Places(most=5, most_served=1), []
+    page = entered(places, 0.0, cut, "page")
+    assert page.begin(Role.LOOK, 0.0)
+    page.leave()
+    page.leave()
+    page.end(1.0)
+    assert entered(places, 1.0, cut, "next").begin(Role.LOOK, 1.0)
+    assert cut == []

@@ -1,0 +1,135 @@
+"""A seat opens with its key alone: names are public, and a lesser token does nothing in it."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from console_served import serving
+from patience import PATIENCE_S
+from websockets.exceptions import InvalidStatus
+
+
+@pytest.fixture(scope="module")
+def console():
+    with serving() as served:
+        served.supervise = served.serving["supervise"].partition("?token=")[2]
+        yield served
+
+
+@pytest.fixture
+def page(console):
+    """A supervisor's page that drives."""
+    page = console.page(console.supervise)
+    console.say({"k": "seat", "t": 5, "seat": page.client, "phase": "driving", "drives": []})
+    with page.driving() as page.drive:
+        console.asked_so_far()
+        yield page
+    page.close()
+
+
+def act(console, token, action, ok=True, **about):
+    """An action of a program: the answer, and what the simulation was asked."""
+    arguments = about.pop("arguments", {})
+    body = {"id": "a-1", "action": action, "arguments": arguments, **about}
+    with ThreadPoolExecutor(1) as other:
+        told = other.submit(console.ask, "/api/actions", "POST", body, token)
+        asked = console.next_asked(action)
+        console.say({"k": "done", "id": asked["id"], "ok": ok, "text": "done"})
+        return told.result(PATIENCE_S).json, asked
+
+
+def test_a_name_is_public_and_a_key_is_nowhere_but_with_its_owner(console, page):
+    looker = console.page(console.look)
+    seen = [looker.next("snap"), console.ask("/api/state", token=console.look).json]
+    assert all(page.client in json.dumps(line) for line in seen)
+    assert page.key not in json.dumps(seen)
+    assert looker.key != page.key
+    looker.close()
+
+
+@pytest.mark.parametrize("role", ["drive", "supervise"])
+@pytest.mark.parametrize("action", ["release", "stop", "gone", "decline"])
+def test_by_its_name_nobody_acts_in_the_seat_of_a_page(console, page, role, action):
+    token = getattr(console, role)
+    for shown in (
+        {"client": page.client},
+        {"key": page.client},
+        {"client": page.client, "key": ""},
+    ):
+        body = {"id": "x", "action": action, "arguments": {}, **shown}
+        answer = console.ask("/api/actions", "POST", body, token)
+        assert answer.status == 403
+        assert "key" in answer.json["text"]
+    assert [line for line in console.asked_so_far() if line["do"] != "watch"] == []
+
+
+def test_a_lesser_token_does_nothing_in_a_seat_whose_key_it_has(console, page):
+    body = {"id": "x", "action": "release", "arguments": {}, "key": page.key}
+    assert console.ask("/api/actions", "POST", body, console.drive).status == 403
+    with pytest.raises(InvalidStatus) as error:
+        console.socket(f"/ws/drive?key={page.key}", console.drive)
+    assert error.value.response.status_code == 403
+    assert [line for line in console.asked_so_far() if line["do"] != "watch"] == []
+
+
+def test_by_its_name_nobody_replaces_the_driving_socket_of_a_page(console, page):
+    for shown in (f"client={page.client}", f"key={page.client}", ""):
+        with pytest.raises(InvalidStatus) as error:
+            console.socket(f"/ws/drive?{shown}", console.supervise)
+        assert error.value.response.status_code == 403
+    back = console.socket(f"/ws/state?client={page.client}&page=", console.supervise)
+    assert json.loads(back.recv(PATIENCE_S))["client"] != page.client
+    back.close()
+    assert [
+        line["do"] for line in console.asked_so_far() if line.get("client") == page.client
+    ] == []
+
+
+def test_an_emergency_with_a_foreign_name_stops_and_is_of_a_program_of_its_own_role(console, page):
+    body = {"id": "e-1", "client": page.client}
+    with ThreadPoolExecutor(1) as other:
+        told = other.submit(console.ask, "/api/emergency", "POST", body, console.drive)
+        asked = console.next_asked("emergency")
+        console.say({"k": "done", "id": asked["id"], "ok": True, "text": "stopped"})
+        assert told.result(PATIENCE_S).json["ok"]
+    assert (asked["client"], asked["role"]) == ("program-drive", "drive")
+
+
+def test_each_program_that_takes_a_robot_sits_in_a_seat_of_its_own(console):
+    take = {"arguments": {"robots": ["robot-1"]}}
+    one, first = act(console, console.drive, "take", **take)
+    two, second = act(console, console.drive, "take", **take)
+    assert one["key"] != two["key"]
+    assert first["client"] != second["client"]
+    assert (one["client"], one["id"]) == (first["client"], "a-1")
+    assert first["id"] != second["id"]  # the same id of two programs is asked twice
+    _, released = act(console, console.drive, "release", key=two["key"])
+    assert released["client"] == second["client"]
+    answer, stopped = act(console, console.drive, "stop")
+    assert stopped["client"] == "program-drive"
+    assert "key" not in answer
+
+
+def test_a_program_that_gets_no_robot_gets_no_seat(console):
+    take = {"arguments": {"robots": ["robot-1"]}}
+    answer, _ = act(console, console.drive, "take", ok=False, **take)
+    assert "key" not in answer
+    assert console.next_asked("release")["client"].startswith("p")
+
+
+def test_a_page_of_a_lower_role_makes_room_for_a_supervisors():
+    with serving() as served:
+        supervise = served.serving["supervise"].partition("?token=")[2]
+        drivers = [served.page(served.drive) for _ in range(4)]
+        pages = [served.page(served.look) for _ in range(60)]
+        with pytest.raises(InvalidStatus):
+            served.socket("/ws/state", served.look)
+        late = served.page(supervise)
+        assert late.you["role"] == "supervise"
+        assert served.ask("/api/state", token=served.look).json["clients"] == 64
+        for page in (*drivers, *pages[1:]):
+            page.next("snap")  # the others are still served
+        for page in (late, *drivers, *pages):
+            page.close()
