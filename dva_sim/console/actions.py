@@ -13,6 +13,7 @@ from typing import Any
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.alarm_actions import AlarmActions
 from dva_sim.console.answers import BYE, Answers, answering
+from dva_sim.console.audited import name_of_page
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
@@ -83,6 +84,7 @@ class Actions:
         elif what == "manual":
             self._at_robots.input(client, line)
         elif what == "samples":
+            self._drew(client, line.get("seen"))
             self._phones.samples(client, line)
         elif what == "gone":
             self._gone(client)
@@ -110,7 +112,7 @@ class Actions:
     def _person(self, client: str) -> PersonAgent:
         seat = self._seats.taken.get(client)
         if seat is None:
-            raise Refused("nothing is in hand: take control first")
+            raise Refused("You are not controlling a robot. Take control first.")
         return self._world.person(seat.number)
 
     def _take(self, client: str, line: Line, said: Said) -> None:
@@ -122,13 +124,33 @@ class Actions:
         self._world.client_of[number] = client
         person.sit_down()
 
+        holders = self._holders(robots, person)
+
         def answered(ok: bool, text: str) -> None:
             if not ok and not person.robots:
                 self._leave(client)
             self._hold()
-            said(ok, text)
+            said(ok, text if ok or not holders else f"{text}. {holders}")
 
         person.take(robots, answered)
+
+    def _holders(self, robots: list[str], person: PersonAgent) -> str:
+        """Which other pages hold some of these robots, and how to get them; empty: none does."""
+        by_page = {
+            robot: self._world.client_of.get(number)
+            for number, other in self._world.numbered_persons()
+            for robot in other.robots
+            if other is not person and robot in robots
+        }
+        named = [
+            f"{self._world.run.stage.labels[robot]} is held on {name_of_page(client)}"
+            for robot, client in by_page.items()
+            if client is not None
+        ]
+        if not named:
+            return ""
+        none = " No robot was taken." if len(robots) > 1 else ""
+        return f"{'; '.join(named)}: release it there, or take it over on the page Events.{none}"
 
     def _release(self, client: str, line: Line, said: Said) -> None:
         if str(line["id"]).startswith(BYE):
@@ -184,7 +206,7 @@ class Actions:
         """Why nobody may drive now; empty: one may."""
         if self._world.lag.held:
             return "held: this machine cannot keep up with real time"
-        return "time stands still: go on first" if self._world.clock.paused else ""
+        return "The simulation is paused. Resume it first." if self._world.clock.paused else ""
 
     def _start(self, client: str, _: Line, said: Said) -> None:
         person = self._person(client)
@@ -209,8 +231,18 @@ class Actions:
                 person.ended_by_others(robots)
         own.emergency(robots, said)
 
+    def _drew(self, client: str, seen: Any) -> None:
+        """Note which picture of each robot a page has drawn last, if it says so."""
+        seat = self._seats.taken.get(client)
+        if seat is None or not isinstance(seen, list):
+            return
+        drawn = {pair[0]: pair[1] for pair in seen if _is_drawn(pair)}
+        for robot, held in self._world.person(seat.number).robots.items():
+            held.drew(drawn.get(self._world.feed.numbers.get(robot)))
+
     def _input(self, client: str, line: Line) -> None:
         """What a person wants now; what is no number wants to stand."""
+        self._drew(client, line.get("seen"))
         speed, turn, number = line.get("speed"), line.get("turn"), line.get("n")
         held = line.get("held") is True
         if not held and self._phones.is_tilted(client):
@@ -233,6 +265,20 @@ class Actions:
         why = f"stopped: the page was silent for {SILENT_AFTER:g} s while it held on"
         for client in self._seats.silent(time.monotonic()):
             self._stop_one(client, why)
+        self._look_for_old_pictures()
+
+    def _look_for_old_pictures(self) -> None:
+        """End the drives of pages that draw no new pictures, before the robot has to."""
+        now, limit = self._world.clock.now, self._world.scenario.robot.max_age_s
+        for client, seat in self._seats.taken.items():
+            for held in self._world.person(seat.number).robots.values():
+                if held.is_driven and held.drawn is not None and now - held.drawn > limit:
+                    self._stop_one(
+                        client,
+                        f"stopped: your page has drawn no new picture of {held.label} for "
+                        f"{now - held.drawn:.1f} s",
+                    )
+                    break
 
     def _stop_one(self, client: str, why: str) -> None:
         seat = self._seats.taken.get(client)
@@ -313,3 +359,12 @@ def _nobody(ok: bool, text: str) -> None:
 def _is_share(value: Any, least: float, most: float = 1.0) -> bool:
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return number and least <= value <= most
+
+
+def _is_drawn(pair: Any) -> bool:
+    """Whether it is a robot's index with the time of a picture [ms]."""
+    return (
+        isinstance(pair, list)
+        and len(pair) == 2
+        and all(isinstance(one, int) and not isinstance(one, bool) for one in pair)
+    )

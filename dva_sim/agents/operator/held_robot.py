@@ -24,6 +24,10 @@ from dva_sim.protocol import messages as m
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
 STILL_WANTED = 0.3  # what was wanted no longer ago holds when a drive begins [s]
 MOST_INPUTS = 4096  # that are remembered until they act
+GRANT_WITHIN = (
+    5.0  # the DVA's word to the robot may be on its way for so long, which is no news [s]
+)
+MOST_PICTURES = 1024  # whose ticks are remembered until they are drawn
 LOST_AFTER = 9.0  # without a word of the robot: three times its watchdog [s]
 
 
@@ -44,6 +48,8 @@ class HeldRobot:
         log: Of the newest drive.
         frame: The newest picture that has arrived.
         arrived: When it did [s].
+        drawn: When the picture was taken that the person's page has drawn last [s]; before the
+            first one, when the drive began. None: the page does not say what it draws.
         event: What the next drives are for; 0: no event.
         last: The newest input.
         level: Of the permission that was asked for.
@@ -64,10 +70,14 @@ class HeldRobot:
         self.phase: HeldPhase = "asking"
         self.session, self.event = 0, 0
         self._address, self._has_answered = "", False
+        self._granted_at = -math.inf
         self._starting: Said | None = None
         self.log: DriveLog | None = None
         self.frame: CameraFrame | None = None
         self.arrived = 0.0
+        self.drawn: float | None = None
+        self._drawn_tick: int | None = None
+        self._ticks: dict[int, int] = {}  # of the newest pictures, by when they were taken [ms]
         self.last = Input(0, 0.0, 0.0, 0.0)
         self._tilt, self.app = tilt, tilt()
         self.level = "teleoperation"
@@ -103,6 +113,7 @@ class HeldRobot:
                 said(False, "given back meanwhile")
             elif isinstance(reply.content, m.Permission):
                 self.session, self.phase = reply.content.session, "held"
+                self._granted_at = self.device.clock.now
                 self._address = reply.content.address or ""
                 self._watch()
                 said(True, f"{self.label} is yours")
@@ -187,8 +198,31 @@ class HeldRobot:
         if message is not None and isinstance(message.body, m.RobotStatus):
             self._heard, self._tick = self.device.clock.now, message.body.tick
 
+    def drew(self, captured_ms: int | None) -> None:
+        """The person's page says which picture of the robot it has drawn last.
+
+        A page that stops drawing goes on saying so: what it commands is then as old as that
+        picture, whatever has arrived here since.
+
+        Args:
+            captured_ms: When the picture was taken [ms]; None: none is drawn yet.
+        """
+        if not self._ticks:
+            return  # a robot without a camera is driven in sight
+        if self._drawn_tick is None:
+            self._drawn_tick, self.drawn = self._newest_tick, self.device.clock.now
+        tick = None if captured_ms is None else self._ticks.get(captured_ms)
+        if tick is not None and captured_ms is not None:
+            self._drawn_tick, self.drawn = tick, captured_ms / 1000
+            self._ticks = {at: known for at, known in self._ticks.items() if at >= captured_ms}
+
     @property
     def _seen_tick(self) -> int | None:
+        """The robot's newest tick that the person may have seen [ms]."""
+        return self._newest_tick if self._drawn_tick is None else self._drawn_tick
+
+    @property
+    def _newest_tick(self) -> int | None:
         """The robot's newest tick that is known here [ms]."""
         shown = -math.inf if self.frame is None else self.frame.observation.tick
         newest = max(shown, self._tick)
@@ -210,6 +244,9 @@ class HeldRobot:
             return
         now = self.device.clock.now
         self.frame, self.arrived = frame, now
+        self._ticks[round(1000 * frame.captured)] = frame.observation.tick
+        if len(self._ticks) > MOST_PICTURES:
+            del self._ticks[next(iter(self._ticks))]
         if self.log is not None and self.log.ended is None:
             self.log.frames.append(Shown(frame.captured, now, frame.observation.tick))
         self.on_frame(self, frame)
@@ -243,8 +280,11 @@ class HeldRobot:
                 silence = f"{self._silence()} after {self.device.attempts} attempts"
                 refused(silence, "lost link")
 
-        def waits(why: str) -> None:
-            self._alert(f"{self.label} does not start yet: {why}")
+        def waits(reply: m.Reply) -> None:
+            recently = self.device.clock.now < self._granted_at + GRANT_WITHIN
+            if reply.code == m.BUSY or not recently:
+                why = reply.text.replace(self.device.id_tag, "this console")
+                self._alert(f"{self.label} does not start yet: {why}")
 
         def begun() -> None:
             self._alert("")

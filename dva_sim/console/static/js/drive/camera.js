@@ -1,22 +1,13 @@
 /** A robot's picture with its true age; old looks old. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
 import { pictures, scene } from '../store.js';
-import { worldNow } from '../net/world_time.js';
 import { useEvery } from '../ui/every.js';
 import { secondsText } from '../ui/words.js';
+import { drawsNoMore, drew, pictureAge } from './drawn.js';
 import { play } from './mjpeg.js';
 
 const OLD_PERIODS = 2;
 const HATCHED_S = 2;
-
-/** Ages of the newest pictures by robot [ms], for the charts. @type {Map<number, number>} */
-const captured = new Map();
-
-/** How old the newest picture of a robot is [ms]. @param {number} i */
-export function pictureAge(i) {
-  const at = captured.get(i);
-  return at === undefined ? NaN : Math.max(0, worldNow() - at);
-}
 
 /** @param {{robot: import('../types.js').Thing}} props */
 export function CameraPicture({ robot }) {
@@ -30,7 +21,7 @@ export function CameraPicture({ robot }) {
     play(url, (frame) => draw(canvas.current, robot.i, frame), tell, stop.signal);
     return () => {
       stop.abort();
-      captured.delete(robot.i);
+      drawsNoMore(robot.i);
     };
   }, [robot.label, seen]);
   return html`<figure class="camera">
@@ -62,7 +53,6 @@ const secondsTo = (age) => (age < 10 ? `${age.toFixed(2)} s` : secondsText(age))
  * @param {import('./mjpeg.js').Frame} frame
  */
 function draw(canvas, robot, frame) {
-  captured.set(robot, frame.capturedMs);
   if (!canvas) return;
   if (canvas.width !== frame.bitmap.width || canvas.height !== frame.bitmap.height) {
     canvas.width = frame.bitmap.width;
@@ -71,6 +61,7 @@ function draw(canvas, robot, frame) {
   canvas.getContext('2d')?.drawImage(frame.bitmap, 0, 0);
   canvas.dataset.frame = String(frame.number);
   frame.bitmap.close();
+  drew(robot, frame.capturedMs);
 }
 
 /** Whether the page can be seen: no stream is read for nobody. */

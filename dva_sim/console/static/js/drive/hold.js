@@ -10,6 +10,7 @@
 import { effect, signal } from '../../vendor/preact.js';
 import { seat, you } from '../store.js';
 import { steer } from '../net/wire.js';
+import { seenPictures } from './drawn.js';
 
 const EVERY_MS = 40;
 const LEAST_MS = 15;
@@ -126,7 +127,7 @@ function send() {
   count += 1;
   sent = performance.now();
   const { speed, turn } = wish.value;
-  steer({ do: what, n: count, speed, turn, held: held.value });
+  steer({ do: what, n: count, speed, turn, held: held.value, seen: seenPictures() });
 }
 
 /**
@@ -145,7 +146,7 @@ export function steerWith(name) {
 
 /** A last word that outlives the page, should the socket not carry it any more. */
 function sayGone() {
-  const body = JSON.stringify({ action: 'gone', client: you.peek()?.client });
+  const body = JSON.stringify({ action: 'gone', key: you.peek()?.key });
   navigator.sendBeacon?.('/api/actions', new Blob([body], { type: 'application/json' }));
 }
 

@@ -6,7 +6,7 @@ import { Chart } from '../charts/chart.js';
 import { History } from '../charts/history.js';
 import { useEvery } from '../ui/every.js';
 import { msText } from '../ui/words.js';
-import { pictureAge } from './camera.js';
+import { pictureAge } from './drawn.js';
 
 const SAMPLE_MS = 200;
 const DASHES = [undefined, [6, 3]];

@@ -1,4 +1,5 @@
 /** Samples on their way to the world: as they are, in batches, with the phone's own times. */
+import { seenPictures } from '../drive/drawn.js';
 import { backlog, steer } from '../net/wire.js';
 import { choices } from './choices.js';
 import { thumb, tilts } from './drive.js';
@@ -61,6 +62,7 @@ function send() {
     xyz: batch.map((sample) => sample.xyz.map((value) => Number(value.toFixed(4)))),
     hand: !choices.peek().hold || thumb.peek(),
     orientation: orientation(),
+    seen: seenPictures(),
   };
   if (!steer(told)) return;
   sent = performance.now();
