@@ -215,6 +215,10 @@ class ConsoleWorld(ToldWorld):
         """Those of all seats, with or without somebody in them."""
         return list(self._persons.values())
 
+    def numbered_persons(self) -> list[tuple[int, PersonAgent]]:
+        """Those of all seats with the numbers of their seats."""
+        return list(self._persons.items())
+
     def person(self, number: int) -> PersonAgent:
         """The person of a seat, by its number; new ones of the console, from 0, register first."""
         while number < FIRST_SEAT and number not in self._persons:

@@ -3,7 +3,9 @@
 import pytest
 from console_page import Page
 
+from dva_sim.agents.operator import steps
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.protocol import messages as m
 
 
 @pytest.fixture
@@ -107,9 +109,31 @@ def test_a_robot_has_one_holder_and_the_second_is_told_who(page):
 
 def test_who_gets_one_of_two_robots_keeps_none(page):
     assert page.do("take", robots=[0])[0]
-    assert not page.do("take", robots=[0, 1], client="c2")[0]
+    done, text = page.do("take", robots=[0, 1], client="c2")
+    assert not done
+    assert "yours" not in text
+    assert "robot-1 is held on page c1" in text
+    assert "take it over on the page Events" in text
+    assert "No robot was taken" in text
     page.let(1.0)
     assert page.do("take", robots=[1], client="c3")[0]
+
+
+def test_a_permission_on_its_way_to_the_robot_is_news_only_when_it_takes_long(page, monkeypatch):
+    """Until the DVA's word has reached the robot, it refuses, and Start is repeated."""
+    assert page.do("take", robots=[0])[0]
+    asked = {}
+    monkeypatch.setattr(steps, "start", lambda *_, **more: asked.update(more))
+    page.actions.take({"id": "s", "client": "c1", "do": "start"})
+    person = page.world.person(0)
+    not_yet = m.Reply(1, m.NOT_PERMITTED, f"{person.device.id_tag} holds no permission here")
+    asked["waits"](not_yet)
+    assert person.alert == ""
+    asked["waits"](m.Reply(1, m.BUSY, "driven by hand, at the robot"))
+    assert person.alert == "robot-1 does not start yet: driven by hand, at the robot"
+    page.let(6.0)
+    asked["waits"](not_yet)
+    assert person.alert == "robot-1 does not start yet: this console holds no permission here"
 
 
 def test_an_action_said_twice_is_done_once_and_answered_twice(page):

@@ -39,7 +39,7 @@ class Console:
 
 
 class Gathered:
-    """One answer made of several: all must be good.
+    """One answer made of several: all must be good, else only what failed is said.
 
     Args:
         count: How many are to come.
@@ -50,16 +50,16 @@ class Gathered:
     """
 
     def __init__(self, count: int, said: Said) -> None:
-        self._left, self._said, self._good = count, said, True
-        self._texts: list[str] = []
+        self._left, self._said = count, said
+        self._good: list[str] = []
+        self._bad: list[str] = []
         self.failed: Callable[[], object] = lambda: None
 
     def __call__(self, done: bool, text: str, /, **_: object) -> None:
         """One of them has come."""
         self._left -= 1
-        self._good = self._good and done
-        self._texts.append(text)
+        (self._good if done else self._bad).append(text)
         if self._left == 0:
-            if not self._good:
+            if self._bad:
                 self.failed()
-            self._said(self._good, "; ".join(dict.fromkeys(self._texts)))
+            self._said(not self._bad, "; ".join(dict.fromkeys(self._bad or self._good)))

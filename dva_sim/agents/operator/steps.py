@@ -67,7 +67,7 @@ def start(
     begun: Callable[[], object],
     refused: Callable[[str], object],
     lost: Callable[[], object],
-    waits: Callable[[str], object] = lambda _: None,
+    waits: Callable[[m.Reply], object] = do_nothing,
     tries: int = 1,
 ) -> None:
     """Ask a robot to begin, again and again while it may not know of the permission yet.
@@ -81,7 +81,7 @@ def start(
         begun: Told that the robot agrees.
         refused: Told why it does not.
         lost: Told that it does not answer.
-        waits: Told why it does not yet, each time before it is asked again.
+        waits: Takes the reply that refuses, each time before it is asked again.
         tries: Which one this is.
     """
     if not wanted():
@@ -107,7 +107,7 @@ def start(
         if reply.code == m.OK:
             begun()
         elif tries < START_TRIES and reply.code in NOT_YET:
-            waits(reply.text)
+            waits(reply)
             device.clock.call_after(START_AGAIN, again)
         else:
             refused(reply.text)

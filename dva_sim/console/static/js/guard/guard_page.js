@@ -7,6 +7,7 @@ import { placeOf } from '../map/shown.js';
 import { Icon } from '../ui/icon.js';
 import { useEvery } from '../ui/every.js';
 import { capital, plain } from '../ui/words.js';
+import { NO_PLAYED_GUARD, playedGuards } from './played.js';
 import { canLocate, locating, follow } from './position.js';
 import { Report } from './report.js';
 
@@ -51,8 +52,8 @@ function Alerts() {
 /** Whom one stands for. */
 function Join() {
   if (!mayDrive.value) return html`<p>This address may only look. Scan the code for phones.</p>`;
-  const free = scene.value?.things.filter((thing) => thing.person) ?? [];
-  if (!free.length) return html`<p>No guard of this scenario is played by a person.</p>`;
+  const free = playedGuards.value;
+  if (!free.length) return html`<p>${NO_PLAYED_GUARD}</p>`;
   return html`<h2>Who are you?</h2>
     <div class="menu">${free.map(
       (one) => html`<button type="button" class="big" key=${one.i} disabled=${!maySteer.value}
@@ -103,6 +104,8 @@ function Own({ me }) {
   return html`<p>${at ? `You are ${placeOf({ x_m: at.x, y_m: at.y })}.` : 'Your position is not known.'}</p>`;
 }
 
+/** Beyond this an arrival is asked about once more: the event can hardly be seen from there [m]. */
+const FAR_M = 10;
 const SAYINGS = /** @type {[string, string][]} */ ([
   ['departed', 'Departed'],
   ['arrived', 'Arrived'],
@@ -115,13 +118,18 @@ const SAYINGS = /** @type {[string, string][]} */ ([
 function OrderCard({ me }) {
   const [why, write] = useState('');
   const [declining, decline] = useState(false);
+  const [doubted, doubt] = useState(false);
   const order = me.order;
   const off = !maySteer.value;
   const answer = async (/** @type {boolean} */ accept) => {
     const done = await act('guard_answer', { accept, reason: accept ? '' : why.trim() });
     if (done.ok) decline(false);
   };
-  const say = (/** @type {string} */ what) => act('guard_say', { what });
+  const isFar = order !== null && order.distance_m !== null && order.distance_m > FAR_M;
+  const say = (/** @type {string} */ what) => {
+    doubt(what === 'arrived' && isFar && !doubted);
+    if (what !== 'arrived' || !isFar || doubted) act('guard_say', { what });
+  };
   if (!order) {
     return html`<section class="panel" aria-label="Order" aria-live="polite"><h2>No order</h2>
       <p>${me.doing ? `You: ${me.doing}.` : 'Wait for an order.'}</p>
@@ -144,6 +152,11 @@ function OrderCard({ me }) {
       ([what, name]) => html`<button type="button" class="big" key=${what} disabled=${off}
         onClick=${() => say(what)}>${name}</button>`,
     )}</div>`}
+    ${doubted && isFar &&
+    html`<div class="warning" role="alert"><span>You are ${Math.round(order.distance_m ?? 0)} m away from the
+      event. Have you arrived?</span><div class="buttons">
+      <button type="button" disabled=${off} onClick=${() => say('arrived')}>Yes, arrived</button>
+      <button type="button" onClick=${() => doubt(false)}>Not yet</button></div></div>`}
     <${Help} me=${me} />
   </section>`;
 }

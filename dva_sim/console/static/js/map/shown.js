@@ -17,6 +17,12 @@ export function eventsInOrder() {
   );
 }
 
+/** What is said where no event is open. */
+export const noEventText = () =>
+  events.value.length === 0
+    ? 'Nothing has been reported.'
+    : `No event is open; ${events.value.length} ${events.value.length === 1 ? 'is' : 'are'} closed.`;
+
 /** How many events of each severity are open. */
 export function alarms() {
   const counts = /** @type {Record<string, number>} */ ({});

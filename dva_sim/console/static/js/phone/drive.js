@@ -73,8 +73,9 @@ export async function start() {
 /** Why a tilted phone cannot begin; empty if it can. */
 function whyNot() {
   if (!tilts.peek()) return '';
-  if (sensor.peek() === 'tap') return 'This phone wants to be asked for its motion sensor: press Start.';
-  if (isSilent()) return 'There is no sensor that says anything: nothing was started. See Calibration.';
+  if (sensor.peek() === 'tap') return 'Tap Start to allow access to the motion sensor.';
+  if (sensor.peek() !== 'live') return 'No motion sensor data is arriving, so driving was not started. See Calibration.';
+  if (isSilent()) return `The motion sensor has been silent for ${silentText()}, so driving was not started. Tilt the phone and start again.`;
   const lifted = choices.peek().hold && !thumb.peek();
   return lifted ? 'Hold to drive is on: swipe up over the picture and keep your thumb there.' : '';
 }
@@ -127,6 +128,7 @@ function watchSensor() {
 }
 
 const isSilent = () => performance.now() - lastHeard() > SILENT_MS;
+const silentText = () => `${((performance.now() - lastHeard()) / 1000).toFixed(1)} s`;
 
 /** Outside of the effect that notices it. @param {string} why */
 const end = (why) => queueMicrotask(() => interrupt(why));

@@ -1,7 +1,8 @@
 /** The menu, and the events that wait for somebody. */
 import { html } from '../../vendor/preact.js';
 import { worldNow } from '../net/world_time.js';
-import { eventsInOrder, isOpen, placeOf } from '../map/shown.js';
+import { hasPlayedGuards, NO_PLAYED_GUARD } from '../guard/played.js';
+import { eventsInOrder, isOpen, noEventText, placeOf } from '../map/shown.js';
 import { dark, switchTheme } from '../shell/theme.js';
 import { SeverityMark } from '../ui/icon.js';
 import { useEvery } from '../ui/every.js';
@@ -21,7 +22,9 @@ export function MainScreen() {
         ${done[name] && html`<small>${done[name]}</small>`}</a>`)}
     </nav>
     <${Events} />
-    <p class="ends"><a href="/guard">I am a guard</a>
+    <p class="ends">${hasPlayedGuards.value
+      ? html`<a href="/guard">I am a guard</a>`
+      : html`<span class="soft">${NO_PLAYED_GUARD}</span>`}
       <button type="button" class="plain" onClick=${switchTheme}>
         ${dark.value ? 'Light colours' : 'Dark colours'}</button></p>`;
 }
@@ -31,7 +34,7 @@ function Events() {
   const open = eventsInOrder().filter(isOpen);
   const next = holds.value ? 'teleoperation' : 'authentication';
   return html`<section aria-label="Events"><h2>Events <span class="count">${open.length} open</span></h2>
-    ${open.length === 0 && html`<p class="soft">Nothing has been reported.</p>`}
+    ${open.length === 0 && html`<p class="soft">${noEventText()}</p>`}
     <ul class="cards">${open.map(
       (event) => html`<li key=${event.number}><${SeverityMark} severity=${event.severity} />
         <span class="what"><b>${capital(plain(event.kind))}</b> ${placeOf(event)}
