@@ -17,7 +17,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from dva_sim.console.web.places import MOST, MOST_SERVED, SILENT, Place, Places
+from dva_sim.console.web.port_connections import (
+    MOST,
+    MOST_SERVED,
+    SILENT,
+    PortConnection,
+    PortConnections,
+)
 
 WAITING: Final = 1024  # connections that are not accepted yet
 AT_ONCE: Final = 32  # connections accepted before the loop serves others again
@@ -31,7 +37,7 @@ SPARE_FILES: Final = 128  # that are no connections: pipes, pages' files, the au
 SHUTDOWN: Final = 1.0  # for the end of a TLS connection [s]
 
 
-def fitting_places(listeners: int) -> Places:
+def fitting_places(listeners: int) -> PortConnections:
     """Return the places of one of some ports: fewer where a process may open few files."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = listeners * MOST + SPARE_FILES
@@ -40,7 +46,7 @@ def fitting_places(listeners: int) -> Places:
         resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))
         wanted = max(soft, most)
     most = min(MOST, max(16, (wanted - SPARE_FILES) // listeners))
-    return Places(most, MOST_SERVED * most // MOST)
+    return PortConnections(most, MOST_SERVED * most // MOST)
 
 
 class Listener:
@@ -56,13 +62,13 @@ class Listener:
     def __init__(
         self,
         sock: socket.socket,
-        make: Callable[[Place], asyncio.Protocol],
+        make: Callable[[PortConnection], asyncio.Protocol],
         context: ssl.SSLContext | None,
-        places: Places,
+        places: PortConnections,
     ) -> None:
         self._sock, self._make, self._context, self._places = sock, make, context, places
         self._at_once = SERVED_AT_ONCE if context is None else HANDSHAKES_AT_ONCE
-        self._speaking: deque[tuple[socket.socket, Place]] = deque()
+        self._speaking: deque[tuple[socket.socket, PortConnection]] = deque()
         self._connecting: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
@@ -99,7 +105,7 @@ class Listener:
         asyncio.get_running_loop().remove_reader(connection)
         connection.close()
 
-    def _heard(self, connection: socket.socket, place: Place) -> None:
+    def _heard(self, connection: socket.socket, place: PortConnection) -> None:
         """A connection has said its first word."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(connection)
@@ -123,7 +129,7 @@ class Listener:
         if self._sock.fileno() >= 0:
             asyncio.get_running_loop().add_reader(self._sock, self._accept)
 
-    async def _connect(self, connection: socket.socket, place: Place) -> None:
+    async def _connect(self, connection: socket.socket, place: PortConnection) -> None:
         """Shake hands, where that is needed; the protocol serves the connection from then on."""
         within = {} if self._context is None else _TLS
         try:

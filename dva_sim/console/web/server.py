@@ -14,7 +14,7 @@ from starlette.types import ASGIApp
 
 from dva_sim.console.web.actions import MOST_BYTES
 from dva_sim.console.web.listener import WAITING, Listener
-from dva_sim.console.web.places import Place, Places
+from dva_sim.console.web.port_connections import PortConnection, PortConnections
 from dva_sim.console.web.sockets import HttpProtocol
 from dva_sim.kernel.errors import ConfigError
 
@@ -52,7 +52,7 @@ def listen(host: str, port: int) -> socket.socket:
 class Server(uvicorn.Server):
     """A server that is ended by whoever started it, not by signals of its own."""
 
-    def protocol(self, place: Place) -> HttpProtocol:
+    def protocol(self, place: PortConnection) -> HttpProtocol:
         """Return what serves a connection."""
         return HttpProtocol(place, config=self.config, server_state=self.server_state, app_state={})
 
@@ -106,7 +106,9 @@ class _Complaints(logging.StreamHandler):  # type: ignore[type-arg]
             super().emit(record)
 
 
-async def serve(server: Server, sock: socket.socket, places: Places, ended: asyncio.Event) -> None:
+async def serve(
+    server: Server, sock: socket.socket, places: PortConnections, ended: asyncio.Event
+) -> None:
     """Serve until the end."""
     server.config.load()
     listener = Listener(sock, server.protocol, server.config.ssl, places)

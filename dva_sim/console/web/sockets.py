@@ -18,7 +18,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from dva_sim.console.web.places import Place
+from dva_sim.console.web.port_connections import PortConnection
 
 STALLED = 5.0  # without a byte taken, a page is dropped [s]
 FAREWELL = 10.0  # for what is on its way to a page that was dropped [s]
@@ -35,7 +35,7 @@ class HttpProtocol(H11Protocol):
         given: See `H11Protocol`.
     """
 
-    def __init__(self, place: Place, **given: Any) -> None:
+    def __init__(self, place: PortConnection, **given: Any) -> None:
         super().__init__(**given)
         self._place = place
         self.app = _extended(self.app, {PLACE: place, WIRE: self})
@@ -72,7 +72,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         given: See `WebSocketsSansIOProtocol`.
     """
 
-    def __init__(self, place: Place, **given: Any) -> None:
+    def __init__(self, place: PortConnection, **given: Any) -> None:
         super().__init__(**given)
         self._place = place
         self.app = _extended(self.app, {PLACE: place, WIRE: self})
@@ -108,9 +108,9 @@ def _extended(app: Any, more: dict[str, Any]) -> ASGIApp:
     return extended
 
 
-def place_of(scope: Scope) -> Place:
+def place_of(scope: Scope) -> PortConnection:
     """The place of the connection under a request."""
-    place: Place = scope["extensions"][PLACE]
+    place: PortConnection = scope["extensions"][PLACE]
     return place
 
 

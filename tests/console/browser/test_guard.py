@@ -49,7 +49,13 @@ def test_an_order_is_accepted_and_followed_to_its_end(page) -> None:
     order = page.get_by_role("region", name="Order")
     expect(order).to_contain_text("Gas leak in somewhere, 42 m")
     tap(page, "Accept")
-    for name in ("Departed", "Arrived", "Confirm"):
+    for name in ("Departed", "Arrived"):
+        tap(page, name)
+    expect(page.get_by_text("42 m away from the event. Have you arrived?")).to_be_visible()
+    tap(page, "Not yet")
+    expect(page.get_by_text("Have you arrived?")).to_have_count(0)
+    assert "arrived" not in [line["what"] for line in said(page, "guard_say")]
+    for name in ("Arrived", "Yes, arrived", "Confirm"):
         tap(page, name)
     expect(order).to_contain_text("You: confirmed.")
     tap(page, "Contained")

@@ -211,7 +211,7 @@ def test_an_emergency_stop_is_asked_for_again_in_red_until_it_is_confirmed(hand)
     stops = hand.page.evaluate("window.stops")
     assert len(stops) >= 3
     assert len(set(stops)) == 1  # it is done once
-    hand.page.evaluate("window.fetch = window.usual")
+    hand.page.evaluate("() => { window.fetch = window.usual; }")
     expect(hand.page.get_by_text("not confirmed")).to_have_count(0)
     hand.page.evaluate("window.hangs = false")
     assert not driving(hand)

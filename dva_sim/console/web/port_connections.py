@@ -19,7 +19,7 @@ IDLE = 20.0  # with one, between two requests [s]; longer than the server keeps 
 
 
 @dataclass(eq=False)
-class Place:
+class PortConnection:
     """One connection.
 
     Attributes:
@@ -30,7 +30,7 @@ class Place:
         drop: Cuts the connection.
     """
 
-    places: Places = field(repr=False)
+    places: PortConnections = field(repr=False)
     since: float
     role: Role = Role.NOBODY
     busy: bool = False
@@ -61,7 +61,7 @@ class Place:
         self.places.taken.pop(self, None)
 
 
-class Places:
+class PortConnections:
     """The connections of a port.
 
     Args:
@@ -75,19 +75,19 @@ class Places:
 
     def __init__(self, most: int = MOST, most_served: int = MOST_SERVED) -> None:
         self._most, self._most_served = most, most_served
-        self.taken: dict[Place, None] = {}
+        self.taken: dict[PortConnection, None] = {}
         self.dropped = {"silent": 0, "for a newcomer": 0, "for a higher role": 0}
 
-    def enter(self, now: float) -> Place:
+    def enter(self, now: float) -> PortConnection:
         """Return the place of a new connection; if all are taken, another connection is cut."""
         if len(self.taken) >= self._most:
             free = [place for place in self.taken if not place.is_served]
             self._drop(min(free or self.taken, key=_importance), "for a newcomer")
-        place = Place(self, now)
+        place = PortConnection(self, now)
         self.taken[place] = None
         return place
 
-    def bear(self, place: Place) -> bool:
+    def bear(self, place: PortConnection) -> bool:
         """Return whether a request may be served; a lower role's connection may be cut for it."""
         served = [each for each in self.taken if each.is_served]
         if len(served) <= self._most_served:
@@ -104,11 +104,11 @@ class Places:
             if not place.is_served and now - place.since > (IDLE if place.role else SILENT):
                 self._drop(place, "silent")
 
-    def _drop(self, place: Place, why: str) -> None:
+    def _drop(self, place: PortConnection, why: str) -> None:
         place.leave()
         self.dropped[why] += 1
         place.drop()
 
 
-def _importance(place: Place) -> tuple[Role, bool, float]:
+def _importance(place: PortConnection) -> tuple[Role, bool, float]:
     return place.role, place.busy, place.since

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.places import IDLE, SILENT, Places
+from dva_sim.console.web.port_connections import IDLE, SILENT, PortConnections
 
 
 def entered(places, now, cut, name):
@@ -14,7 +14,7 @@ def entered(places, now, cut, name):
 
 
 def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
-    places, cut = Places(most=3, most_served=2), []
+    places, cut = PortConnections(most=3, most_served=2), []
     first = entered(places, 0.0, cut, "first")
     for now in (1.0, 2.0):
         entered(places, now, cut, f"at {now}")
@@ -25,7 +25,7 @@ def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
 
 
 def test_a_connection_that_is_being_set_up_outlives_one_that_has_said_nothing():
-    places, cut = Places(most=2, most_served=1), []
+    places, cut = PortConnections(most=2, most_served=1), []
     speaking = entered(places, 0.0, cut, "speaking")
     speaking.busy = True
     entered(places, 1.0, cut, "silent")
@@ -34,7 +34,7 @@ def test_a_connection_that_is_being_set_up_outlives_one_that_has_said_nothing():
 
 
 def test_a_request_with_a_token_is_never_cut_for_a_newcomer():
-    places, cut = Places(most=2, most_served=1), []
+    places, cut = PortConnections(most=2, most_served=1), []
     page = entered(places, 0.0, cut, "page")
     assert page.begin(Role.LOOK, 0.0)
     for now in range(100):
@@ -44,7 +44,7 @@ def test_a_request_with_a_token_is_never_cut_for_a_newcomer():
 
 
 def test_silence_is_cut_after_seconds_and_idleness_with_a_token_later():
-    places, cut = Places(), []
+    places, cut = PortConnections(), []
     entered(places, 0.0, cut, "silent")
     idle = entered(places, 0.0, cut, "idle")
     idle.begin(Role.DRIVE, 0.0)
@@ -60,7 +60,7 @@ def test_silence_is_cut_after_seconds_and_idleness_with_a_token_later():
 
 
 def test_beyond_the_limit_a_lower_role_yields_and_the_same_role_is_refused():
-    places, cut = Places(most=10, most_served=2), []
+    places, cut = PortConnections(most=10, most_served=2), []
     lookers = [entered(places, float(n), cut, f"looker {n}") for n in range(3)]
     assert [place.begin(Role.LOOK, 5.0 + n) for n, place in enumerate(lookers)] == [
         True,
@@ -74,7 +74,7 @@ def test_beyond_the_limit_a_lower_role_yields_and_the_same_role_is_refused():
 
 
 def test_what_is_outside_the_limits_is_served_however_many_are():
-    places, cut = Places(most=10, most_served=1), []
+    places, cut = PortConnections(most=10, most_served=1), []
     assert entered(places, 0.0, cut, "page").begin(Role.SUPERVISE, 0.0)
     assert not entered(places, 0.0, cut, "page").begin(Role.SUPERVISE, 0.0)
     assert entered(places, 0.0, cut, "stop").begin(Role.DRIVE, 0.0, is_limited=False)
@@ -82,7 +82,7 @@ def test_what_is_outside_the_limits_is_served_however_many_are():
 
 
 def test_more_stops_in_progress_than_there_are_places_let_a_newcomer_in_still():
-    places, cut = Places(most=3, most_served=1), []
+    places, cut = PortConnections(most=3, most_served=1), []
     for n in range(3):
         assert entered(places, float(n), cut, n).begin(Role.DRIVE, float(n), is_limited=False)
     entered(places, 9.0, cut, "newcomer")
@@ -90,7 +90,7 @@ def test_more_stops_in_progress_than_there_are_places_let_a_newcomer_in_still():
 
 
 def test_a_place_that_is_left_counts_no_more():
-    places, cut = Places(most=5, most_served=1), []
+    places, cut = PortConnections(most=5, most_served=1), []
     page = entered(places, 0.0, cut, "page")
     assert page.begin(Role.LOOK, 0.0)
     page.leave()
