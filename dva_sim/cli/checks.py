@@ -115,14 +115,18 @@ def _check_one(name: str) -> ExitCode:
     for problem in verdict.problems[:_SHOWN]:
         where = _near(problem.file) if problem.file else name
         _say(f"{where}:{problem.line}:{problem.column}: {problem.text}")
-    number = len(verdict.problems)
+    number, broken = len(verdict.problems), verdict.broken
     for doubt in verdict.doubts:
         _say(f"{name}: warning: {doubt}")
-    if not number:
+    for rule in verdict.rules:
+        _say(f"{name}: {rule}")
+    if not number and not broken:
         _say(f"{name}: {verdict.kind}: valid" + (f"; {verdict.note}" if verdict.note else ""))
         return VALID
     more = f", the first {_SHOWN} shown" if number > _SHOWN else ""
-    _say(f"{name}: {verdict.kind}: invalid, {number} problem{'s'[: number > 1]}{more}")
+    found = [f"{number} problem{'s'[: number > 1]}{more}"] if number else []
+    found += [f"breaks {broken} safety rule{'s'[: broken > 1]}"] if broken else []
+    _say(f"{name}: {verdict.kind}: invalid, {', '.join(found)}")
     return INVALID
 
 

@@ -6,7 +6,7 @@ Keys for the devices of a scenario, by the names that people use.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +28,7 @@ from dva_sim.live.supervisor import Summary, Supervisor
 from dva_sim.network.keys import create_keys
 from dva_sim.network.sockets import DEFAULT_PORT
 from dva_sim.simulation.full.stage import DVA, id_of, label_of, team_of
+from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
 from dva_sim.simulation.scenario import build, contradictions, load
 
 STORY_LINES = 12
@@ -178,8 +179,10 @@ def run_one(part: str, options: LiveOptions, number: int) -> None:
             if console.is_terminal:
                 screen.update(board.table())
 
-        run_part(part, options, say, number)
+        found = run_part(part, options, say, number)
     console.print(board.table())
+    _print_rules(console, found)
+    refuse_broken(found)
 
 
 class InOrder:
@@ -213,10 +216,17 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
                 counters[name] = counters.get(name, 0) + count
     for name, count in sorted(counters.items()):
         _print(console, f"  {name}: {count}")
+    if summary.lost is None and options.records_run:
+        _print(console, f"{options.record} written")
+    _print_rules(console, summary.verdicts)
     if summary.lost is not None:
         raise DvaSimError(summary.lost)
-    if options.records_run:
-        _print(console, f"{options.record} written")
+    refuse_broken(summary.verdicts)
+
+
+def _print_rules(console: Console, found: Sequence[Verdict]) -> None:
+    for verdict in found:
+        _print(console, str(verdict))
 
 
 _ID = re.compile(r"[0-9A-F]{2}(:[0-9A-F]{2}){5}")

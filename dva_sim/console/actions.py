@@ -49,7 +49,7 @@ class Actions:
             why_not=self._why_not,
             labels=world.run.stage.labels,
             deaf=world.deafen,
-            slow=world.run.audit.expect,
+            slow=world.run.slowed,
         )
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)

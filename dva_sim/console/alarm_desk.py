@@ -13,6 +13,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.alarms import AlarmCondition, Alarms
 from dva_sim.console.refusal import Refused
 from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.kernel.recorder import Breach
 from dva_sim.simulation.full.run import Run
 
 Line = dict[str, Any]
@@ -29,6 +30,9 @@ class AlarmFacts(Protocol):
 
     def is_somebody_free(self) -> bool:
         """Whether a guard or a robot could be sent somewhere."""
+
+    def broken(self) -> Iterable[Breach]:
+        """The safety rules that are broken, as far as anybody can tell."""
 
 
 class RunFacts:
@@ -49,6 +53,10 @@ class RunFacts:
             driven = row["mode"] == Mode.TELEOPERATION.value and row["watchdog_left_s"] == 0.0
             if driven and "first command" not in row["stands"]:
                 yield by_row.get(row["i"], str(row["i"])), "its watchdog stopped it"
+
+    def broken(self) -> Iterable[Breach]:
+        """What the audit of the run has found."""
+        return self._run.recorder.broken.values()
 
     def is_somebody_free(self) -> bool:
         """Whether somebody whom the DVA hears was sent nowhere."""
@@ -80,6 +88,7 @@ class AlarmDesk:
     def look(self, events: Sequence[Line], robots: Sequence[Line], now_ms: int) -> Line:
         """Look at what pages are told, and tell the alarms."""
         found = [*_of_events(events, now_ms), *self._lost(robots), *self._nobody(events)]
+        found += self._broken()
         timed = [
             one._replace(since_ms=one.since_ms or self._from(one.key, now_ms)) for one in found
         ]
@@ -112,6 +121,13 @@ class AlarmDesk:
         for label, why in self._facts.lost(robots):
             text = f"{label} is lost in drive: {why}"
             yield AlarmCondition(f"lost {label}", "robot lost", "high", "", text)
+
+    def _broken(self) -> Iterator[AlarmCondition]:
+        """Safety rules that are broken: for good, so that somebody has to see it."""
+        for breach in self._facts.broken():
+            text = f"{breach.rule} broken by {breach.who}: {breach.what}"
+            key, since = f"rule {breach.rule} {breach.who}", max(1, round(1000 * breach.time))
+            yield AlarmCondition(key, "safety rule broken", "critical", "", text, since)
 
     def _nobody(self, events: Iterable[Line]) -> Iterator[AlarmCondition]:
         """Events wait, and nobody is free to go."""

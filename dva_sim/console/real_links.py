@@ -12,7 +12,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
-from dva_sim.simulation.full.safety_checks import SafetyAudit
+from dva_sim.simulation.full.observations import Listener, Senders
 from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.scenario import Scenario
 
@@ -60,6 +60,7 @@ class ConsoleSockets:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
         self.dva = ""
         self.network = SocketNetwork(clock, ring, self._tell, scenario.zeromq)
+        self._said = Senders(self.network.is_here)
 
     def _tell(self, line: str) -> None:
         self._recorder.tell(self._clock.now, "console", line, "link")
@@ -81,13 +82,14 @@ class ConsoleSockets:
         """See `RealLinks`: by the clock on the wall."""
         return start_of_day(self._clock)
 
-    def watch(self, audit: SafetyAudit) -> None:
+    def watch(self, listener: Listener) -> None:
         """See `RealLinks`: all devices of ours are in this process, so each message is seen."""
 
         def note(node: str, payload: Any, sent: bool) -> None:
             now = self._clock.now
             if not isinstance(payload, bytes):
                 if sent:
+                    listener.sent(now, node, "", payload)
                     self._recorder.message_sent(now, node, "", 0, payload)
                 return
             ends = _ENDS.search(payload, 0, _HEADER)
@@ -95,11 +97,12 @@ class ConsoleSockets:
                 return
             to, source = ends[1].decode(), ends[2].decode()
             if sent:
+                self._said.note(node, payload)
+                listener.sent(now, node, to, payload)
                 self._recorder.message_sent(now, node, to, len(payload), payload)
-                audit.sent(now, node, to, payload)
             else:
                 self._recorder.message_taken(node, payload)
-                audit.delivered(now, source, node, payload)
+                listener.delivered(now, self._said.sender(source, payload), node, payload)
 
         self.network.watcher = note
 

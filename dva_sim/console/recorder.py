@@ -8,7 +8,8 @@ from typing import Any
 
 from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.live.recording import LiveRecorder, event_facts
-from dva_sim.simulation.full.run import FILM_PERIOD, Run
+from dva_sim.simulation.full.observations import FactLog, motion_of, page_of
+from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD, Run
 
 KEPT = 200  # of each list of a drive, and of ended drives nothing but the last
 KEPT_DRIVES = 20
@@ -135,6 +136,13 @@ def keep_run(run: Run, recorder: ConsoleRecorder) -> None:
         for e in (*book.closed.values(), *book.open.values()):
             kept.put_new("event", *event_facts(e), key=f"event {e.number}")
 
+    log = FactLog(
+        *(kept.observe, field.robots, lambda robot: motion_of(field.robots[robot])),
+        lambda: page_of(run.dva),
+        keeps_sent=False,
+    )
     facts()
+    run.observe(log)
     clock.every(FILM_PERIOD, sample)
+    clock.every(WATCH_PERIOD, lambda: log.places(clock.now, field.places()))
     clock.every(1.0, facts)

@@ -44,7 +44,7 @@ class RobotDesk:
             why_not=lambda: "held: this machine cannot keep up" if world.lag.held else "",
             labels=world.stage.labels,
             deaf=world.deafen,
-            slow=world.audit.expect,
+            slow=world.slowed,
         )
         world.hold = lambda _: self._hands.stop(world.field.robots)
         world.clock.pulse(LOOK, self._hands.look_for_the_silent)

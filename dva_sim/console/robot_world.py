@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 from dva_sim.agents.observation import CameraFrame, Cameras
-from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.feed import Feed
 from dva_sim.console.lag import LagRule
@@ -24,17 +23,16 @@ from dva_sim.console.robot_windows import RobotWindows
 from dva_sim.console.scene import scene_of
 from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.stands import why_stands
-from dva_sim.core.assignments import Rules
-from dva_sim.core.events import EventBook
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link.link import Link
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
-from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field
+from dva_sim.simulation.full.observations import motion_of, terms_of
+from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import WATCH_PERIOD
 from dva_sim.simulation.full.safety_checks import SafetyAudit
-from dva_sim.simulation.full.stage import DVA, Stage, id_of
+from dva_sim.simulation.full.stage import Stage, id_of
 from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.simulation.scenario import Scenario
 
@@ -146,17 +144,11 @@ class RobotWorld:
         self.feed = Feed(self)
         self.recorder.robots = {id_tag}
         self.audit = SafetyAudit(
-            self.recorder,
-            limits=self.scenario.robot,
-            robots=self.field.robots,
-            book=EventBook(),
-            rules=Rules(),
-            processing=max(mean_of(profile.processing_s) for profile in self.stage.robots),
-            dva=DVA,
-            place_of=self.field.place_of,
-            at_event=0.0,
-            tick=PHYSICS_TICK,
+            *(self.recorder, terms_of(self.scenario)),
+            lambda _: motion_of(robot),
+            self.field.place_of,
         )
+        self.recorder.on_accepted, self.recorder.on_hand = self.audit.accepted, self.audit.by_hand
         self.sockets.watch(self.audit)
         about = self.feed.numbers, self.stage.labels
         self.windows = RobotWindows(
@@ -172,14 +164,23 @@ class RobotWorld:
             self, id_of("console", 1), self.feed.numbers, lambda line, key: self.show(line, key)
         )
         self.clock.every(1.0 / self.scenario.camera.rate_hz, self._film)
-        self.clock.every(WATCH_PERIOD, lambda: self.audit.check(self.clock.now))
+        self.clock.every(WATCH_PERIOD, self._check_rules)
+
+    def _check_rules(self) -> None:
+        now = self.clock.now
+        self.field.world.advance_to(now)
+        self.audit.moves(now, {self.robot.device.id_tag: motion_of(self.robot)})
 
     def _lost(self, robot: str, reply: bytes) -> None:
         self.audit.sent(self.clock.now, robot, "", reply)
 
     def deafen(self, robot: str, on: bool) -> None:
         """The audit is told that the robot hears nothing, or hears again."""
-        (self.audit.deaf.add if on else self.audit.deaf.discard)(robot)
+        self.audit.deafened(self.clock.now, robot, on)
+
+    def slowed(self, processing: float) -> None:
+        """The audit is told how long a message takes the robot's computer from now on [s]."""
+        self.audit.slowed(self.clock.now, processing)
 
     # --- what a console shows: see `ConsoleSubject` ------------------------------------------
 

@@ -78,7 +78,7 @@ class LinkSliders:
     def _change_processing(self, seconds: float) -> None:
         for robot in self._run.field.robots:
             self._set_usual(robot, seconds)
-        self._run.audit.expect(seconds)
+        self._run.slowed(seconds)
 
 
 def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:

@@ -15,8 +15,10 @@ from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.recorder import keep_run
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.live.pipes import Outlet
 from dva_sim.live.process import ending_when_asked
-from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
+from dva_sim.live.recording import Keeper, LiveRecorder
+from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
 
 LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 
@@ -42,6 +44,7 @@ class ConsoleSupervisor:
             ConfigError: the scenario cannot be run, or not recorded as wanted.
             ChildFailed: the web process could not begin, or has ended by itself.
             DvaSimError: what was to be recorded is not, or not all of it.
+            RulesBroken: a safety rule was broken.
         """
         options, scenario, seed = self._options, self._options.read(), self._options.seed
         results = options.kept_results()
@@ -59,10 +62,14 @@ class ConsoleSupervisor:
         if results is not None:
             results.write()
             self._say(f"{options.results} written")
+        found = verdicts(world.recorder)
+        for verdict in found:
+            self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
         if options.record is not None:
             self._say(f"{options.record} written")
+        refuse_broken(found)
 
     @contextmanager
     def _recorded(self, world: ConsoleWorld) -> Iterator[None]:
@@ -72,7 +79,7 @@ class ConsoleSupervisor:
             keeper = Keeper(options.record, world.scenario, world.seed)
             outlet = Outlet(keeper.inlet())
             world.recorder.kept = LiveRecorder(world.clock, outlet)
-            world.recorder.kept.is_own = lambda _: True
+            world.recorder.kept.is_own = world.is_ours
             keep_run(world.run, world.recorder)
         try:
             with auditing(options.audit, world.clock, self._about(world), self._say) as audit:

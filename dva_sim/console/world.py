@@ -148,7 +148,7 @@ class ConsoleWorld(ToldWorld):
         recorder.robots = run.field.robots.keys()
 
         def lost(robot: str, reply: bytes) -> None:
-            run.audit.sent(run.clock.now, robot, "", reply)
+            run.sent(run.clock.now, robot, "", reply)
 
         about = self.feed.numbers, run.stage.labels
         windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
@@ -158,7 +158,11 @@ class ConsoleWorld(ToldWorld):
 
     def deafen(self, robot: str, on: bool) -> None:
         """The audit is told that a robot hears nothing, or hears again."""
-        (self.run.audit.deaf.add if on else self.run.audit.deaf.discard)(robot)
+        self.run.deafened(robot, on)
+
+    def is_ours(self, device: str) -> bool:
+        """Whether what a device sends is seen as it is sent; else it is one that has joined."""
+        return self.sockets is None or self.sockets.network.is_here(device)
 
     def serve_cameras(self, base: str) -> None:
         """The robots' pictures are to be had below this URL from now on."""

@@ -273,6 +273,25 @@ class DriveLog:
         return now
 
 
+@dataclass
+class Breach:
+    """A rule that somebody has broken.
+
+    Attributes:
+        rule: Which, such as `S1`.
+        who: The name of the agent.
+        time: When it did so first [s].
+        what: How, in words.
+        count: How often that was seen.
+    """
+
+    rule: str
+    who: str
+    time: float
+    what: str
+    count: int = 0
+
+
 class Recorder:
     """Collects; decides nothing.
 
@@ -283,6 +302,8 @@ class Recorder:
         messages: How many were sent.
         bytes: Of all of them [B].
         counters: Whatever else is counted, by what it is.
+        broken: What broke each rule first, by rule and agent.
+        facts: What the safety rules are judged by, in order, where that is kept.
         on_accepted: Told of each command that a robot accepts.
         on_hand: Told of what is done to a robot by hand.
     """
@@ -293,6 +314,8 @@ class Recorder:
         self.messages = self.bytes = 0
         self.counters: Counter[str] = Counter()
         self.violations: Counter[str] = Counter()
+        self.broken: dict[tuple[str, str], Breach] = {}
+        self.facts: list[Any] | None = None
         self.drives: list[DriveLog] = []
         self.newest_drive: dict[str, DriveLog] = {}  # of each robot
         self.views: dict[str, list[TrackPoint]] = defaultdict(list)
@@ -355,3 +378,5 @@ class Recorder:
         if not self.violations[rule]:
             self.tell(time, who, f"{rule} broken: {what}", "safety")
         self.violations[rule] += 1
+        first = self.broken.setdefault((rule, who), Breach(rule, who, time, what))
+        first.count += 1

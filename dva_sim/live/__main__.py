@@ -8,8 +8,8 @@ from pathlib import Path
 
 from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, LiveOptions
+from dva_sim.live.pipes import Outlet
 from dva_sim.live.process import run_part
-from dva_sim.live.recording import Outlet
 
 
 def main(argument: str) -> int:

@@ -28,8 +28,9 @@ from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_fa
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.dva_trace import traced
+from dva_sim.simulation.full.observations import STANDS, FactLog, motion_of, page_of
 from dva_sim.simulation.full.physical_world import Field
-from dva_sim.simulation.full.run import FILM_PERIOD
+from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD
 from dva_sim.simulation.full.stage import Stage
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
@@ -63,7 +64,7 @@ class LivePart(Protocol):
 def _trace_of(label: str, stage: Stage, options: LiveOptions) -> Callable[[str], object] | None:
     """What takes the lines of what a robot, or the DVA, decides, if that is wanted."""
     recorder = stage.recorder
-    if isinstance(recorder, LiveRecorder):
+    if isinstance(recorder, LiveRecorder) and recorder.keeps:
         return TraceLines(recorder, label)
     if options.record is None:
         return None
@@ -105,8 +106,7 @@ class DvaPart:
         if trace is not None:
             self._agent.desk = traced(self._agent.desk, trace, stage, memory)
         if isinstance(stage.recorder, LiveRecorder):
-            recorder = stage.recorder
-            self._agent.on_fact = lambda fact: recorder.put("fact", fact.row())
+            self._observe(stage.recorder, stage)
         self._agent.start()
         self._dispatcher = add_dispatcher(stage)
         self._stage = stage
@@ -114,6 +114,15 @@ class DvaPart:
         self._scripted = options.operators == "scripted"  # who follows a script settles no event
         self._settled_before = 0 if book.open else book.total
         self._beats: dict[str, Rate] = {}
+
+    def _observe(self, recorder: LiveRecorder, stage: Stage) -> None:
+        """Let the recorder have what is decided, and what the book shows, twice a second."""
+        agent, clock = self._agent, stage.clock
+        agent.on_fact = lambda fact: recorder.put("fact", fact.row())
+        page = partial(page_of, agent)
+        log = FactLog(recorder.observe, (), lambda _: STANDS, page, keeps_sent=False)
+        recorder.log = log
+        clock.every(WATCH_PERIOD, lambda: log.shows(clock.now, page()))
 
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: how the events stand."""
@@ -184,13 +193,24 @@ class WorldPart:
             trace = _trace_of(label, stage, options)
             robot.trace = None if trace is None else DecisionLog(trace, robot.controller)
         if isinstance(stage.recorder, LiveRecorder):
-            stage.clock.every(FILM_PERIOD, partial(self._sample, stage.recorder))
+            self._observe(stage.recorder)
 
-    def _sample(self, recorder: LiveRecorder) -> None:
-        """Say for the recording where everybody is."""
-        now = self._stage.clock.now
-        places = [(name, *point[1:]) for name, point in self._field.whereabouts(now)]
+    def _observe(self, recorder: LiveRecorder) -> None:
+        """Let the recorder have what robots accept, how they move, and where everybody is."""
+        robots = self._field.robots
+        log = FactLog(
+            recorder.observe, robots, lambda robot: motion_of(robots[robot]), keeps_sent=False
+        )
+        recorder.log, recorder.on_accepted, recorder.on_hand = log, log.accepted, log.by_hand
+        clock = self._stage.clock
+        clock.every(FILM_PERIOD, partial(self._sample, recorder, log))
+        clock.every(WATCH_PERIOD, lambda: log.places(clock.now, self._field.places()))
+
+    def _sample(self, recorder: LiveRecorder, log: FactLog) -> None:
+        now, field = self._stage.clock.now, self._field
+        places = [(name, *point[1:]) for name, point in field.whereabouts(now)]
         recorder.put("at", now, places)
+        log.moves(now, {name: motion_of(robot) for name, robot in field.robots.items()})
 
     def keep(self, recorder: LiveRecorder) -> None:
         """See `LivePart`: who there is, and which hazards are dealt with."""

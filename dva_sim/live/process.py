@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
-from dva_sim.kernel.recorder import Recorder
 from dva_sim.live.options import LiveOptions
 from dva_sim.live.parts import DvaPart, LivePart, make_part
-from dva_sim.live.recording import Keeper, LiveRecorder, Outlet
+from dva_sim.live.pipes import Outlet
+from dva_sim.live.recording import LiveRecorder, RunKeeping
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork, split_address
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
+from dva_sim.simulation.full.verdicts import Verdict
 
 REPORT_PERIOD = 1.0  # [s]
 LAST_WORDS = 0.5  # between the end and closing the sockets [s]
@@ -67,7 +68,7 @@ def run_part(
     epoch: float | None = None,
     supervised: bool = False,
     outlet: int | None = None,
-) -> None:
+) -> list[Verdict]:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
 
     One that is alone gives up if it has heard of nobody for `PATIENCE`, or a DVA until the end.
@@ -79,8 +80,11 @@ def run_part(
         number: Which operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
         supervised: End when standard input does: whoever started this process is gone.
-        outlet: Number of the open file that takes what is recorded. None, and a recording is
-            wanted: this part makes it alone.
+        outlet: Number of the open file that takes what is recorded, and judged. None: this part
+            does both alone.
+
+    Returns:
+        How the safety rules have fared, as far as this part can tell; none with an outlet.
 
     Raises:
         ConfigError: scenario, keys or part are not as they should be.
@@ -88,20 +92,16 @@ def run_part(
         NetworkError: a port is taken.
         NobodyThere: this part stayed alone.
     """
-    keeper = None
-    if options.records_run and outlet is None:
-        assert options.record is not None
-        keeper = Keeper(options.record, options.read(), options.seed)
-        outlet = keeper.inlet()
-    out = None if outlet is None else Outlet(outlet)
+    alone = RunKeeping(options, options.read()) if outlet is None else None
+    out = Outlet(alone.inlet() if alone is not None else outlet or 0)
     try:
         _run_part(name, options, say, number, epoch, supervised, out)
     finally:
-        if out is not None:
-            out.close()
-        lost = None if keeper is None else keeper.finish()
+        out.close()
+        lost = None if alone is None else alone.finish()
     if lost is not None:
         raise DvaSimError(lost)
+    return [] if alone is None else alone.verdicts()
 
 
 def _run_part(
@@ -111,28 +111,27 @@ def _run_part(
     number: int,
     epoch: float | None,
     supervised: bool,
-    out: Outlet | None,
+    out: Outlet,
 ) -> None:
     scenario = options.read()
     ring = None if options.keys is None else KeyRing(options.keys)
-    clock, recorder = LiveClock(epoch), Recorder()
-    if out is not None:
-        recorder = LiveRecorder(clock, out)
+    clock = LiveClock(epoch)
+    recorder = LiveRecorder(clock, out, keeps=options.records_run)
 
     def tell(line: str) -> None:
         recorder.tell(clock.now, name, line, "link")
 
     network = SocketNetwork(clock, ring, tell, scenario.zeromq)
-    if isinstance(recorder, LiveRecorder):
-        team = frozenset(team_of(scenario))
-        recorder.is_own = team.__contains__ if supervised else network.is_here
-        network.watcher = recorder.message
+    team = frozenset(team_of(scenario))
+    recorder.is_own = team.__contains__ if supervised else network.is_here
+    network.watcher = recorder.message
     try:
         joining = _joining(network, options, name)
         stage = Stage(scenario, options.seed, network, recorder, joining, _time_of_day(clock))
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)
         part = make_part(name, stage, options, number)
+        recorder.here(device.id_tag for device in stage.devices)
         gc.freeze()  # what stays for the whole run is not looked through again and again
         reporter = _Reporter(name, number, stage, part, network)
         clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
@@ -202,6 +201,7 @@ class _Reporter:
         recorder, part = self._stage.recorder, self._part
         if isinstance(recorder, LiveRecorder):
             part.keep(recorder)
+            recorder.is_alive()
         story, recorder.timeline = recorder.timeline, []
         clock = self._network.clock
         return Report(

@@ -11,39 +11,43 @@ from __future__ import annotations
 
 import fcntl
 import json
-import os
 import re
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
-from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
+from dva_sim.agents.observation import CameraFrame
 from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.kernel.streams import Streams
+from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, Facts, LiveJudge, observation_of
+from dva_sim.live.options import LiveOptions
+from dva_sim.live.pipes import Inlets, Outlet
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings.writing import PART, SENT, check_target, write_recording
+from dva_sim.recordings.writing import HELD_TO, PART, SENT, check_target, write_recording
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.hazards import draw_incidents
+from dva_sim.simulation.full.observation_json import as_plain
+from dva_sim.simulation.full.observations import FactGap, FactLog, terms_of
 from dva_sim.simulation.full.recording import ending_of, event_about
 from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.full.verdicts import Verdict
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.hazards import Surroundings
 
 FORMAT = 1  # of the lines
 MOST_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
 BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
-PIPE_BYTES = 1024 * 1024  # that may wait to be taken
 MOST_FACTS = 20_000  # of which one knows that they were said
 MOST_STRANGERS = 200  # devices of another make whose messages are kept
 _ENDS = re.compile(
@@ -54,52 +58,25 @@ _NOT_KEPT = "not recorded"
 Line = list[Any]
 
 
-class Outlet:
-    """Writes lines into a pipe, and never waits for whoever reads them.
-
-    Args:
-        file: Number of the open file; it is closed by `close`.
-    """
-
-    def __init__(self, file: int) -> None:
-        self._file, self._rest = file, b""
-        os.set_blocking(file, False)
-
-    def put(self, line: bytes) -> bool:
-        """Write a whole line, or none of it: whether there was room."""
-        if not self._flush():
-            return False
-        self._rest = line + b"\n"
-        self._flush()
-        return True
-
-    def _flush(self) -> bool:
-        with suppress(BlockingIOError, BrokenPipeError):
-            while self._rest:
-                self._rest = self._rest[os.write(self._file, self._rest) :]
-        return not self._rest
-
-    def close(self) -> None:
-        """Say what was begun, if there is room, and nothing more."""
-        self._flush()
-        os.close(self._file)
-
-
 class LiveRecorder(Recorder):
     """A recorder whose part of the story goes to the recording at once.
 
     Args:
         clock: The part's.
         outlet: Takes lines.
+        keeps: Whether there is to be a recording; else only what the rules are judged by is said.
 
     Attributes:
+        log: Takes what the rules are judged by and this part sees; None: it sees nothing of that.
         is_own: Whether a device, by its id, is of this run: what it sends is kept where it is
             sent, what others send where it arrives.
     """
 
-    def __init__(self, clock: Clock, outlet: Outlet) -> None:
+    def __init__(self, clock: Clock, outlet: Outlet, keeps: bool = True) -> None:
         super().__init__()
-        self._clock, self._outlet = clock, outlet
+        self._clock, self._outlet, self.keeps = clock, outlet, keeps
+        self.log: FactLog | None = None
+        self._filmed, self._missing = set[str](), 0
         self.is_own: Callable[[str], bool] = lambda _: False
         self._strangers: set[str] = set()
         self._second, self._room = 0, BYTES_PER_SECOND
@@ -107,7 +84,20 @@ class LiveRecorder(Recorder):
         self._facts: dict[str, Any] = {}
 
     def put(self, *line: Any) -> bool:
-        """Keep a line: whether it was."""
+        """Keep a line: whether it was. That one is missing which the rules need is said later."""
+        if not self.keeps and line[0] not in JUDGED:
+            return True
+        if self._missing:
+            gap = as_plain(FactGap(self._clock.now, self._missing))
+            if not self._put([SEEN, gap[1], gap[0], gap[2]]):
+                self._missing += line[0] in JUDGED
+                return False
+            self._missing = 0
+        kept = self._put(line)
+        self._missing += line[0] in JUDGED and not kept
+        return kept
+
+    def _put(self, line: Sequence[Any]) -> bool:
         if (second := int(time.monotonic())) != self._second:
             self._second, self._room = second, BYTES_PER_SECOND
         data = json.dumps(line).encode() if self._room > 0 else b""
@@ -123,6 +113,19 @@ class LiveRecorder(Recorder):
                 self._facts.clear()
             self._facts[key] = line
 
+    def observe(self, fact: Any) -> None:
+        """Keep a fact that the rules are judged by."""
+        word, time, told = as_plain(fact)
+        self.put(SEEN, time, word, told)
+
+    def is_alive(self) -> None:
+        """Say that this part has told all that it knows up to now: nobody has to wait for it."""
+        self.here(())
+
+    def here(self, nodes: Iterable[str]) -> None:
+        """Say which devices are of this process: what they send is said here, and nowhere else."""
+        self.put(HERE, self._clock.now, sorted(nodes))
+
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
         """See `Recorder`."""
         super().tell(time, who, what, kind)
@@ -136,14 +139,26 @@ class LiveRecorder(Recorder):
         """A node of this process sends a message, or takes one."""
         now = self._clock.now
         if isinstance(payload, CameraFrame):
-            self.put("frame", now, node, payload.observation, payload.captured)
+            if self.keeps or node not in self._filmed:  # the rules need the clock behind one
+                self._filmed.add(node)
+                self.put(FRAME, now, node, payload.observation, payload.captured)
             return
+        if not self.keeps and b"<HBMsg>" in payload and sent:
+            return
+        if sent and self.log is not None:
+            self.log.sent(now, node, "", payload)
         ends = _ENDS.search(payload, 0, 400)
         if ends is None:
             return
         destination, source = ends[1].decode(), ends[2].decode()
-        if sent or self._is_news(source, payload):
-            self.put("sent", now, source, destination, payload.decode())
+        if sent or (self.keeps and self._is_news(source, payload)):
+            self.put(SAID, now, node if sent else source, destination, payload.decode())
+        if sent or self.log is None:
+            return
+        if self._room <= 0:
+            self._missing += 1
+        elif self._is_message(payload):
+            self.log.delivered(now, source, node, payload)
 
     def _is_news(self, source: str, data: bytes) -> bool:
         """Whether it is a message, of somebody who keeps no record for us."""
@@ -152,11 +167,18 @@ class LiveRecorder(Recorder):
         if source not in self._strangers and len(self._strangers) >= MOST_STRANGERS:
             self.counters[_NOT_KEPT] += 1
             return False
+        if not self._is_message(data):
+            return False  # it is counted where it is refused
+        self._strangers.add(source)
+        return True
+
+    def _is_message(self, data: bytes) -> bool:
+        """Whether it is one by the schema; what is none costs as much room as if it were kept."""
         try:
             decode(data)
         except ProtocolError:
-            return False  # it is counted where it is refused
-        self._strangers.add(source)
+            self._room -= len(data)
+            return False
         return True
 
     def catch_up(self) -> None:
@@ -263,40 +285,33 @@ class Keeper:
 
     Args:
         target: The recording that is to be made.
-        about: What the run is.
+        scenario: What is run.
+        seed: With which seed.
+        judge: Judges it by the safety rules meanwhile; None: somebody else does that.
+
+    Attributes:
+        inlets: Where parts write.
 
     Raises:
         ConfigError: it cannot be written.
     """
 
-    def __init__(self, target: Path, scenario: Scenario, seed: int) -> None:
+    def __init__(
+        self, target: Path, scenario: Scenario, seed: int, judge: LiveJudge | None = None
+    ) -> None:
         self._target, self.path = target, target.with_name(target.name + PART)
         start = {"format": FORMAT, "scenario": scenario.model_dump(mode="json"), "seed": seed}
+        start[HELD_TO] = terms_of(scenario).about_robots()
         self.problem: str | None = None
         self._room = MOST_BYTES
         self._file = _emptied(self.path)
-        self._threads: list[threading.Thread] = []
+        self.inlets = Inlets(self._keep, judge)
         self._lock = threading.Lock()
         self._keep(json.dumps(start).encode() + b"\n")
 
     def inlet(self) -> int:
-        """A new pipe: where a part writes; whoever gets it closes it."""
-        reads, writes = os.pipe()
-        with suppress(OSError):
-            fcntl.fcntl(writes, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
-        thread = threading.Thread(target=self._take, args=(reads,), daemon=True)
-        self._threads.append(thread)
-        thread.start()
-        return writes
-
-    def _take(self, reads: int) -> None:
-        """Take whole lines until the part has ended, however it did."""
-        rest = b""
-        while data := os.read(reads, 1 << 18):
-            whole, _, rest = (rest + data).rpartition(b"\n")
-            if whole:
-                self._keep(whole + b"\n")
-        os.close(reads)
+        """See `Inlets`."""
+        return self.inlets.inlet()
 
     def _keep(self, lines: bytes) -> None:
         with self._lock:
@@ -314,8 +329,7 @@ class Keeper:
 
     def close(self) -> None:
         """Wait until all parts have ended; what they have said is in the file."""
-        for thread in self._threads:
-            thread.join()
+        self.inlets.join()
         self._file.close()
 
     def finish(self) -> str | None:
@@ -329,6 +343,41 @@ class Keeper:
         if self.problem is None:
             return None
         return f"{self._target} is recorded up to {lasted:.0f} s only: {self.problem}"
+
+
+class RunKeeping:
+    """What keeps and judges a live run: a recording, where one is wanted, and the safety rules.
+
+    Args:
+        options: How the run is done.
+        scenario: What is run.
+
+    Raises:
+        ConfigError: the recording cannot be written.
+    """
+
+    def __init__(self, options: LiveOptions, scenario: Scenario) -> None:
+        self._judge = LiveJudge(terms_of(scenario))
+        self._keeper: Keeper | None = None
+        self._inlets = Inlets(judge=self._judge)
+        if options.records_run and options.record is not None:
+            self._keeper = Keeper(options.record, scenario, options.seed, self._judge)
+            self._inlets = self._keeper.inlets
+
+    def inlet(self) -> int:
+        """See `Inlets`."""
+        return self._inlets.inlet()
+
+    def finish(self) -> str | None:
+        """Make the recording when all parts have ended; see `Keeper`."""
+        if self._keeper is not None:
+            return self._keeper.finish()
+        self._inlets.join()
+        return None
+
+    def verdicts(self) -> list[Verdict]:
+        """How the safety rules have fared, once all is finished."""
+        return self._judge.verdicts()
 
 
 # --- from lines to a recording -----------------------------------------------------------
@@ -393,12 +442,14 @@ class _Told:
             self.start = json.loads(first)
             if self.start["format"] > FORMAT:
                 raise ValueError("made by a later version")
-            for line in lines[:-1]:  # what is behind the last end of a line is not whole
-                kind, *values = json.loads(line)
+            # What is behind the last end of a line is not whole.
+            told = [json.loads(line) for line in lines[:-1]]
+            for kind, *values in told:
                 getattr(self, f"_{kind}")(*values)
+            self.recorder.facts = _facts_in(told) if HELD_TO in self.start else None
         except OSError as error:
             raise ConfigError(f"cannot be read: {error.strerror}", part) from error
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise ConfigError(f"holds no lines of a live run: {error}", part) from error
 
     def playback(self) -> Playback:
@@ -431,6 +482,7 @@ class _Told:
             endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
             events=events,
             facts=self._facts,
+            about_robots=self.start.get(HELD_TO),
         )
 
     def _traffic(self) -> Iterator[Sent]:
@@ -471,11 +523,16 @@ class _Told:
         self._traffic_of.append(Sent(when, source, destination, len(data), data))
 
     def _frame(self, when: float, robot: str, seen: list[Any], captured: float) -> None:
-        *values, hazards, visibility = seen
-        others = tuple(SeenHazard(*hazard) for hazard in hazards)
-        view = Observation._make((*values, others, visibility))
         size = self.start["scenario"]["camera"]["frame_bytes"]
-        self._traffic_of.append(Sent(when, robot, "", size, CameraFrame(view, captured)))
+        frame = CameraFrame(observation_of(seen), captured)
+        self._traffic_of.append(Sent(when, robot, "", size, frame))
+
+    def _here(self, when: float, _: list[str]) -> None:
+        self._until(when)
+
+    def _seen(self, when: float, *_: Any) -> None:
+        """See `_facts_in`."""
+        self._until(when)
 
     @property
     def _traffic_of(self) -> list[Sent]:
@@ -511,3 +568,12 @@ class _Told:
 
     def _trace(self, when: float, who: str, line: str) -> None:
         self.traces[who].append((when, line))
+
+
+def _facts_in(told: Sequence[Line]) -> list[Any]:
+    """What the rules are judged by, in order of time; what one part says stays in its order."""
+    reads = Facts(most=None)
+    for line in told:
+        reads.note(line)
+    facts = [fact for line in told if (fact := reads.fact(line)) is not None]
+    return sorted(facts, key=lambda fact: fact.time)

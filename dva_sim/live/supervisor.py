@@ -17,7 +17,8 @@ from typing import IO
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import Report
-from dva_sim.live.recording import Keeper
+from dva_sim.live.recording import RunKeeping
+from dva_sim.simulation.full.verdicts import Verdict, broken_rules
 from dva_sim.simulation.scenario import Scenario
 
 SPEAK_WITHIN = 60.0  # for a part to speak, from its start and after each time [s]
@@ -50,11 +51,13 @@ class Summary:
         why: `settled`, `the script is done`, `time is up` or `interrupted`.
         latest: The last report of each part, by its name.
         lost: What was to be recorded and is not, in one line; None: nothing.
+        verdicts: How the safety rules have fared.
     """
 
     why: str
     latest: dict[str, Report] = field(default_factory=dict)
     lost: str | None = None
+    verdicts: list[Verdict] = field(default_factory=list)
 
 
 class Supervisor:
@@ -72,7 +75,7 @@ class Supervisor:
         self._epoch = time.monotonic()
         self._interrupted = False
         self._settled_since: float | None = None
-        self._keeper: Keeper | None = None
+        self._keeping: RunKeeping | None = None
 
     def run(self) -> Summary:
         """Start everything, wait for the end, end everything.
@@ -81,20 +84,16 @@ class Supervisor:
             PartFailed: a part could not start, or ended by itself.
             ConfigError: the scenario cannot be run live.
         """
-        scenario, options = self._options.check(), self._options
-        if options.records_run and options.record is not None:
-            self._keeper = Keeper(options.record, scenario, options.seed)
+        scenario = self._options.check()
+        keeping = self._keeping = RunKeeping(self._options, scenario)
         try:
             why = self._run(scenario)
         except DvaSimError as error:
-            lost = self._finish()
-            raise error if lost is None else type(error)(f"{error}; {lost}") from None
+            told = [str(error), keeping.finish() or "", broken_rules(keeping.verdicts())]
+            raise type(error)("; ".join(filter(None, told))) from None
         latest = {c.name: c.latest for c in self._children if c.latest}
-        return Summary(why, latest, self._finish())
-
-    def _finish(self) -> str | None:
-        """Make the recording, if one is wanted; in one line why not."""
-        return None if self._keeper is None else self._keeper.finish()
+        lost = keeping.finish()
+        return Summary(why, latest, lost, keeping.verdicts())
 
     def _run(self, scenario: Scenario) -> str:
         limit = scenario.horizon_s if self._options.duration is None else self._options.duration
@@ -121,7 +120,8 @@ class Supervisor:
 
     def _start(self, name: str, part: str, dva: str | None, number: int = 1, port: int = 0) -> None:
         """Start a part; it ends when its standard input does, whatever happens to us."""
-        outlet = None if self._keeper is None else self._keeper.inlet()
+        assert self._keeping is not None
+        outlet = self._keeping.inlet()
         told = self._arguments(part, dva, number, port, outlet)
         process = subprocess.Popen(
             [sys.executable, "-m", "dva_sim.live", told],
@@ -129,10 +129,9 @@ class Supervisor:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C reaches us alone; we end the parts in good order
-            pass_fds=() if outlet is None else (outlet,),
+            pass_fds=(outlet,),
         )
-        if outlet is not None:
-            os.close(outlet)
+        os.close(outlet)
         child = _Child(name, process)
         self._children.append(child)
         for stream, take in ((process.stdout, self._take_line), (process.stderr, self._take_error)):
@@ -140,9 +139,7 @@ class Supervisor:
             os.set_blocking(stream.fileno(), False)
             self._selector.register(stream, selectors.EVENT_READ, (child, take))
 
-    def _arguments(
-        self, part: str, dva: str | None, number: int, port: int, outlet: int | None
-    ) -> str:
+    def _arguments(self, part: str, dva: str | None, number: int, port: int, outlet: int) -> str:
         told = {**vars(self._options), "dva": dva, "port": port}
         for key in PATHS:
             told[key] = None if told[key] is None else str(told[key])

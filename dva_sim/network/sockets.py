@@ -1,8 +1,7 @@
 """Asking and telling over ZeroMQ sockets, in real time.
 
-Each node of this process has two sockets of its own: a ROUTER for the requests to it, on the
-port it registers with, and an XPUB for what it publishes, on the next port. Peers connect to
-them with REQ or DEALER, and with SUB. `protocol/README.md` says the same for other programs.
+Each node has two sockets: a ROUTER for the requests to it, on the port that it registers with, and
+an XPUB for what it publishes, on the next one; peers use REQ, DEALER, SUB (`protocol/README.md`).
 """
 
 from __future__ import annotations
@@ -154,6 +153,7 @@ class ReqWire(SocketWire):
 
     def _reply(self, frames: list[bytes]) -> None:
         if len(frames) == 1:
+            self._network.note(self._node, frames[0], sent=False)
             self._on_reply(self._tag, frames[0])
 
 
@@ -169,6 +169,7 @@ class DealerWire(SocketWire):
 
     def _reply(self, frames: list[bytes]) -> None:
         if len(frames) == 3 and len(frames[0]) == 8 and not frames[1]:
+            self._network.note(self._node, frames[2], sent=False)
             self._on_reply(int.from_bytes(frames[0], "big"), frames[2])
 
 

@@ -30,7 +30,7 @@ class VirtualNetwork:
         links: Gives the link from one node to another, and the one back.
         traffic: Told of each message sent: time [s], from, to, size [B], what.
         connector: Makes the connections.
-        delivered: Told of each request and publication that arrives: time [s], from, to, what.
+        delivered: Told of each message that arrives: time [s], from, to, what.
 
     Attributes:
         dropped: Publications that found the pipe of a subscriber full.
@@ -238,9 +238,14 @@ class VirtualWire(VirtualClient):
             network.clock,
             network.links(self.node, self.peer),
             at_peer,
-            lambda payload: self._on_reply(*payload),
+            self._replied,
         )
         return made
+
+    def _replied(self, payload: tuple[int, bytes]) -> None:
+        network = self._network
+        network.delivered(network.clock.now, self.peer, self.node, payload[1])
+        self._on_reply(*payload)
 
     def _answer(self, connection: AnyConnection, tag: int, reply: bytes) -> None:
         size = len(reply) + FRAMING

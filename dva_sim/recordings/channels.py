@@ -24,6 +24,7 @@ from dva_sim.recordings import messages
 from dva_sim.recordings.messages import FRAME, HERE, XML, ChannelMessage, stamped
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.worlds.hazards import Hazard, Raster
 
 POSE, ACTIVITY, FIX, SEEN = "pose", "activity", "fix", "seen"  # last parts of topics
@@ -313,7 +314,7 @@ def _words(text: str, x: float, y: float, z: float = 0.0) -> dict[str, Any]:
 
 
 STORY, MESSAGES, DECISIONS, AUDIT = "/story", "/messages", "/decisions/", "/audit"
-FACTS = "/facts"
+FACTS, OBSERVED = "/facts", "/observed/"
 # Last parts of topics.
 SCREEN, COMMANDS, CAMERA, APPLIED = "screen", "commands", "camera", "applied"
 LEVELS = {"safety": 3, "mode": 1, "link": 1}  # of Foxglove's log; all else is for information
@@ -354,14 +355,26 @@ _IN_SECONDS = {name: f"{name}_s" for name in ("arrival_in", "advised_in", "waite
 
 
 def said(playback: Playback) -> Iterator[ChannelMessage]:
-    """All messages as they went onto the network; of a camera's frame, what it stands for."""
-    names = names_of(playback.labels)
-    for sent in playback.recorder.traffic or ():
-        if isinstance(sent.payload, CameraFrame):
-            yield _frame(sent, names)
-        else:
-            topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
-            yield ChannelMessage(sent.time, topic, XML, sent.payload)
+    """All messages as they went onto the network, among the facts that rules are judged by.
+
+    Of a camera's frame, what it stands for. What happens at the same moment stays in its order.
+    """
+    names, traffic = names_of(playback.labels), iter(playback.recorder.traffic or ())
+    for fact in playback.recorder.facts or ():
+        if not isinstance(fact, Sent):
+            word, time, told = as_plain(fact)
+            yield stamped(time, f"{OBSERVED}{word}", f"dva_sim.{type(fact).__name__}", **told)
+        elif (sent := next(traffic, None)) is not None:
+            yield _sent(sent, names)
+    for sent in traffic:
+        yield _sent(sent, names)
+
+
+def _sent(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
+    if isinstance(sent.payload, CameraFrame):
+        return _frame(sent, names)
+    topic = f"{MESSAGES}/{names[sent.source]}/{names[sent.destination]}"
+    return ChannelMessage(sent.time, topic, XML, sent.payload)
 
 
 def decided(traces: Mapping[str, Sequence[tuple[float, str]]]) -> Iterator[ChannelMessage]:
@@ -436,6 +449,7 @@ def _frame(sent: Sent, names: Mapping[str, str]) -> ChannelMessage:
         to=names[sent.destination],
         size_bytes=sent.size,
         captured_s=frame.captured,
+        tick_ms=seen.tick,
         x_m=round(seen.x, messages.PLACES),
         y_m=round(seen.y, messages.PLACES),
         heading_rad=round(seen.heading, messages.PLACES),

@@ -104,6 +104,8 @@ _WORDS: dict[str, Schema] = {
     "nsec": {"type": "integer", "minimum": 0, "maximum": 999_999_999},
     "bytes": {"type": "string", "contentEncoding": "base64"},
     "none": {"type": "array", "maxItems": 0},
+    "list": {"type": ["array", "null"]},
+    "object": {"type": ["object", "null"]},
     "nine": {"type": "array", "items": _NUMBER, "minItems": 9, "maxItems": 9},
 }
 """Types of fields by the word that stands for them; the types made of them come on top."""

@@ -30,6 +30,8 @@ from dva_sim.recordings.messages import XML
 from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
 from dva_sim.simulation.full import Ending, Playback
 from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.simulation.full.observation_json import of_plain
+from dva_sim.simulation.full.observations import SafetyTerms, terms_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.worlds.hazards import KINDS, QUANTITIES, Hazard, Raster, Surroundings
 from dva_sim.worlds.site import Site
@@ -147,6 +149,7 @@ class Opened:
         lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
         traces: The lines of what was decided, by who decides.
         audit: The rows of the audit log.
+        terms: What the run is held to by the safety rules; None: the file has no facts for that.
     """
 
     playback: Playback
@@ -155,6 +158,7 @@ class Opened:
     lasted: float
     traces: dict[str, list[str]] = field(default_factory=dict)
     audit: list[dict[str, Any]] = field(default_factory=list)
+    terms: SafetyTerms | None = None
 
     @property
     def is_whole(self) -> bool:
@@ -178,9 +182,12 @@ def read_recording(path: Path) -> Opened:
         raise ConfigError(str(error), path) from None
     try:
         return _opened(raw)
-    except (KeyError, TypeError, ValueError, pydantic.ValidationError) as error:
+    except (*_BROKEN, pydantic.ValidationError) as error:
         problem = f"was made by dva-sim {(raw.about or {}).get('version')} and cannot be read: "
         raise ConfigError(problem + " ".join(str(error).split())[:200], path) from None
+
+
+_BROKEN = KeyError, TypeError, ValueError, AttributeError, IndexError
 
 
 class _Exactly:
@@ -212,6 +219,8 @@ class _Raw:
         files: What is attached, by name.
         said: Content of the messages, with their time [s], by topic.
         ends: Source and destination of the channels of XML, by topic.
+        order: What the safety rules are judged by, messages among them, as it stands in the file:
+            time [s], topic, content.
         time: Of the last message [s].
         is_cut: Whether the end of the file is missing.
     """
@@ -220,6 +229,7 @@ class _Raw:
     files: dict[str, bytes] = field(default_factory=dict)
     said: dict[str, list[tuple[float, Any]]] = field(default_factory=lambda: defaultdict(list))
     ends: dict[str, dict[str, str]] = field(default_factory=dict)
+    order: list[tuple[float, str, Any]] = field(default_factory=list)
     time: float = 0.0
     is_cut: bool = False
 
@@ -250,23 +260,29 @@ class _Raw:
         if self.about is None or digest(self.files) != self.about.get(DIGEST):
             raise _Damaged(CUT if self.is_cut else "is damaged: something is missing or changed")
 
-    def _take(self, record: Any, channels: dict[int, Any]) -> None:
+    def _take(self, record: Any, opened: dict[int, Any]) -> None:
         from mcap.records import Attachment, Channel, Message, Metadata
 
         if isinstance(record, Message):
-            channel = channels[record.channel_id]
+            channel = opened[record.channel_id]
             is_xml = channel.message_encoding == XML
             self.time = record.log_time / messages.NS
             content = record.data if is_xml else json.loads(record.data)
             self.said[channel.topic].append((self.time, content))
+            if is_xml or channel.topic.startswith(channels.OBSERVED) or _is_camera(channel.topic):
+                self.order.append((self.time, channel.topic, content))
         elif isinstance(record, Channel):
-            channels[record.id] = record
+            opened[record.id] = record
             if record.metadata:
                 self.ends[record.topic] = dict(record.metadata)
         elif isinstance(record, Attachment):
             self.files[record.name] = record.data
         elif isinstance(record, Metadata) and record.name == ABOUT:
             self.about = dict(record.metadata)
+
+
+def _is_camera(topic: str) -> bool:
+    return topic.endswith(f"/{channels.CAMERA}")
 
 
 # --- from what was said to what can be shown -------------------------------------------
@@ -302,7 +318,24 @@ def _opened(raw: _Raw) -> Opened:
         if topic.startswith(channels.DECISIONS)
     }
     audit = [json.loads(entry["row"]) for _, entry in raw.said.get(channels.AUDIT, ())]
-    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces, audit)
+    terms = None
+    if writing.HELD_TO in run:
+        terms = terms_of(scenario, run[writing.HELD_TO])
+        playback.recorder.facts = list(_facts(raw, run))
+    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces, audit, terms)
+
+
+def _facts(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Any]:
+    """What the safety rules are judged by: facts, and messages and pictures between them."""
+    ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
+    for time, topic, content in raw.order:
+        if topic.startswith(channels.OBSERVED):
+            yield of_plain(topic.removeprefix(channels.OBSERVED), time, content)
+        elif _is_camera(topic):
+            yield Sent(time, ids[topic.split("/")[1]], "", 0, content)
+        else:
+            ends = raw.ends[topic]["source"], raw.ends[topic]["destination"]
+            yield Sent(time, *ends, len(content), content)
 
 
 def _tables(data: bytes) -> dict[str, list[dict[str, Any]]]:

@@ -30,6 +30,7 @@ from dva_sim.recordings import channels, messages
 from dva_sim.recordings.messages import SCHEMAS, XML, ChannelMessage
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.simulation.full.observations import terms_of
 from dva_sim.simulation.full.run import FILM_PERIOD
 from dva_sim.simulation.scenario import Scenario, site_of
 from dva_sim.worlds.hazards import KINDS
@@ -95,6 +96,7 @@ FORMAT = 1  # of what is attached; a reader refuses a later one
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
+HELD_TO = "held_to"  # what robots are held to, where the facts are recorded that this is judged by
 SENT = ("responder", "operator", "actor")  # to an event
 DRIVE = ("robot", "operator", "event", "ordered_s", "started_s", "ended_s", "outcome")
 SUFFIX, PART = ".mcap", ".part"  # a recording; what a live run puts together until its end
@@ -309,7 +311,13 @@ def facts(playback: Playback) -> dict[str, Any]:
             {key: getattr(drive, key.removesuffix("_s")) for key in DRIVE}
             for drive in playback.recorder.drives
         ],
+        **({} if playback.recorder.facts is None else {HELD_TO: _held_to(playback)}),
     }
+
+
+def _held_to(playback: Playback) -> dict[str, Any]:
+    """What the robots are held to, beside the scenario: their profiles may be files of a user."""
+    return playback.about_robots or terms_of(playback.scenario).about_robots()
 
 
 def _event(event: Event) -> dict[str, Any]:

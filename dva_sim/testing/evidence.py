@@ -1,6 +1,7 @@
 """What proves something: recordings, traces and audit logs.
 
-Messages are valid, every decision is made the same again, and a chain of rows is whole.
+Messages are valid, every decision is made the same again, a chain of rows is whole; and what
+happened in a recorded run is held against the safety rules, whatever was decided.
 """
 
 from __future__ import annotations
@@ -8,10 +9,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.mistakes import Problem, check_message
+
+if TYPE_CHECKING:  # late: start-up
+    from dva_sim.recordings.reading import Opened
+    from dva_sim.simulation.full.verdicts import Verdict
 
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 
@@ -19,15 +24,18 @@ CUT: Final = "its last line is cut off, as of a program that was killed; all oth
 Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was looked at
 
 
-def check_recording(path: Path) -> Found:
-    """What is wrong with a recording, and doubts: its messages, and the decisions it holds."""
+def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Verdict]]:
+    """What is wrong with a recording, doubts, what was looked at, and how each rule has fared.
+
+    Its messages are judged, the decisions it holds, and by the safety rules what it shows.
+    """
     from dva_sim.recordings.audit_log import verify_plain  # late: start-up
     from dva_sim.recordings.reading import read_recording  # late: start-up
 
     try:
         opened = read_recording(path)
     except ConfigError as error:
-        return [Problem(1, 1, error.problem)], [], ""
+        return [Problem(1, 1, error.problem)], [], "", []
     traffic = [(s, s.payload) for s in opened.playback.recorder.traffic or ()]
     said = [(sent, data) for sent, data in traffic if isinstance(data, bytes)]
     problems = list[Problem]()
@@ -44,7 +52,20 @@ def check_recording(path: Path) -> Found:
         if wrong := found.problem:
             problems.append(Problem(1, 1, f"audit log: row {wrong.number} {wrong.text}"))
         note += f", an audit log whose last row is {found.rows} with the hash {found.head}"
-    return problems, [] if opened.is_whole else ["was cut short"], note
+    doubts = [] if opened.is_whole else ["was cut short"]
+    try:
+        return problems, doubts, note, judged_recording(opened)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        told = f"facts that no run of dva-sim has written: {' '.join(repr(error).split())[:200]}"
+        return [*problems, Problem(1, 1, told)], doubts, note, []
+
+
+def judged_recording(opened: Opened) -> list[Verdict]:
+    """How each safety rule has fared in a recorded run, as far as the recording goes."""
+    from dva_sim.simulation.full.verdicts import judged  # late: start-up
+
+    until = "" if opened.is_whole else f", up to {opened.playback.duration:.0f} s"
+    return judged(opened.playback.recorder.facts, opened.terms, until)
 
 
 def check_trace(path: Path) -> Found:

@@ -10,13 +10,16 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.protocol.limits import schema_file
 from dva_sim.protocol.mistakes import READ_BYTES, Problem, check_message, not_text
+
+if TYPE_CHECKING:  # late: start-up
+    from dva_sim.simulation.full.verdicts import Verdict
 
 YAML_BYTES: Final = 256 * 1024
 PLAN_BYTES: Final = 16 * 1024 * 1024
@@ -45,13 +48,19 @@ class NotReadError(DvaSimError):
 class FileVerdict:
     """What was found: the kind of a file, its problems, and what does not go together in it.
 
-    It is valid if it has no problems. A note says how much was looked at.
+    It is valid if it has no problems, and breaks no rule. A note says how much was looked at.
     """
 
     kind: str
     problems: list[Problem]
     doubts: Sequence[str] = ()
     note: str = ""
+    rules: Sequence[Verdict] = ()
+
+    @property
+    def broken(self) -> int:
+        """How many safety rules are broken."""
+        return len({verdict.rule for verdict in self.rules if verdict.is_broken})
 
 
 def check_file(path: Path) -> FileVerdict:

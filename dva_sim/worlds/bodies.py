@@ -465,10 +465,13 @@ class RobotBody(Body):
         world.wake(self)
 
     @property
-    def asked_until(self) -> float:
-        """Until when it was last asked to move [s], in whole ticks; 0: to stand."""
-        target = self._asked.newest
-        return target.end * self._world.dt if target.speed or target.turn_rate else 0.0
+    def asked(self) -> tuple[float, float, float]:
+        """Speed [m/s] and turn rate [rad/s] that the motors were asked for last, and their end [s].
+
+        The end is that of a whole tick; 0: they were asked to stand.
+        """
+        speed, turn_rate, end = self._asked.newest
+        return speed, turn_rate, end * self._world.dt if speed or turn_rate else 0.0
 
     def push(self, tick: int, dt: float) -> bool:
         """Apply the motors' forces for one tick; False if the robot stands and shall stand.

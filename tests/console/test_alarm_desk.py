@@ -9,6 +9,7 @@ from phone_page import PhonePage
 
 from dva_sim.console.alarm_desk import ESCALATED_FOR, AlarmDesk, RunFacts
 from dva_sim.console.refusal import Refused
+from dva_sim.worlds.bodies import TickTarget
 
 
 def event(number: int = 1, **more: Any) -> dict[str, Any]:
@@ -65,6 +66,27 @@ def test_a_robot_whose_watchdog_has_stopped_it_is_lost(desk: AlarmDesk) -> None:
     assert texts(desk, robots=[robot(0), robot(1)]) == []
     lost = robot(0, watchdog_left_s=0.0)
     assert texts(desk, robots=[lost]) == ["robot-1 is lost in drive: its watchdog stopped it"]
+
+
+@pytest.mark.invariant("S4")
+def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_seen_it(
+    page: PhonePage, desk: AlarmDesk
+) -> None:
+    assert texts(desk) == []
+    run = page.world.run
+    body = next(iter(run.field.robots.values())).body
+    body._asked.put(0, TickTarget(2.0, 0.0, body._world.tick_at(1e6)))
+    page.let(1.0)
+    rows = {row["text"]: row for row in desk.look([], [], 10_000)["alarms"]}
+    asked = "S4 broken by robot-1: its motors are asked for 2.00 m/s and 0.00 rad/s"
+    assert (rows[asked]["priority"], rows[asked]["state"]) == ("critical", "unacknowledged")
+    assert 5_000 <= rows[asked]["since_ms"] <= 6_000
+
+    desk.acknowledge(rows[asked]["key"], "ana")
+    body._asked.put(0, TickTarget(0.0, 0.0, 0.0))
+    page.let(1.0)
+    again = {row["text"]: row["state"] for row in desk.look([], [], 20_000)["alarms"]}
+    assert again[asked] == "acknowledged"
 
 
 def test_a_robot_that_waits_for_its_first_command_is_not(desk: AlarmDesk) -> None:

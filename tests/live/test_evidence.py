@@ -19,7 +19,8 @@ from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live import recording
-from dva_sim.live.recording import Keeper, LiveRecorder, Outlet, TraceFile, finish
+from dva_sim.live.pipes import Outlet
+from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile, finish
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.recordings.reading import read_recording
@@ -238,6 +239,13 @@ def record(path: Path, lines: int = 20) -> Keeper:
     return keeper
 
 
+def found_in(path: Path) -> tuple[object, ...]:
+    """What is said of a recording, but for the safety rules: nobody has looked at robots here."""
+    *found, rules = check_recording(path)
+    assert {verdict.state for verdict in rules} == {"not judged"}
+    return tuple(found)
+
+
 def test_what_parts_say_becomes_a_recording_whose_messages_are_valid(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     assert record(path).finish() is None
@@ -248,7 +256,7 @@ def test_what_parts_say_becomes_a_recording_whose_messages_are_valid(tmp_path: P
     ]
     assert len(playback.recorder.tracks["robot-1"]) == 20
     assert playback.recorder.timeline[0].what == "is now in mode Idle"
-    assert check_recording(path) == ([], [], "20 messages")
+    assert found_in(path) == ([], [], "20 messages")
 
 
 def test_a_message_that_is_none_is_found_in_a_recording(tmp_path: Path) -> None:
@@ -282,7 +290,7 @@ def test_lines_that_were_left_are_made_a_recording_by_replay(tmp_path: Path) -> 
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "is now in mode Idle" in ended.stdout
-    assert check_recording(tmp_path / "run.mcap") == ([], [], "20 messages")
+    assert found_in(tmp_path / "run.mcap") == ([], [], "20 messages")
 
 
 def test_the_lines_of_a_run_that_goes_on_are_left_alone(tmp_path: Path) -> None:
@@ -293,7 +301,7 @@ def test_the_lines_of_a_run_that_goes_on_are_left_alone(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="belongs to a run that still goes on"):
         Keeper(tmp_path / "run.mcap", scenario_of(), 1)
     assert keeper.finish() is None
-    assert check_recording(tmp_path / "run.mcap") == ([], [], "20 messages")
+    assert found_in(tmp_path / "run.mcap") == ([], [], "20 messages")
 
 
 def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path: Path) -> None:

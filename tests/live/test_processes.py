@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import signal
 import socket
@@ -11,12 +12,13 @@ from pathlib import Path
 
 import pytest
 from command_line import call
-from programs import Programs, wait_until
+from programs import Program, Programs, wait_until
 
 from dva_sim.agents.robot.decision_log import replay
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.recordings.reading import read_recording
+from dva_sim.simulation.full.verdicts import RULES
 
 pytestmark = [
     pytest.mark.system,
@@ -40,6 +42,7 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
 ) -> None:
     run = programs.start(*SCRIPTED, "--record", "traces")
     assert run.ends() == 0, run.complained
+    assert all_held(run)
     for line in ("breaks out", "is now in mode Teleoperation", "is now in mode Idle"):
         assert line in run.said
     for line in ("200 of 200 commands obeyed", "an emergency: obeyed", "refused (wrong mode)"):
@@ -60,6 +63,42 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
     assert call("check", *(tmp_path / "traces").iterdir()).stdout.endswith("2 files: 2 valid\n")
 
 
+def all_held(run: Program) -> bool:
+    """Whether a run has said of each safety rule that it was held."""
+    return all(f"\n{rule} held: " in run.said for rule in RULES)
+
+
+DEAF = """
+from functools import partial
+
+from dva_sim.agents.operator.scripted import drill
+from dva_sim.agents.robot.controller import Decision, RobotController
+from dva_sim.live import parts
+from dva_sim.protocol import messages as m
+
+parts.drill = partial(drill, commands=10)
+RobotController._emergency = lambda *_: Decision(m.OK, "stopped")
+"""
+
+
+@pytest.mark.invariant("S3")
+def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_done(
+    programs: Programs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bug is in all processes; what it did is judged by what was seen."""
+    (tmp_path / "sitecustomize.py").write_text(DEAF)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    run = programs.start(*SCRIPTED, "--record", "run.mcap")
+    assert run.ends() == 1
+    assert "an emergency: obeyed" in run.said
+    (told,) = [line for line in run.said.splitlines() if " broken: " in line]
+    assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: obeys a command after an .*", told)
+    assert run.complained == ["error: the run has broken S3"]
+    ended = call("check", tmp_path / "run.mcap")
+    assert ended.returncode == 1
+    assert f"run.mcap: {told}" in ended.stdout
+
+
 def count_in(recording: Path, element: bytes) -> int:
     """How many messages with an element a recording holds; they, and its decisions, are valid."""
     ended = call("check", recording)
@@ -73,6 +112,7 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
 ) -> None:
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     assert run.ends() == 0, run.complained
+    assert all_held(run)
     assert "run.mcap written" in run.said
     file = tmp_path / "run.mcap"
     assert count_in(file, b"<SetTeleOp>") == 200 + 1 + 10
@@ -113,6 +153,7 @@ def test_a_simulated_person_drives_to_the_fire_and_confirms_it(
     run = programs.start("live", "drive-to-event", *NEAR, "--record", "traces")
     assert run.ends() == 0, run.complained
     assert "The run ended (settled): event 1 (fire) is confirmed." in run.said
+    assert all_held(run)
     assert programs.processes() == {}
     decided = list(replay(tmp_path / "traces" / "robot-1.trace.jsonl"))
     assert sum(isinstance(message.body, m.SetTeleOp) for message, _, _ in decided) > 10

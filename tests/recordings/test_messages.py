@@ -21,6 +21,8 @@ EVERYDAY = {
     *("foxglove.Log", "foxglove.PoseInFrame", "foxglove.FrameTransforms", "foxglove.LocationFix"),
     *("foxglove.SceneUpdate", "foxglove.Grid", "dva_sim.Activity", "dva_sim.Shown"),
     *("dva_sim.Command", "dva_sim.Applied", "dva_sim.Frame", "dva_sim.Hazard", XML),
+    *("dva_sim.Arrived", "dva_sim.Accepted", "dva_sim.Heard", "dva_sim.MotionNews"),
+    *("dva_sim.PlaceNews", "dva_sim.BookNews"),
 }
 
 

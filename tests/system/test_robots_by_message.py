@@ -20,6 +20,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.exchange import Nuisances, Outbox
 from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.observations import motion_of, terms_of
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import broken_by_moving
 from dva_sim.simulation.full.stage import DVA, id_of
@@ -165,7 +166,8 @@ def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone() ->
 
 def rules_broken(run: Run, robot: RobotAgent) -> list[str]:
     witness = run.audit.witness(robot.device.id_tag)
-    return [rule for rule, _ in broken_by_moving(witness, robot, run.clock.now)]
+    limits = terms_of(run.scenario).motors[robot.device.id_tag]
+    return [rule for rule, _ in broken_by_moving(witness, motion_of(robot), limits, run.clock.now)]
 
 
 def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_does() -> None:

@@ -2,19 +2,22 @@
 
 It notes who was sent where, who took that up, since when an event waits or is in the same hands,
 and what those who were sent have found; the fields of the DVA's events are not asked for that.
+It also notes who was heard: a permission whose holder is silent should be in no book.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventBook, State, apart
 from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.observations import Page, Right
 
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
+SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
 UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
@@ -66,24 +69,31 @@ class EventLedger:
     """A second book of the events, by what is said on the network, beside what the DVA's shows.
 
     Args:
-        book: The DVA's.
         rules: How long an event may wait, or be in one pair of hands.
         dva: Id of the DVA.
         place_of: Where a device really is.
         at_event: Who is so near may have seen what there is [m].
+        name: Gives the name of a device by its id.
+
+    Attributes:
+        knows_places: Whether anybody knows where devices are; else they are taken at their word.
     """
 
     def __init__(
         self,
-        book: EventBook,
         rules: Rules,
         dva: str,
         place_of: Callable[[str], m.Position | None],
         at_event: float,
+        name: Callable[[str], str],
     ) -> None:
-        self._book, self._rules, self._dva = book, rules, dva
+        self._book, self._rules, self._dva, self._name = EventBook(), rules, dva, name
         self._place_of, self._at_event = place_of, at_event
+        self.knows_places = True
+        self._heard: dict[str, float] = {}
+        self._held_since: dict[Right, float] = {}
         self._asked: dict[tuple[str, int], m.EventReport] = {}
+        self._taken: list[m.EventReport] = []
         self._orders: dict[tuple[str, int], int] = {}
         self._called_false: dict[tuple[str, int], int] = {}
         self._words: dict[int, Word] = {}
@@ -96,9 +106,16 @@ class EventLedger:
 
     def hears(self, source: str, message: m.Message | None, now: float) -> None:
         """Something has reached the DVA; `source` has really sent it."""
-        if message is None or message.source != source or isinstance(message.body, OF_NO_EVENT):
+        if message is None or message.source != source:
+            return
+        self.is_heard(source, now)
+        if isinstance(message.body, OF_NO_EVENT):
             return
         match message.body:
+            case m.Reply(answers=answers, code=code):
+                ordered = self._orders.pop((source, answers), None)
+                if ordered is not None and code == m.OK:
+                    self._takes_up(ordered, source)
             case m.SensorValue():
                 self._felt[source] = now
             case m.EventReport(event_id=None, finding="detected") as report:
@@ -118,15 +135,17 @@ class EventLedger:
                 for word in self._words.values():
                     word.loose.add(source)
 
-    def waits_for(self, source: str, data: bytes) -> bool:
-        """Whether what is sent is worth reading: an order, or an answer that is waited for."""
-        if source == self._dva:
-            asked = self._asked or self._called_false
-            return any(what in data for what in _ORDERED) or _answers(asked, data)
-        return _answers(self._orders, data)
+    def is_heard(self, source: str, now: float) -> None:
+        """The DVA has heard a device, whatever it said."""
+        self._heard[source] = now
 
-    def told(self, source: str, message: m.Message | None) -> Iterator[Broken]:
-        """The DVA sends an order, or somebody answers."""
+    def waits_for(self, data: bytes) -> bool:
+        """Whether what the DVA sends is worth reading: an order, or an answer waited for."""
+        asked = self._asked or self._called_false
+        return any(what in data for what in _ORDERED) or (bool(asked) and b"<reply>" in data)
+
+    def says(self, message: m.Message | None) -> None:
+        """The DVA sends an order, or an answer."""
         if message is None:
             return
         match message.body:
@@ -134,14 +153,10 @@ class EventLedger:
                 self._sends(message, number, device or message.destination)
             case m.TaskAward(event_id=number):
                 self._sends(message, number, message.destination)
-            case m.OrderProgress(event_id=number) if source == self._dva:
+            case m.OrderProgress(event_id=number):
                 self._word(number).loose.add(message.destination)
-            case m.Reply() as reply if source == self._dva:
-                yield from self._answered(message.destination, reply)
-            case m.Reply(answers=answers, code=code):
-                ordered = self._orders.pop((source, answers), None)
-                if ordered is not None and code == m.OK:
-                    self._takes_up(ordered, source)
+            case m.Reply() as reply:
+                self._answers(message.destination, reply)
 
     def _word(self, number: int) -> Word:
         word = self._words.setdefault(number, Word())
@@ -172,31 +187,35 @@ class EventLedger:
             word.found.add(finding)
 
     def _is_near(self, device: str, event: Event) -> bool:
+        if not self.knows_places:
+            return True
         place = self._place_of(device)
         return place is not None and apart(place, event.position) <= self._at_event
 
-    def _answered(self, reporter: str, reply: m.Reply) -> Iterator[Broken]:
+    def _answers(self, reporter: str, reply: m.Reply) -> None:
         """The DVA has taken a report: then there is an event. Or a person's word: it is none."""
         none = self._called_false.pop((reporter, reply.answers), None)
         if none is not None and reply.code == m.OK:
             self._word(none).found.add("refuted")
         report = self._asked.pop((reporter, reply.answers), None)
-        if report is None or reply.code != m.OK:
-            return
-        near, kind = max(self._book.merge_distance, SAME_SPOT), report.kind
-        known = (*self._book.open.values(), *self._book.closed.values())
-        same = (e for e in known if e.kind == kind)
-        if not any(apart(e.position, report.position) < near for e in same):
-            yield "S6", f"a {report.kind} was reported, and is in no book"
+        if report is not None and reply.code == m.OK:
+            self._taken.append(report)
 
     # --- what the book shows -------------------------------------------------------------
 
-    def check(self, now: float) -> Iterator[Broken]:
+    def check(self, now: float, page: Page) -> Iterator[Broken]:
         """What is wrong with the book now."""
-        book = self._book
+        book = self._book = page.book
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
-        self._now = now
+        passed, self._now = now - self._now, now
+        if not page.works:
+            self._let_no_time_pass(passed)
+        yield from self._unheard(page.rights, now, page.works)
+        for report in self._taken:
+            if not self._is_booked(report):
+                yield "S6", f"a {report.kind} was reported, and is in no book"
+        self._taken.clear()
         if sum(book.counts.values()) != book.total:
             yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
         if min(book.counts.values()) < 0:
@@ -215,6 +234,32 @@ class EventLedger:
         seen, self._seen = self._seen, {}
         for event in every:
             yield from self._of_event(event, seen.get(event.number), now)
+
+    def _is_booked(self, report: m.EventReport) -> bool:
+        """Whether there is an event that a report may be of, open or closed."""
+        near, kind = max(self._rules.merge_distance, SAME_SPOT), report.kind
+        known = (*self._book.open.values(), *self._book.closed.values())
+        same = (e for e in known if e.kind == kind)
+        return any(apart(e.position, report.position) < near for e in same)
+
+    def _let_no_time_pass(self, passed: float) -> None:
+        """A DVA that was silenced decides nothing: what waits for it is not late by that."""
+        for number, seen in self._seen.items():
+            self._seen[number] = seen._replace(since=seen.since + passed, waits=seen.waits + passed)
+
+    def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
+        """Permissions of those of whom nothing was heard for longer than the DVA may wait."""
+        before, self._held_since = self._held_since, {}
+        for right in rights:
+            since = now if not works else before.get(right, now)
+            self._held_since[right] = since
+            silent = now - max(since, self._heard.get(right.holder, since))
+            if right.holder != self._dva and silent > SILENT_AFTER + PENDING_SLACK:
+                held = f"{self._name(right.holder)} hold {self._name(right.robot)}"
+                yield (
+                    "S2",
+                    f"lets {held}, of whom nothing is heard for {silent:.0f} s",
+                )
 
     def _of_event(self, event: Event, old: Seen | None, now: float) -> Iterator[Broken]:
         new, rules = self._look(event, old, now), self._rules
@@ -255,10 +300,6 @@ class EventLedger:
 def _keep_newest(kept: dict[Any, Any]) -> None:
     if len(kept) > MOST_KEPT:
         del kept[next(iter(kept))]
-
-
-def _answers(asked: dict[Any, Any], data: bytes) -> bool:
-    return bool(asked) and b"<reply>" in data
 
 
 def _in_hand(event: Event) -> tuple[str | None, ...]:

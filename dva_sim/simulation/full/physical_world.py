@@ -94,6 +94,11 @@ class Field(RunHazards):
         places = (self.stage.site.frame.to_latlon(*g.walking.place) for g in guards)
         return next((m.Position(*place) for place in places), None)
 
+    def places(self) -> dict[str, m.Position]:
+        """Where all robots and guards are, by id."""
+        devices = [*self.robots, *(guard.device.id_tag for guard in self.guards)]
+        return {device: at for device in devices if (at := self.place_of(device)) is not None}
+
     def whereabouts(self, now: float) -> Iterator[tuple[str, TrackPoint]]:
         """Where everybody is who is on the site, by name."""
         self.world.advance_to(now)

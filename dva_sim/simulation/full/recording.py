@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.core.audit import Fact
@@ -75,6 +75,8 @@ class Playback:
             known, as of a recording that was cut short.
         events: The events as the DVA knew them in the end.
         facts: What was decided, by whom and why, in order.
+        about_robots: What its robots are held to, as `Terms.about_robots` tells it; None: as the
+            profiles say that the scenario names.
     """
 
     scenario: Scenario
@@ -90,6 +92,7 @@ class Playback:
     endings: list[Ending] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     facts: list[Fact] = field(default_factory=list)
+    about_robots: dict[str, Any] | None = None
 
     @property
     def people_decide(self) -> bool:

@@ -12,9 +12,8 @@ from typing import Any, Protocol
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
-from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import Recorder
+from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.network.connections import HEADERS, MSS, Connector, Load
 from dva_sim.network.link import (
     ConstantRate,
@@ -27,17 +26,21 @@ from dva_sim.network.link import (
 from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.messaging import Transport
 from dva_sim.network.virtual_network import VirtualNetwork
-from dva_sim.simulation.full.control_room import (
-    add_dispatcher,
-    add_dva,
-    add_operator,
-    at_event_m,
-)
+from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.disturbance import Disturbance
-from dva_sim.simulation.full.physical_world import PHYSICS_TICK, Field, is_dangerous
+from dva_sim.simulation.full.observations import (
+    FactLog,
+    Listener,
+    Observer,
+    RobotMotion,
+    motion_of,
+    page_of,
+    terms_of,
+)
+from dva_sim.simulation.full.physical_world import Field, is_dangerous
 from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
 from dva_sim.simulation.full.safety_checks import SafetyAudit
-from dva_sim.simulation.full.stage import DVA, Stage, id_of
+from dva_sim.simulation.full.stage import Stage, id_of
 from dva_sim.simulation.scenario import Scenario, request_timeout_s
 
 # Beside pictures and commands: heartbeats, status, sensors, orders, replies; assumed, and ample.
@@ -102,7 +105,7 @@ class RealLinks(Protocol):
     def time_of_day(self) -> tuple[float, bool]:
         """See `AgentDevice`."""
 
-    def watch(self, audit: SafetyAudit) -> None:
+    def watch(self, listener: Listener) -> None:
         """Tell of each message that is sent or arrives."""
 
 
@@ -149,7 +152,7 @@ class Run:
     ) -> None:
         watched = watched or Watched(Clock(), Recorder(keep_traffic))
         self.scenario, self.clock, self.recorder = scenario, watched.clock, watched.recorder
-        self._listeners: tuple[SafetyAudit, ...] = ()  # the audit, once all are in place
+        self._observers: tuple[Observer, ...] = ()  # the audit first, once all are in place
         self._connector = connector_of(scenario)
         self.network, self.stage = self._connected(seed, watched)
         check_partitions(scenario.link.partitions, self.stage.labels.values())
@@ -169,22 +172,15 @@ class Run:
         self.dispatcher = add_dispatcher(self.stage)
         self.field.schedule_incidents()
         self.audit = SafetyAudit(
-            self.recorder,
-            limits=scenario.robot,
-            robots=self.field.robots,
-            book=self.dva.desk.book,
-            rules=self.dva.desk.dispatcher.orders.rules,
-            processing=max(
-                (mean_of(robot.processing_s) for robot in self.stage.robots), default=0.0
-            ),
-            dva=DVA,
-            place_of=self.field.place_of,
-            at_event=at_event_m(scenario),
-            tick=PHYSICS_TICK,
+            self.recorder, terms_of(scenario), self._motion_of, self.field.place_of
         )
-        self._listeners = (self.audit,)
+        self.recorder.on_accepted, self.recorder.on_hand = self._accepted, self._by_hand
+        self._log = self._keep_facts() if keep_traffic else None
+        self.observe(self.audit)
+        if self._log is not None:
+            self.observe(self._log)
         if watched.real is not None:
-            watched.real.watch(self.audit)
+            watched.real.watch(self)
         Disturbance(self.stage, self.dva, self.field)
         self.dva.start()
         self.clock.every(WATCH_PERIOD, self._watch)
@@ -196,7 +192,7 @@ class Run:
         scenario, real = self.scenario, watched.real
         if real is None:
             network: Transport = VirtualNetwork(
-                self.clock, self._link_between, self._sent, self._connector, self._delivered
+                self.clock, self._link_between, self._sent, self._connector, self.delivered
             )
             return network, Stage(scenario, seed, network, self.recorder, cameras=watched.cameras)
         time_of_day, join = real.time_of_day(), real.join
@@ -276,13 +272,8 @@ class Run:
     # --- the network -------------------------------------------------------------------
 
     def _sent(self, now: float, source: str, to: str, size: int, payload: Any) -> None:
+        self.sent(now, source, to, payload)
         self.recorder.message_sent(now, source, to, size, payload)
-        for audit in self._listeners:
-            audit.sent(now, source, to, payload)
-
-    def _delivered(self, now: float, source: str, to: str, payload: Any) -> None:
-        for audit in self._listeners:
-            audit.delivered(now, source, to, payload)
 
     def _make_links(self) -> dict[str, tuple[Link, Link]]:
         """To each robot and back, by its id."""
@@ -325,6 +316,48 @@ class Run:
             return down, up
         return self._lan
 
+    # --- observers: see `Observer` -----------------------------------------------------
+
+    def observe(self, observer: Observer) -> None:
+        """Tell somebody the facts of this run from now on."""
+        self._observers = *self._observers, observer
+
+    def _keep_facts(self) -> FactLog:
+        """What keeps the facts of the run for its recording."""
+        facts = self.recorder.facts = []
+        return FactLog(facts.append, self.field.robots, self._motion_of, lambda: page_of(self.dva))
+
+    def _motion_of(self, robot: str) -> RobotMotion:
+        return motion_of(self.field.robots[robot])
+
+    def sent(self, now: float, source: str, to: str, payload: Any) -> None:
+        """A message has been sent."""
+        for observer in self._observers:
+            observer.sent(now, source, to, payload)
+
+    def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
+        """A message has arrived."""
+        for observer in self._observers:
+            observer.delivered(now, source, to, payload)
+
+    def _accepted(self, command: Accepted) -> None:
+        for observer in self._observers:
+            observer.accepted(command)
+
+    def _by_hand(self, done: ByHand) -> None:
+        for observer in self._observers:
+            observer.by_hand(done)
+
+    def deafened(self, robot: str, deaf: bool) -> None:
+        """A robot's computer hangs and hears nothing, or hears again."""
+        for observer in self._observers:
+            observer.deafened(self.clock.now, robot, deaf)
+
+    def slowed(self, processing: float) -> None:
+        """From now on a message takes a robot's computer so long on average [s]."""
+        for observer in self._observers:
+            observer.slowed(self.clock.now, processing)
+
     # --- watching ----------------------------------------------------------------------
 
     def _watch(self) -> None:
@@ -338,7 +371,13 @@ class Run:
             x, y = who.walking.place
             if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
                 self.recorder.exposure[name] += WATCH_PERIOD
-        self.audit.check(now)
+        motions = {name: motion_of(robot) for name, robot in self.field.robots.items()}
+        page = page_of(self.dva)
+        if self._log is not None:
+            self._log.places(now, self.field.places())
+        for observer in self._observers:
+            observer.moves(now, motions)
+            observer.shows(now, page)
 
     def _sample(self) -> None:
         """Note where everybody is who is on the site."""

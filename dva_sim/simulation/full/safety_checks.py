@@ -1,13 +1,15 @@
 """An audit of the safety rules from outside: what it can see itself, it believes nobody.
 
-It listens on the network, so it knows which permissions the DVA really gave, when a robot was told
-that one is over, and when an emergency reached it. It sees the bodies move, and it is told of every
-command that a robot accepted, whoever sent it, and of every hand that drove one at the robot
-itself. `CHECKED` says which rules it holds that against.
+It takes the facts of a run (`observations`): so it knows which permissions the DVA really gave,
+when a robot was told that one is over, and when an emergency reached it; how bodies move, and what
+motors are asked for; every command that a robot accepted, whoever sent it, and every hand that
+drove one at the robot itself. `CHECKED` says which rules it holds that against. Nothing of a run
+is asked for anything else, so that a recording can be judged as the run itself was.
 """
 
 from __future__ import annotations
 
+import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,21 +17,21 @@ from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.observation import CameraFrame
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.core.assignments import Rules
-from dva_sim.core.events import EventBook
 from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.simulation.full.event_ledger import PENDING_SLACK, EventLedger
-from dva_sim.simulation.scenario import RobotConfig
+from dva_sim.simulation.full.event_ledger import PENDING_SLACK, SILENT_AFTER, EventLedger
+from dva_sim.simulation.full.observations import MotorLimits, Page, RobotMotion, SafetyTerms
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.worlds.bodies import G
 
 MOVING = 0.05  # above this a robot is going somewhere [m/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
 ROUNDED = 0.002  # of ticks [s]
+LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
+LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
 MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
 
 CHECKED: Final = {
@@ -39,9 +41,12 @@ CHECKED: Final = {
     "slack: a tick of the motors, and until it can have braked",
     "S2": "no command acts by a session that is over, no robot changes hands while it moves "
     f"({MOVING:g} m/s), none is driven by hand that somebody holds, nor by messages that is driven "
-    "by hand; slack: until it has confirmed the end, {OBEYS_WITHIN:g} s and ten messages",
+    f"by hand; nobody keeps a robot of whom it hears nothing valid for {LEASE:g} s, or the DVA "
+    f"nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the end, {OBEYS_WITHIN:g} s "
+    f"and ten messages, {LEASE_SLACK:g} s of silence",
     "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
-    "S4": f"speed and turn rate stay within the motors' limits; slack: {SLACK - 1:.0%}, and "
+    "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
+    f"slack: {SLACK - 1:.0%}, and "
     f"{MOVING:g} m/s backwards",
     "S5": "every command, drive, mission and subscription has a permission that the DVA gave; "
     "no slack",
@@ -57,6 +62,7 @@ CHECKED_IN_SHORT: Final = (
 )
 
 Broken = tuple[str, str]
+_ID = re.compile(r"\b[0-9A-F]{2}(?::[0-9A-F]{2}){5}\b")
 _ORDERS = m.StartTeleOp | m.GoTo | m.Patrol | m.Inspect | m.ReturnToBase
 
 
@@ -113,6 +119,7 @@ class Witness:
         offset: What is to be added to its own clock to have the time.
         last_mission: When it was last on a mission that it may be on.
         looked: When it was last looked at.
+        heard: When something of its driver, or of a hand, was last obeyed.
         told: Sessions that it has agreed to.
         hand: Who has taken it by hand, and has not let it go since.
     """
@@ -132,6 +139,7 @@ class Witness:
     offset: float | None = None
     last_mission: float = 0.0
     looked: float = 0.0
+    heard: float = 0.0
     told: set[int] = field(default_factory=set)
     hand: str | None = None
 
@@ -156,6 +164,14 @@ class Witness:
         """Who holds it by a session that it has agreed to, and whose end it has not heard."""
         held = (s for s in self.sessions if s in self.told and s not in self.over)
         return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
+
+    def in_hand(self, now: float) -> bool:
+        """Whether somebody drives it by hand who has not been silent for too long."""
+        return self.hand is not None and now - self.heard <= LEASE
+
+    def stands(self, when: float) -> None:
+        """An emergency has stopped it, or should have: it is in nobody's hand any longer."""
+        self.stopped, self.hand = max(self.stopped, when), None
 
     def may_be_on_a_mission(self, now: float) -> bool:
         """Whether it was sent on one, nobody has called it back, and the session holds."""
@@ -185,46 +201,38 @@ class Witness:
 class SafetyAudit:
     """Holds what happens against the rules, and tells the recorder what breaks one.
 
+    It is an `Observer`.
+
     Args:
         recorder: Told what broke which rule.
-        limits: Of the robots, as the scenario states them.
-        robots: The robots by id; they may come later.
-        book: The DVA's events.
-        rules: Of the DVA.
-        processing: Of a message at a robot, mean [s].
-        dva: Its id.
+        terms: What the run is held to.
+        motion_of: Gives the motion of a robot now, by its id.
         place_of: Where a device really is, by its id; None: it has no place.
-        at_event: From how far somebody may see what was reported somewhere [m].
-        tick: Of the motors [s].
-
-    Attributes:
-        deaf: Robots whose computer was made to hang: what reaches them now, they do not hear.
     """
 
     def __init__(
         self,
         recorder: Recorder,
-        *,
-        limits: RobotConfig,
-        robots: Mapping[str, RobotAgent],
-        book: EventBook,
-        rules: Rules,
-        processing: float,
-        dva: str,
+        terms: SafetyTerms,
+        motion_of: Callable[[str], RobotMotion],
         place_of: Callable[[str], m.Position | None],
-        at_event: float,
-        tick: float,
     ) -> None:
-        self._recorder, self._robots = recorder, robots
-        self._watchdog, self._max_age = limits.watchdog_s, limits.max_age_s
-        self._dva, self._obeys_within = dva, OBEYS_WITHIN + 10 * processing
-        self._ledger, self._tick = EventLedger(book, rules, dva, place_of, at_event), tick
+        self._recorder, self._motors, self._labels = recorder, terms.motors, terms.labels
+        self._watchdog, self._max_age = terms.watchdog, terms.max_age
+        self._dva, self._obeys_within = terms.dva, OBEYS_WITHIN + 10 * terms.processing
+        self._motion_of, self._deaf = motion_of, set[str]()
+        self._ledger = EventLedger(terms.rules, terms.dva, place_of, terms.at_event, self._name_of)
         self._witnesses: dict[str, Witness] = {}
-        self.deaf: set[str] = set()
-        recorder.on_accepted, recorder.on_hand = self.accepted, self.by_hand
 
-    def expect(self, processing: float) -> None:
-        """From now on a message takes a robot's computer so long on average [s]."""
+    def _name_of(self, device: str) -> str:
+        return self._labels.get(device, device)
+
+    def deafened(self, now: float, robot: str, deaf: bool) -> None:
+        """See `Observer`: what reaches a robot that hangs, it does not hear."""
+        (self._deaf.add if deaf else self._deaf.discard)(robot)
+
+    def slowed(self, now: float, processing: float) -> None:
+        """See `Observer`."""
         self._obeys_within = OBEYS_WITHIN + 10 * processing
         for witness in self._witnesses.values():
             witness.obeys_within = max(witness.obeys_within, self._obeys_within)
@@ -238,19 +246,29 @@ class SafetyAudit:
 
     # --- what is seen on the network -------------------------------------------------------
 
-    def delivered(self, now: float, source: str, to: str, data: Any) -> None:
-        """A message, or a picture, has reached somebody; `source` is who really sent it."""
-        if isinstance(data, CameraFrame):
-            if source in self._robots and (witness := self.witness(source)).offset is None:
-                witness.offset = data.captured - data.observation.tick / 1000
-        elif to in self._robots and to not in self.deaf:
-            self._reaches_robot(now, source, to, data)
-        elif to == self._dva:
-            self._ledger.hears(source, _read(data), now)
+    def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
+        """See `Observer`."""
+        if to in self._motors:
+            if to not in self._deaf:
+                self._reaches_robot(now, source, to, payload)
+        elif to == self._dva and isinstance(payload, bytes):
+            self._ledger.hears(source, _read(payload), now)
+
+    def knows_places(self, known: bool) -> None:
+        """Whether anybody knows where robots and guards are: else they are taken at their word."""
+        self._ledger.knows_places = known
+
+    def heard(self, now: float, device: str) -> None:
+        """The DVA has heard a device, by what needs no judgement."""
+        self._ledger.is_heard(device, now)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness, message = self.witness(robot), _read(data)
         if message is None:
+            return
+        if isinstance(message.body, m.Reply):
+            if source == self._dva:
+                self._is_told_who_holds(witness, message.body)
             return
         key = message.source, message.message_id
         if isinstance(message.body, m.SetTeleOp):
@@ -263,48 +281,56 @@ class SafetyAudit:
             grant = message.body
             witness.given(grant.session, Held(grant.holder, grant.level, grant.sensors))
 
-    def sent(self, now: float, source: str, to: str, data: Any) -> None:
-        """A message has been sent."""
-        if not isinstance(data, bytes):
+    def sent(self, now: float, source: str, to: str, payload: Any) -> None:
+        """See `Observer`."""
+        if source == self._dva:
+            if isinstance(payload, bytes) and self._ledger.waits_for(payload):
+                self._ledger.says(_read(payload))
             return
-        if self._ledger.waits_for(source, data):
-            self._report(self._ledger.told(source, _read(data)), now, "dva")
-        if source == self._dva and to in self._robots and b"<Permission>" in data:
-            self._says_who_holds(to, _read(data))
-        witness = self._witnesses.get(source)
-        if witness is None:
+        if source not in self._motors:
             return
-        if witness.offset is None and b"<RobotStatus>" in data:
-            status = _read(data)
+        witness = self.witness(source)
+        if not isinstance(payload, bytes):
+            if witness.offset is None:
+                witness.offset = offset_of(payload)
+            return
+        if witness.offset is None and b"<RobotStatus>" in payload:
+            status = _read(payload)
             if status is not None and isinstance(status.body, m.RobotStatus):
                 witness.offset = now - status.body.tick / 1000
         if not witness.unanswered:
             return
-        reply = _read(data) if b"<reply>" in data else None
+        reply = _read(payload) if b"<reply>" in payload else None
         if reply is None or not isinstance(reply.body, m.Reply):
             return
         asked = witness.unanswered.pop((reply.destination, reply.body.answers), None)
         if asked is not None:
-            found = self._answered(witness, self._robots[source], asked, reply.body.code, now)
-            self._report(found, now, self._robots[source].device.label)
+            motion, limits = self._motion_of(source), self._motors[source]
+            found = self._answered(witness, motion, limits, asked, reply.body.code, now)
+            self._report(found, now, source)
 
-    def _says_who_holds(self, robot: str, reply: m.Message | None) -> None:
+    @staticmethod
+    def _is_told_who_holds(witness: Witness, reply: m.Reply) -> None:
         """The DVA has answered a robot that asked who holds it: that permission is good."""
-        content = reply.body.content if reply and isinstance(reply.body, m.Reply) else None
-        if isinstance(content, m.Permission):
-            witness = self.witness(robot)
+        if isinstance(content := reply.content, m.Permission):
             witness.given(content.session, Held(content.device, content.level, content.sensors))
             witness.over.pop(content.session, None)
             witness.told.add(content.session)
 
     def _answered(
-        self, witness: Witness, robot: RobotAgent, asked: Unanswered, code: int, now: float
+        self,
+        witness: Witness,
+        motion: RobotMotion,
+        limits: MotorLimits,
+        asked: Unanswered,
+        code: int,
+        now: float,
     ) -> Iterator[Broken]:
         """A robot has answered a request, and so has obeyed it or not."""
         message, body = asked.message, asked.message.body
         match body:
-            case m.Emergency():
-                witness.stopped = max(witness.stopped, now)
+            case m.Emergency():  # it acts whenever it comes, though its bytes never change
+                witness.stands(now)
             case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
             case m.PermissionGrant() if asked.source == self._dva and code == m.OK:
@@ -324,10 +350,15 @@ class SafetyAudit:
             if not mine or now > witness.over.get(message.session or 0, now):
                 yield "S5", f"lets {message.source} read {body.sensor}"
         if isinstance(body, _ORDERS):
-            yield from self._ordered(witness, robot, asked, now)
+            yield from self._ordered(witness, motion, limits, asked, now)
 
     def _ordered(
-        self, witness: Witness, robot: RobotAgent, asked: Unanswered, now: float
+        self,
+        witness: Witness,
+        motion: RobotMotion,
+        limits: MotorLimits,
+        asked: Unanswered,
+        now: float,
     ) -> Iterator[Broken]:
         """A robot has begun to do what somebody asked for."""
         message = asked.message
@@ -336,15 +367,15 @@ class SafetyAudit:
         if broken is not None:
             yield broken
         if asked.at < witness.stopped:
-            if robot.controller.mode is not Mode.IDLE:  # else it repeats what it once said
+            if motion.mode != Mode.IDLE:  # else it repeats what it once said
                 yield "S3", "obeys an order from before the emergency"
             return
-        if witness.hand is not None and robot.controller.mode is not Mode.IDLE:
+        if witness.in_hand(now) and motion.mode != Mode.IDLE:
             yield "S2", f"obeys {message.source} while it is driven by hand"
         another = witness.owner not in (None, message.source)
-        if another and abs(robot.body.speed) > MOVING and not _pushed(robot, now):
-            yield "S2", f"goes over to {message.source} at {robot.body.speed:.2f} m/s"
-        witness.owner, witness.ordered = message.source, asked.at
+        if another and abs(motion.speed) > MOVING and not _pushed(motion, limits, now):
+            yield "S2", f"goes over to {message.source} at {motion.speed:.2f} m/s"
+        witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
         witness.ends("teleoperation", now)
         witness.does = Doing(message.source, message.session, level)
 
@@ -369,14 +400,14 @@ class SafetyAudit:
         source, session, number = command.source, command.session, command.message_id
         if witness.stopped > witness.ordered and witness.stopped > -0.5:
             found.append(("S3", "obeys a command after an emergency, before a new order"))
-        elif witness.hand is not None:
+        elif witness.in_hand(command.time):
             found.append(("S2", f"obeys {source} while it is driven by hand"))
         elif witness.does != (source, session, "teleoperation"):
             found.append(("S1", f"obeys a command of {source}, who has not started, or stopped"))
         speaker, known = witness.newest
         if speaker == (source, session) and number <= known:
             found.append(("S1", "obeys a command again, or after a newer one"))
-        witness.newest = (source, session), number
+        witness.newest, witness.heard = ((source, session), number), command.time
         arrived = witness.arrivals.pop((source, number), command.arrived)
         witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
@@ -388,44 +419,58 @@ class SafetyAudit:
             if pictured > command.time + ROUNDED:
                 found.append(("S1", "obeys a command behind a picture that was not taken yet"))
         if found:
-            self._report(found, command.time, self._robots[command.robot].device.label)
+            self._report(found, command.time, command.robot)
 
     def by_hand(self, done: ByHand) -> None:
         """Somebody drives a robot at the robot itself: no message tells of that."""
-        witness, robot, now = self.witness(done.robot), self._robots[done.robot], done.time
-        found: list[Broken] = []
+        witness, now, found = self.witness(done.robot), done.time, list[Broken]()
         if done.what == "takes":
-            found = [*_taken_by_hand(witness, robot, now)]
+            motion, limits = self._motion_of(done.robot), self._motors[done.robot]
+            found = [*_taken_by_hand(witness, motion, limits, now)]
             witness.hand = witness.owner = done.who
-            witness.ordered = now
+            witness.ordered = witness.heard = now
             witness.ends("teleoperation", now)
             witness.does = None
         elif done.what == "lets go":
             witness.hand, witness.allowed = None, min(witness.allowed, now)
         elif done.what == "stops":
-            witness.stopped = max(witness.stopped, now)
+            witness.stands(now)
         else:
             if witness.stopped > witness.ordered:
                 found.append(("S3", "obeys a hand after an emergency, before it is taken anew"))
             elif witness.hand != done.who:
                 found.append(("S1", "obeys a hand that has not taken it, or has let it go"))
-            witness.allowed = now + self._watchdog
-        self._report(found, now, robot.device.label)
+            witness.allowed, witness.heard = now + self._watchdog, now
+        self._report(found, now, done.robot)
 
-    # --- twice a second --------------------------------------------------------------------
+    # --- twice a second, or more often -----------------------------------------------------
 
-    def check(self, now: float) -> None:
-        """Hold what is seen now against the rules."""
-        for id_tag, robot in self._robots.items():
-            witness = self.witness(id_tag)
-            self._overdue(witness, robot, now)
-            found = [*broken_by_wish(witness, robot, now, self._tick)]
-            found += broken_by_moving(witness, robot, now)
-            self._report(found, now, robot.device.label)
+    def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
+        """See `Observer`."""
+        for robot, motion in motions.items():
+            witness, limits = self.witness(robot), self._motors[robot]
+            self._overdue(witness, motion, now)
+            found = [*broken_by_wish(witness, motion, now)]
+            found += broken_by_moving(witness, motion, limits, now)
+            found += self._overstays(witness, motion, now)
+            self._report(found, now, robot)
             witness.looked = now
-        self._report(self._ledger.check(now), now, "dva")
 
-    def _overdue(self, witness: Witness, robot: RobotAgent, now: float) -> None:
+    def shows(self, now: float, page: Page) -> None:
+        """See `Observer`."""
+        self._report(self._ledger.check(now, page), now, self._dva)
+
+    def _overstays(self, witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
+        """Whether somebody keeps the robot of whom it hears nothing that it may obey."""
+        does, silent = witness.does, now - witness.heard
+        if does is None or does.level != "teleoperation" or silent <= LEASE + LEASE_SLACK:
+            return
+        witness.does = None  # whatever it obeys now needs a new order
+        if motion.mode == Mode.TELEOPERATION and motion.powered:
+            who = self._name_of(does.source)
+            yield "S2", f"is kept by {who}, of whom it has heard nothing valid for {silent:.0f} s"
+
+    def _overdue(self, witness: Witness, motion: RobotMotion, now: float) -> None:
         """What a robot has not answered in time counts as obeyed by then."""
         if not witness.unanswered:
             return
@@ -433,10 +478,10 @@ class SafetyAudit:
         for key in late:
             message, at, source = witness.unanswered.pop(key)
             body, by = message.body, at + witness.obeys_within
-            if not robot.body.powered:
+            if not motion.powered:
                 pass  # it has not heard it
             elif isinstance(body, m.Emergency):
-                witness.stopped = max(witness.stopped, by)
+                witness.stands(by)
             elif source != self._dva:
                 pass
             elif isinstance(body, m.PermissionRevocation):
@@ -446,59 +491,82 @@ class SafetyAudit:
 
     def _report(self, found: Iterator[Broken] | list[Broken], now: float, who: str) -> None:
         for rule, what in found:
-            self._recorder.violated(rule, now, who, what)
+            named = _ID.sub(lambda found: self._name_of(found[0]), what)
+            self._recorder.violated(rule, now, self._name_of(who), named)
 
 
-def broken_by_wish(
-    witness: Witness, robot: RobotAgent, now: float, tick: float
-) -> Iterator[Broken]:
-    """Whether the motors were asked to move for longer than they may be; to a tick."""
-    until = robot.body.asked_until
-    if robot.controller.mode is Mode.MISSION and witness.may_be_on_a_mission(now):
+def offset_of(picture: Any) -> float | None:
+    """What is to be added to the clock of the robot that took a picture to have the time [s]."""
+    if isinstance(picture, CameraFrame):
+        return picture.captured - picture.observation.tick / 1000
+    tick = picture.get("tick_ms")  # as a recording has it
+    return None if tick is None else float(picture["captured_s"]) - float(tick) / 1000
+
+
+def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
+    """Rules that break by what motors are asked for: to move for too long, or to move at all."""
+    until = motion.asked_until
+    is_sent = motion.mode == Mode.MISSION and witness.may_be_on_a_mission(now)
+    if is_sent:
         witness.last_mission = now
-    elif until > max(witness.allowed + tick + ROUNDED, witness.looked):
+    if witness.stopped > witness.ordered and until > now > witness.stopped + PHYSICS_TICK:
+        yield "S3", f"is still asked to move, {now - witness.stopped:.1f} s after an emergency"
+    elif not is_sent and until > max(witness.allowed + PHYSICS_TICK + ROUNDED, witness.looked):
         late = until - max(witness.allowed, witness.last_mission)
         yield "S1", f"is asked to move for {late:.2f} s longer than it may"
 
 
-def broken_by_moving(witness: Witness, robot: RobotAgent, now: float) -> list[Broken]:
-    """Rules that the motion of a robot breaks now; what was pushed breaks none."""
-    spec, speed, turn_rate = robot.body.spec, robot.body.speed, robot.body.turn_rate
+def broken_by_moving(
+    witness: Witness, motion: RobotMotion, limits: MotorLimits, now: float
+) -> list[Broken]:
+    """Rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
+    speed, turn_rate = motion.speed, motion.turn_rate
     found: list[Broken] = []
     if abs(speed) > MOVING:
-        allowed, stopping = max(witness.allowed, witness.last_mission), _stopping(robot)
+        allowed = max(witness.allowed, witness.last_mission)
+        stopping = _stopping(motion, limits)
         if now > allowed + stopping:
             late = f"{now - allowed:.1f} s after it had to stop"
             found.append(("S1", f"moves at {speed:.2f} m/s, {late}"))
         if witness.stopped > witness.ordered and now > witness.stopped + stopping:
             late = f"{now - witness.stopped:.1f} s after an emergency"
             found.append(("S3", f"moves at {speed:.2f} m/s, {late}"))
-    # Comparisons that a nan fails, too; nobody drives backwards.
-    forward = -MOVING <= speed <= spec.max_speed * SLACK
-    if not (forward and abs(turn_rate) <= spec.max_turn_rate * SLACK):
+    if not _is_within(speed, turn_rate, limits):
         found.append(("S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"))
-    return [] if found and _pushed(robot, now) else found
+    if found and _pushed(motion, limits, now):
+        found.clear()
+    if not _is_within(motion.asked_speed, motion.asked_turn_rate, limits):
+        asked = f"{motion.asked_speed:.2f} m/s and {motion.asked_turn_rate:.2f} rad/s"
+        found.append(("S4", f"its motors are asked for {asked}"))
+    return found
 
 
-def _taken_by_hand(witness: Witness, robot: RobotAgent, now: float) -> Iterator[Broken]:
+def _is_within(speed: float, turn_rate: float, limits: MotorLimits) -> bool:
+    """By comparisons that a nan fails, too; nobody drives backwards."""
+    forward = -MOVING <= speed <= limits.max_speed * SLACK
+    return forward and abs(turn_rate) <= limits.max_turn_rate * SLACK
+
+
+def _taken_by_hand(
+    witness: Witness, motion: RobotMotion, limits: MotorLimits, now: float
+) -> Iterator[Broken]:
     """Whether a robot may be taken by hand now: only one that stands, and that nobody holds."""
     holder = witness.holder()
     if holder is not None:
         yield "S2", f"goes into a hand while {holder} holds it"
-    if abs(robot.body.speed) > MOVING and not _pushed(robot, now):
-        yield "S2", f"goes into a hand at {robot.body.speed:.2f} m/s"
+    if abs(motion.speed) > MOVING and not _pushed(motion, limits, now):
+        yield "S2", f"goes into a hand at {motion.speed:.2f} m/s"
 
 
-def _stopping(robot: RobotAgent) -> float:
+def _stopping(motion: RobotMotion, limits: MotorLimits) -> float:
     """How long it takes a robot to stand from full speed [s]."""
-    spec = robot.body.spec
-    braking = min(spec.max_deceleration, robot.body.grip * G)
-    return spec.max_speed / braking + 4 * spec.motor_time_constant
+    braking = min(limits.max_deceleration, motion.grip * G)
+    return limits.max_speed / braking + 4 * limits.time_constant
 
 
-def _pushed(robot: RobotAgent, now: float) -> bool:
+def _pushed(motion: RobotMotion, limits: MotorLimits, now: float) -> bool:
     """What another robot has pushed moves on, until its own brakes have stopped it."""
-    return robot.body.last_touch + _stopping(robot) >= now
+    return motion.touched + _stopping(motion, limits) >= now
 
 
 def _end(witness: Witness, session: int, when: float) -> None:

@@ -41,7 +41,7 @@ class Killed:
     def _start(self) -> DvaAgent:
         dva = add_dva(self.run.stage, memory=Store(self.file))
         dva.start()
-        self.run.audit._ledger._book = dva.desk.book
+        self.run.dva = dva
         return dva
 
     def _kill(self) -> None:

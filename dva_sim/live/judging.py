@@ -1,0 +1,134 @@
+"""A live run held to the safety rules while it goes on, by what its parts say of it.
+
+Parts are processes: each writes the facts that it sees itself, in their order and by its own
+clock. All that a rule compares it takes from one part, so that no rule hangs on two clocks: a
+robot's commands, motors and motion are facts of the world's process, events and permissions those
+of the DVA's. Two things are of another part: who really sent a message, for which its time does not
+count, and where somebody is who confirms an event, to half a second.
+"""
+
+from __future__ import annotations
+
+import heapq
+import json
+import threading
+from collections.abc import Iterable
+from typing import Any, Final
+
+from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
+from dva_sim.kernel.recorder import Sent
+from dva_sim.simulation.full.observation_json import of_plain
+from dva_sim.simulation.full.observations import MOST_SENT, Arrived, FactGap, SafetyTerms, Senders
+from dva_sim.simulation.full.verdicts import Judge, Verdict
+
+WAITS = 10.0  # for what a part says that is silent, or has much to say [s]
+HERE, SEEN, SAID, FRAME = "here", "seen", "sent", "frame"  # first words of the lines that count
+JUDGED: Final = HERE, SEEN, SAID, FRAME
+_STARTS: Final = tuple(f'["{word}"'.encode() for word in JUDGED)
+
+Line = list[Any]
+
+
+class Facts:
+    """Facts from the lines of parts; who really sent a message is told by who says so.
+
+    Args:
+        most: So many messages are remembered; None: all.
+    """
+
+    def __init__(self, most: int | None = MOST_SENT) -> None:
+        self._here: set[str] = set()
+        self._senders = Senders(self._here.__contains__, most)
+
+    def note(self, line: Line) -> None:
+        """Remember who is one of ours, and what those have sent; in whatever order that comes."""
+        if line[0] == HERE:
+            self._here.update(line[2])
+        elif line[0] == SAID:
+            self._senders.note(line[2], line[4].encode())
+
+    def fact(self, line: Line) -> Any:
+        """The fact that a line tells; None if it tells none."""
+        if line[0] == SAID:
+            _, time, source, to, text = line
+            return Sent(time, source, to, len(text), text.encode())
+        if line[0] == FRAME:
+            _, time, robot, seen, captured = line
+            return Sent(time, robot, "", 0, CameraFrame(observation_of(seen), captured))
+        if line[0] != SEEN:
+            return None
+        _, time, word, told = line
+        fact = of_plain(word, time, told)
+        if isinstance(fact, Arrived):
+            fact = fact._replace(source=self._senders.sender(fact.source, fact.payload))
+        return fact
+
+
+def observation_of(seen: list[Any]) -> Observation:
+    """What a camera saw, from its values in a line."""
+    *values, hazards, visibility = seen
+    return Observation._make((*values, tuple(SeenHazard(*one) for one in hazards), visibility))
+
+
+class LiveJudge:
+    """Judges what parts say, in order of time; they speak from threads of their own.
+
+    Args:
+        terms: What the run is held to.
+    """
+
+    def __init__(self, terms: SafetyTerms) -> None:
+        self._judge, self._facts = Judge(terms), Facts()
+        self._waiting: list[tuple[float, int, Line]] = []
+        self._heard: dict[int, float] = {}  # up to when each part that goes on has told [s]
+        self._count, self._latest, self._up_to = 0, 0.0, 0.0
+        self._is_judging = False
+        self._lock = threading.Lock()
+
+    def joins(self, part: int) -> None:
+        """A part is going to speak."""
+        with self._lock:
+            self._heard[part] = 0.0
+
+    def hear(self, part: int, lines: Iterable[bytes]) -> None:
+        """A part has said something: whole lines."""
+        with self._lock:
+            for line in lines:
+                if line.startswith(_STARTS):
+                    self._hear(part, json.loads(line))
+            self._judge_up_to(max(min(self._heard.values()), self._latest - WAITS))
+
+    def _hear(self, part: int, line: Line) -> None:
+        time = float(line[1])
+        self._facts.note(line)
+        self._heard[part] = max(self._heard[part], time)
+        self._latest, self._count = max(self._latest, time), self._count + 1
+        heapq.heappush(self._waiting, (time, self._count, line))
+
+    def leaves(self, part: int) -> None:
+        """A part has ended."""
+        with self._lock:
+            self._heard.pop(part, None)
+            self._judge_up_to(min(self._heard.values(), default=self._latest))
+
+    def _judge_up_to(self, time: float) -> None:
+        self._is_judging = True
+        while self._waiting and self._waiting[0][0] <= time:
+            self._up_to, _, line = heapq.heappop(self._waiting)
+            fact = self._facts.fact(line)
+            if fact is not None:
+                self._judge.take(fact)
+        self._is_judging = False
+
+    def verdicts(self) -> list[Verdict]:
+        """How each rule has fared, when all parts have ended.
+
+        A judge that has ended in the middle of its work, by an error of its own, has judged nothing
+        of what came later.
+        """
+        with self._lock:
+            if not self._is_judging:
+                self._judge_up_to(self._latest)
+            if self._is_judging:
+                self._judge.take(FactGap(self._up_to, len(self._waiting) + 1))
+            return self._judge.verdicts()

@@ -1,0 +1,90 @@
+"""Pipes from the parts of a live run to who keeps and judges it: no part ever waits for them."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+
+from dva_sim.live.judging import LiveJudge
+
+PIPE_BYTES = 1024 * 1024  # that may wait to be taken
+
+
+class Outlet:
+    """Writes lines into a pipe, and never waits for whoever reads them.
+
+    Args:
+        file: Number of the open file; it is closed by `close`.
+    """
+
+    def __init__(self, file: int) -> None:
+        self._file, self._rest = file, b""
+        os.set_blocking(file, False)
+
+    def put(self, line: bytes) -> bool:
+        """Write a whole line, or none of it: whether there was room."""
+        if not self._flush():
+            return False
+        self._rest = line + b"\n"
+        self._flush()
+        return True
+
+    def _flush(self) -> bool:
+        with suppress(BlockingIOError, BrokenPipeError):
+            while self._rest:
+                self._rest = self._rest[os.write(self._file, self._rest) :]
+        return not self._rest
+
+    def close(self) -> None:
+        """Say what was begun, if there is room, and nothing more."""
+        self._flush()
+        os.close(self._file)
+
+
+class Inlets:
+    """Pipes that parts write lines into, each read by a thread.
+
+    Args:
+        keep: Takes whole lines; None: nobody keeps them.
+        judge: Likewise.
+    """
+
+    def __init__(
+        self, keep: Callable[[bytes], object] | None = None, judge: LiveJudge | None = None
+    ) -> None:
+        self._takers = keep, judge
+        self._threads: list[threading.Thread] = []
+
+    def inlet(self) -> int:
+        """A new pipe: where a part writes; whoever gets it closes it."""
+        reads, writes = os.pipe()
+        with suppress(OSError):
+            fcntl.fcntl(writes, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
+        number = len(self._threads)
+        if (judge := self._takers[1]) is not None:
+            judge.joins(number)
+        thread = threading.Thread(target=self._take, args=(number, reads), daemon=True)
+        self._threads.append(thread)
+        thread.start()
+        return writes
+
+    def _take(self, number: int, reads: int) -> None:
+        """Take whole lines until the part has ended, however it did."""
+        rest, (keep, judge) = b"", self._takers
+        while data := os.read(reads, 1 << 18):
+            whole, _, rest = (rest + data).rpartition(b"\n")
+            if whole and keep is not None:
+                keep(whole + b"\n")
+            if whole and judge is not None:
+                judge.hear(number, whole.split(b"\n"))
+        os.close(reads)
+        if judge is not None:
+            judge.leaves(number)
+
+    def join(self) -> None:
+        """Wait until all parts have ended."""
+        for thread in self._threads:
+            thread.join()

@@ -1,0 +1,156 @@
+"""JSON of the facts that the safety rules are judged by.
+
+It stands in the lines of live runs and in recordings. Units stand in the names; a number that is
+not finite is null.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
+
+from dva_sim.kernel.recorder import Accepted, ByHand
+from dva_sim.protocol.messages import Position
+from dva_sim.simulation.full import observations as o
+
+DIGITS = 5  # of what is measured: ticks of the motors and slacks of the rules are far longer
+
+DEGREES = 8  # of latitude and longitude: a millimetre
+
+Plain = dict[str, Any]
+
+
+class _Form(NamedTuple):
+    """How a kind of fact is written, apart from its time, and read again."""
+
+    kind: type
+    write: Callable[[Any], Plain]
+    read: Callable[[float, Mapping[str, Any]], Any]
+
+
+def _as_named(kind: type, **renamed: str) -> _Form:
+    """Of a kind whose fields are as JSON has them, but for some names."""
+    fields = [name for name in kind._fields if name != "time"]  # type: ignore[attr-defined]
+    names = {name: renamed.get(name, name) for name in fields}
+
+    def write(fact: Any) -> Plain:
+        return {written: getattr(fact, name) for name, written in names.items()}
+
+    def read(time: float, told: Mapping[str, Any]) -> Any:
+        return kind(time=time, **{name: told[written] for name, written in names.items()})
+
+    return _Form(kind, write, read)
+
+
+def _write_arrived(fact: o.Arrived) -> Plain:
+    return {"source": fact.source, "to": fact.to, "message": fact.payload.decode()}
+
+
+def _read_arrived(time: float, told: Mapping[str, Any]) -> o.Arrived:
+    return o.Arrived(time, told["source"], told["to"], told["message"].encode())
+
+
+def _write_moves(fact: o.MotionNews) -> Plain:
+    return {"motions": [_write_motion(robot, one) for robot, one in fact.motions.items()]}
+
+
+def _read_moves(time: float, told: Mapping[str, Any]) -> o.MotionNews:
+    return o.MotionNews(time, {one["robot"]: _read_motion(one) for one in told["motions"]})
+
+
+def _write_motion(robot: str, motion: o.RobotMotion) -> Plain:
+    return {
+        "robot": robot,
+        "mode": motion.mode,
+        "speed_m_s": _rounded(motion.speed),
+        "turn_rate_rad_s": _rounded(motion.turn_rate),
+        "asked_speed_m_s": _rounded(motion.asked_speed),
+        "asked_turn_rate_rad_s": _rounded(motion.asked_turn_rate),
+        "asked_until_s": _rounded(motion.asked_until),
+        "touched_s": _rounded(motion.touched),
+        "grip": _rounded(motion.grip),
+        "powered": motion.powered,
+    }
+
+
+def _read_motion(told: Mapping[str, Any]) -> o.RobotMotion:
+    return o.RobotMotion(
+        told["mode"],
+        _number(told["speed_m_s"], math.nan),
+        _number(told["turn_rate_rad_s"], math.nan),
+        _number(told["asked_speed_m_s"], math.nan),
+        _number(told["asked_turn_rate_rad_s"], math.nan),
+        _number(told["asked_until_s"], math.inf),
+        _number(told["touched_s"], -math.inf),
+        _number(told["grip"], math.nan),
+        bool(told["powered"]),
+    )
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, DIGITS) if math.isfinite(value) else None
+
+
+def _number(value: float | None, missing: float) -> float:
+    return missing if value is None else float(value)
+
+
+def _write_places(fact: o.PlaceNews) -> Plain:
+    return {"places": [_write_place(device, at) for device, at in fact.places.items()]}
+
+
+def _write_place(device: str, at: Position) -> Plain:
+    latitude, longitude = round(at.latitude, DEGREES), round(at.longitude, DEGREES)
+    return {"device": device, "latitude_deg": latitude, "longitude_deg": longitude}
+
+
+def _read_places(time: float, told: Mapping[str, Any]) -> o.PlaceNews:
+    return o.PlaceNews(
+        time,
+        {at["device"]: Position(at["latitude_deg"], at["longitude_deg"]) for at in told["places"]},
+    )
+
+
+def _write_book(fact: o.BookNews) -> Plain:
+    rights = None if fact.rights is None else [right._asdict() for right in fact.rights]
+    return _BOOK.write(fact) | {"rights": rights}
+
+
+def _read_book(time: float, told: Mapping[str, Any]) -> o.BookNews:
+    rights = told["rights"] and [o.Right(**right) for right in told["rights"]]
+    news: o.BookNews = _BOOK.read(time, told)
+    return news._replace(rights=rights)
+
+
+_BOOK: Final = _as_named(o.BookNews)
+
+FORMS: Final[dict[str, _Form]] = {
+    "arrived": _Form(o.Arrived, _write_arrived, _read_arrived),
+    "heard": _as_named(o.Heard),
+    "accepted": _as_named(Accepted, seen_tick="seen_tick_ms", arrived="arrived_s"),
+    "by_hand": _as_named(ByHand),
+    "moves": _Form(o.MotionNews, _write_moves, _read_moves),
+    "places": _Form(o.PlaceNews, _write_places, _read_places),
+    "book": _Form(o.BookNews, _write_book, _read_book),
+    "deafened": _as_named(o.Deafened),
+    "slowed": _as_named(o.Slowed, processing="processing_s"),
+    "gap": _as_named(o.FactGap),
+}
+"""By the word that a kind is written with."""
+_WORDS: Final = {form.kind: word for word, form in FORMS.items()}
+
+
+def as_plain(fact: Any) -> tuple[str, float, Plain]:
+    """A fact that is no message sent: the word of its kind, its time [s], and the rest."""
+    word = _WORDS[type(fact)]
+    return word, fact.time, FORMS[word].write(fact)
+
+
+def of_plain(word: str, time: float, told: Mapping[str, Any]) -> Any:
+    """The fact that was written so.
+
+    Raises:
+        KeyError, TypeError, ValueError, AttributeError: it was written otherwise.
+    """
+    return FORMS[word].read(time, told)

@@ -1,0 +1,506 @@
+"""Facts that the safety rules are judged by: messages, commands, motion, and the DVA's book.
+
+A virtual run reports them as they happen, a live run and a recording line by line; the audit takes
+all of them alike. Of a decision nothing is asked: a robot that answers an emergency with OK has
+sent a message, and its body shows whether it has stopped.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol
+
+from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.core.assignments import Rules
+from dva_sim.core.events import Event, EventBook, State
+from dva_sim.kernel.recorder import Accepted, ByHand, Sent
+from dva_sim.protocol.messages import Position
+from dva_sim.simulation.full.control_room import at_event_m
+from dva_sim.simulation.full.dva_server import DvaAgent
+from dva_sim.simulation.full.stage import DVA, id_of, label_of
+from dva_sim.simulation.scenario import Scenario, robot_profiles
+from dva_sim.worlds.bodies import GRIP
+
+
+class MotorLimits(NamedTuple):
+    """Limits of a robot's motors: [m/s], [rad/s], [m/s^2], and their time constant [s]."""
+
+    max_speed: float
+    max_turn_rate: float
+    max_deceleration: float
+    time_constant: float
+
+
+@dataclass
+class SafetyTerms:
+    """What a run is held to, as its scenario states it.
+
+    Attributes:
+        watchdog: How long a command may be in force after its arrival [s].
+        max_age: And after the picture behind it was taken [s].
+        rules: What the DVA insists on.
+        at_event: From how far somebody may see what was reported somewhere [m].
+        processing: Mean time that a message takes a robot's computer [s].
+        motors: Limits of the robots by id.
+        labels: Names by id, for what is said of somebody.
+        dva: Id of the DVA.
+    """
+
+    watchdog: float
+    max_age: float
+    rules: Rules
+    at_event: float
+    processing: float = 0.0
+    motors: dict[str, MotorLimits] = field(default_factory=dict)
+    labels: dict[str, str] = field(default_factory=dict)
+    dva: str = DVA
+
+    def about_robots(self) -> dict[str, Any]:
+        """What a scenario alone does not tell: it stands in the profiles of its robots."""
+        motors = {robot: list(limits) for robot, limits in self.motors.items()}
+        return {"processing_s": self.processing, "motors": motors}
+
+
+def terms_of(scenario: Scenario, robots: Mapping[str, Any] | None = None) -> SafetyTerms:
+    """What a run of a scenario is held to.
+
+    Args:
+        scenario: What is run.
+        robots: From `about_robots`; None: the profiles of the robots are read.
+
+    Raises:
+        ConfigError: a profile of a robot that cannot be read.
+    """
+    rules = replace(scenario.dispatch.rules(), operator_span=scenario.operator.span)
+    limits = scenario.robot.watchdog_s, scenario.robot.max_age_s
+    terms = SafetyTerms(*limits, rules, at_event_m(scenario), labels={DVA: label_of("dva", 1)})
+    for kind in ("robot", "guard", "operator"):
+        count = getattr(scenario, kind).count
+        terms.labels |= {id_of(kind, n): label_of(kind, n) for n in range(1, count + 1)}
+    if robots is not None:
+        terms.processing = float(robots["processing_s"])
+        terms.motors = {robot: MotorLimits(*of) for robot, of in robots["motors"].items()}
+        return terms
+    profiles = robot_profiles(scenario)
+    terms.processing = max((mean_of(profile.processing_s) for profile in profiles), default=0.0)
+    for number, profile in enumerate(profiles, 1):
+        terms.motors[id_of("robot", number)] = MotorLimits(
+            profile.max_speed_mps,
+            profile.max_turn_rate_rad_s,
+            profile.max_deceleration_mps2,
+            profile.motor_time_constant_s,
+        )
+    return terms
+
+
+class RobotMotion(NamedTuple):
+    """How a robot moves, and what its motors are asked for; nothing of it is the robot's word.
+
+    Attributes:
+        mode: What it does, as it says: the only word of it.
+        speed: Measured along its heading [m/s].
+        turn_rate: Measured [rad/s].
+        asked_speed: What the motors were asked for last [m/s].
+        asked_turn_rate: The same [rad/s].
+        asked_until: Until when that is in force [s]; 0: they were asked to stand.
+        touched: When it last was in contact with anything [s]; -inf: never.
+        grip: Friction coefficient of the floor under it.
+        powered: Whether it has power.
+    """
+
+    mode: str
+    speed: float
+    turn_rate: float
+    asked_speed: float = 0.0
+    asked_turn_rate: float = 0.0
+    asked_until: float = 0.0
+    touched: float = float("-inf")
+    grip: float = GRIP
+    powered: bool = True
+
+
+STANDS = RobotMotion("Idle", 0.0, 0.0)
+
+
+def motion_of(robot: RobotAgent) -> RobotMotion:
+    """How a robot moves now."""
+    body = robot.body
+    speed, turn_rate, until = body.asked
+    return RobotMotion(
+        *(robot.controller.mode.value, body.speed, body.turn_rate, speed, turn_rate, until),
+        *(body.last_touch, body.grip, body.powered),
+    )
+
+
+class Right(NamedTuple):
+    """A permission to act on a robot, as the DVA's book shows it."""
+
+    robot: str
+    holder: str
+    session: int
+
+
+class Page(NamedTuple):
+    """The DVA's book as it is now.
+
+    Attributes:
+        book: The events.
+        rights: Who may act on which robot.
+        works: Whether the DVA is at work: one that was silenced decides nothing.
+    """
+
+    book: EventBook
+    rights: Sequence[Right]
+    works: bool
+
+
+def page_of(dva: DvaAgent) -> Page:
+    """What the book of a DVA shows now."""
+    grants = dva.desk.sessions.permissions.grants.values()
+    rights = [Right(grant.robot, grant.holder, grant.session) for grant in grants]
+    return Page(dva.desk.book, rights, not dva.device.silent)
+
+
+class Listener(Protocol):
+    """Takes what is said, in order of time [s]."""
+
+    def sent(self, now: float, source: str, to: str, payload: Any) -> None:
+        """A node has sent a message, or a picture; `to` is empty if that went to anybody."""
+
+    def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
+        """A message has reached a node; `source` has really sent it."""
+
+
+class Observer(Listener, Protocol):
+    """Takes all facts, in order of time [s]."""
+
+    def accepted(self, command: Accepted) -> None:
+        """A robot has accepted a command to drive."""
+
+    def by_hand(self, done: ByHand) -> None:
+        """Somebody drives a robot at the robot itself: no message says so."""
+
+    def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
+        """How the robots move, by id."""
+
+    def shows(self, now: float, page: Page) -> None:
+        """What the DVA's book shows."""
+
+    def deafened(self, now: float, robot: str, deaf: bool) -> None:
+        """A robot's computer hangs and hears nothing, or hears again."""
+
+    def slowed(self, now: float, processing: float) -> None:
+        """From now on a message takes a robot's computer so long on average [s]."""
+
+
+MOST_SENT = 50_000  # messages of which is known who has sent them
+
+
+class Senders:
+    """Who has really sent a message over sockets, where nothing but the message says so.
+
+    Args:
+        is_ours: Whether a device is one of those whose every message is noted.
+        most: So many messages are remembered; None: all.
+    """
+
+    def __init__(self, is_ours: Callable[[str], bool], most: int | None = MOST_SENT) -> None:
+        self._is_ours, self._most = is_ours, most
+        self._sent: OrderedDict[tuple[str, int], None] = OrderedDict()
+
+    def note(self, source: str, payload: bytes) -> None:
+        """One of ours sends a message."""
+        self._sent[source, hash(payload)] = None
+        if self._most is not None and len(self._sent) > self._most:
+            self._sent.popitem(last=False)
+
+    def sender(self, claimed: str, payload: bytes) -> str:
+        """The sender as a message claims it; empty if that is one of ours, and has not sent it."""
+        forged = self._is_ours(claimed) and (claimed, hash(payload)) not in self._sent
+        return "" if forged else claimed
+
+
+# --- facts that are kept -----------------------------------------------------------------
+
+
+class Arrived(NamedTuple):
+    """A message has reached a robot or the DVA.
+
+    Attributes:
+        time: When [s].
+        source: Who really sent it; empty: nobody of this run, although it says so.
+        to: Whom it has reached.
+        payload: Its bytes.
+    """
+
+    time: float
+    source: str
+    to: str
+    payload: bytes
+
+
+class Heard(NamedTuple):
+    """Whom the DVA has heard since the last such fact; heartbeats and status are kept as that."""
+
+    time: float
+    devices: tuple[str, ...]
+
+
+class MotionNews(NamedTuple):
+    """How robots move, as far as that has changed, by id."""
+
+    time: float
+    motions: dict[str, RobotMotion]
+
+
+class PlaceNews(NamedTuple):
+    """Where robots and guards are, as far as they have moved, by id."""
+
+    time: float
+    places: dict[str, Position]
+
+
+class BookNews(NamedTuple):
+    """What the DVA's book shows, as far as that has changed.
+
+    Attributes:
+        time: When [s].
+        events: Events that have changed, as `event_facts` has them.
+        gone: Numbers of events that are in it no longer.
+        total: How many events there ever were, and ...
+        counts: ... how many stand in each state; None: as before.
+        rights: Who may act on which robot; None: as before.
+        works: Whether the DVA is at work.
+    """
+
+    time: float
+    events: list[dict[str, Any]]
+    gone: list[int]
+    total: int
+    counts: dict[str, int] | None
+    rights: list[Right] | None
+    works: bool
+
+
+class Deafened(NamedTuple):
+    """A robot's computer hangs and hears nothing, or hears again."""
+
+    time: float
+    robot: str
+    deaf: bool
+
+
+class Slowed(NamedTuple):
+    """From now on a message takes a robot's computer so long on average [s]."""
+
+    time: float
+    processing: float
+
+
+class FactGap(NamedTuple):
+    """So many facts could not be kept, here or shortly before."""
+
+    time: float
+    missing: int
+
+
+Fact = Sent | Arrived | Heard | Accepted | ByHand | MotionNews | PlaceNews | BookNews
+Fact |= Deafened | Slowed | FactGap
+Put = Callable[[Any], object]
+_QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
+
+
+class FactLog:
+    """Keeps the facts that a recording needs: an observer that judges nothing.
+
+    Args:
+        put: Takes facts, in order.
+        robots: Ids of the robots whose facts are kept.
+        dva: Id of the DVA.
+        look: Gives the motion of a robot now, by its id.
+        page: Gives what the DVA's book shows now; None: the DVA is elsewhere.
+        keeps_sent: Whether messages are kept as they are sent; else somebody else does that.
+    """
+
+    def __init__(
+        self,
+        put: Put,
+        robots: Container[str],
+        look: Callable[[str], RobotMotion],
+        page: Callable[[], Page] | None = None,
+        *,
+        dva: str = DVA,
+        keeps_sent: bool = True,
+    ) -> None:
+        self._put, self._robots, self._dva, self._look = put, robots, dva, look
+        self._page, self._keeps_sent = page, keeps_sent
+        self._motions: dict[str, RobotMotion] = {}
+        self._places: dict[str, Position] = {}
+        self._heard: dict[str, None] = {}
+        self._book = _BookDiff()
+
+    def sent(self, now: float, source: str, to: str, payload: Any) -> None:
+        """See `Observer`; an answer goes with how the robot moves, an order with the book."""
+        if isinstance(payload, bytes):
+            if source in self._robots and b"<reply>" in payload:
+                self._note_motions(now, {source: self._look(source)})
+            elif source == self._dva and self._page is not None and b"<Order>" in payload:
+                self._put(self._book.news(now, self._page()))
+        if self._keeps_sent:
+            self._put(Sent(now, source, to, 0, payload))
+
+    def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
+        """See `Observer`."""
+        if not isinstance(payload, bytes) or not (to == self._dva or to in self._robots):
+            return
+        if to == self._dva and any(quiet in payload for quiet in _QUIET):
+            self._heard[source] = None
+        else:
+            self._put(Arrived(now, source, to, payload))
+
+    def accepted(self, command: Accepted) -> None:
+        """See `Observer`."""
+        self._put(command)
+
+    def by_hand(self, done: ByHand) -> None:
+        """See `Observer`."""
+        self._note_motions(done.time, {done.robot: self._look(done.robot)})
+        self._put(done)
+
+    def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
+        """See `Observer`: that somebody has looked is a fact, too."""
+        self._note_motions(now, motions, at_all=True)
+
+    def _note_motions(
+        self, now: float, motions: Mapping[str, RobotMotion], at_all: bool = False
+    ) -> None:
+        known = self._motions
+        new = {robot: each for robot, each in motions.items() if known.get(robot) != each}
+        known |= new
+        if new or at_all:
+            self._put(MotionNews(now, new))
+
+    def places(self, now: float, places: Mapping[str, Position]) -> None:
+        """Where robots and guards are."""
+        new = {device: at for device, at in places.items() if self._places.get(device) != at}
+        self._places |= new
+        if new:
+            self._put(PlaceNews(now, new))
+
+    def shows(self, now: float, page: Page) -> None:
+        """See `Observer`."""
+        if self._heard:
+            self._put(Heard(now, tuple(self._heard)))
+            self._heard.clear()
+        self._put(self._book.news(now, page))
+
+    def deafened(self, now: float, robot: str, deaf: bool) -> None:
+        """See `Observer`."""
+        self._put(Deafened(now, robot, deaf))
+
+    def slowed(self, now: float, processing: float) -> None:
+        """See `Observer`."""
+        self._put(Slowed(now, processing))
+
+
+# --- the book, told by what changes -------------------------------------------------------
+
+_OPEN, _CLOSED, _BOTH = "open", "closed", "both"
+
+
+def event_facts(event: Event, where: str) -> dict[str, Any]:
+    """An event as facts have it; `where`: among the open or the closed ones, or `both`."""
+    return {
+        "number": event.number,
+        "kind": event.kind,
+        "latitude_deg": event.position.latitude,
+        "longitude_deg": event.position.longitude,
+        "state": event.state.value,
+        "where": where,
+        "contain": event.needs_containment,
+        **{who: getattr(event, who) for who in _SENT},
+        "times_s": dict(event.times),
+    }
+
+
+_SENT = "responder", "operator", "actor"
+
+
+class _BookDiff:
+    """Finds out what has changed in a book, by looking at all of it."""
+
+    def __init__(self) -> None:
+        self._events: dict[int, tuple[Any, ...]] = {}
+        self._counts: dict[str, int] = {}
+        self._rights: list[Right] = []
+
+    def news(self, now: float, page: Page) -> BookNews:
+        """What a page shows that the last one did not."""
+        book, events = page.book, list[dict[str, Any]]()
+        every = [(e, _BOTH if n in book.closed else _OPEN) for n, e in book.open.items()]
+        every += [(e, _CLOSED) for n, e in book.closed.items() if n not in book.open]
+        known, self._events = self._events, {}
+        for event, where in every:
+            shown: tuple[Any, ...] = where, event.state, event.responder, event.operator
+            shown = *shown, event.actor, event.needs_containment, *event.times.items()
+            self._events[event.number] = shown
+            if known.get(event.number) != shown:
+                events.append(event_facts(event, where))
+        gone = [number for number in known if number not in self._events]
+        counts = {state.value: count for state, count in book.counts.items()}
+        rights = list(page.rights)
+        news = BookNews(
+            *(now, events, gone, book.total),
+            counts if counts != self._counts else None,
+            rights if rights != self._rights else None,
+            page.works,
+        )
+        self._counts, self._rights = counts, rights
+        return news
+
+
+class BookCopy:
+    """The DVA's book put together from what has changed.
+
+    Args:
+        merge_distance: Reports of one kind nearer than this are one event [m].
+    """
+
+    def __init__(self, merge_distance: float) -> None:
+        self.book, self._rights = EventBook(merge_distance), list[Right]()
+
+    def page(self, news: BookNews) -> Page:
+        """What the book shows by now."""
+        book = self.book
+        for number in news.gone:
+            book.open.pop(number, None)
+            book.closed.pop(number, None)
+        for facts in news.events:
+            self._put(facts)
+        book.total = news.total
+        if news.counts is not None:
+            book.counts = {State(state): count for state, count in news.counts.items()}
+        if news.rights is not None:
+            self._rights = news.rights
+        return Page(book, self._rights, news.works)
+
+    def _put(self, facts: Mapping[str, Any]) -> None:
+        number = facts["number"]
+        event = Event(
+            number,
+            facts["kind"],
+            Position(facts["latitude_deg"], facts["longitude_deg"]),
+            0.0,
+            facts["contain"],
+            State(facts["state"]),
+            times=dict(facts["times_s"]),
+            **{who: facts[who] for who in _SENT},
+        )
+        for where, events in ((_OPEN, self.book.open), (_CLOSED, self.book.closed)):
+            if facts["where"] in (where, _BOTH):
+                events[number] = event
+            else:
+                events.pop(number, None)

@@ -1,0 +1,199 @@
+"""Verdicts: which safety rules a run has held, which were broken by whom, and which nobody judged.
+
+A `Judge` takes the facts of a run, of one that goes on or of a recording, and lets the audit hold
+them against the rules. It knows nothing of the program that was run, and runs none of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from dva_sim.kernel.errors import DvaSimError, ExitCode
+from dva_sim.kernel.recorder import Accepted, Breach, ByHand, Recorder, Sent
+from dva_sim.protocol.messages import Position
+from dva_sim.simulation.full import observations as o
+from dva_sim.simulation.full.safety_checks import SafetyAudit
+
+RULES: Final = {
+    "S1": "a robot moves only by a valid command in time, or a mission that holds",
+    "S2": "a robot has one owner, and changes hands at a standstill",
+    "S3": "an emergency stops a robot until it gets a new order",
+    "S4": "motors stay within their limits",
+    "S5": "nobody acts without a permission",
+    "S6": "no event is lost, counted twice or left waiting",
+    "S7": "the times of events are in order",
+}
+OF_ROBOTS: Final = ("S1", "S2", "S3", "S4", "S5")
+HELD, BROKEN, NOT_JUDGED = "held", "broken", "not judged"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a rule has fared.
+
+    Attributes:
+        rule: Which, such as `S1`.
+        state: `held`, `broken` or `not judged`.
+        text: What the rule says, how it was broken, or why nobody judged it.
+    """
+
+    rule: str
+    state: str
+    text: str
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the rule is broken."""
+        return self.state == BROKEN
+
+    def __str__(self) -> str:
+        return f"{self.rule} {self.state}: {self.text}"
+
+
+def broken_lines(broken: Iterable[Breach]) -> dict[str, list[str]]:
+    """For each broken rule a line for each agent that broke it: who, since when, how often, how."""
+    lines: dict[str, list[str]] = {}
+    for breach in sorted(broken, key=lambda each: (each.rule, each.time, each.who)):
+        times = f", seen {breach.count} times" if breach.count > 1 else ""
+        text = f"{breach.who}, at {breach.time:.1f} s{times}: {breach.what}"
+        lines.setdefault(breach.rule, []).append(text)
+    return lines
+
+
+def verdicts(
+    recorder: Recorder, not_judged: Mapping[str, str] | None = None, until: str = ""
+) -> list[Verdict]:
+    """A verdict on each rule, in order; on one that several agents broke, one for each.
+
+    Args:
+        recorder: Told by an audit what was broken.
+        not_judged: Rules that nobody could judge, each with the reason.
+        until: Up to when the run was judged, in words; empty: all of it.
+    """
+    broken, why_not = broken_lines(recorder.broken.values()), not_judged or {}
+    found: list[Verdict] = []
+    for rule, says in RULES.items():
+        if rule in broken:
+            found += [Verdict(rule, BROKEN, line) for line in broken[rule]]
+        elif rule in why_not:
+            found.append(Verdict(rule, NOT_JUDGED, why_not[rule]))
+        else:
+            found.append(Verdict(rule, HELD, says + until))
+    return found
+
+
+class RulesBroken(DvaSimError):
+    """A run has broken safety rules."""
+
+    exit_code = ExitCode.DOES_NOT_HOLD
+
+
+def refuse_broken(found: Iterable[Verdict]) -> None:
+    """Let a run whose rules were broken not end as if nothing had happened.
+
+    Raises:
+        RulesBroken: one was broken.
+    """
+    if told := broken_rules(found):
+        raise RulesBroken(told)
+
+
+def broken_rules(found: Iterable[Verdict]) -> str:
+    """Which rules a run has broken, in a line; empty: none."""
+    broken = dict.fromkeys(verdict.rule for verdict in found if verdict.is_broken)
+    return f"the run has broken {', '.join(broken)}" if broken else ""
+
+
+class Judge:
+    """Lets the audit judge facts, in their order.
+
+    Args:
+        terms: What the run is held to.
+    """
+
+    def __init__(self, terms: o.SafetyTerms) -> None:
+        self.recorder = Recorder()
+        self._terms, self._book = terms, o.BookCopy(terms.rules.merge_distance)
+        self._motions: dict[str, o.RobotMotion] = {}
+        self._places: dict[str, Position] = {}
+        self._audit = SafetyAudit(self.recorder, terms, self._motion_of, self._places.get)
+        self._sees_robots = self._sees_dva = False
+        self._gap: o.FactGap | None = None
+        self._missing = 0
+
+    def _motion_of(self, robot: str) -> o.RobotMotion:
+        return self._motions.get(robot, o.STANDS)
+
+    def take(self, fact: Any) -> None:
+        """Judge one more fact; none that is missing can be told from one that never was."""
+        audit, now = self._audit, fact.time
+        match fact:
+            case Sent():
+                audit.sent(now, fact.source, fact.destination, fact.payload)
+            case o.Arrived():
+                audit.delivered(now, fact.source, fact.to, fact.payload)
+            case Accepted() if fact.robot in self._terms.motors:
+                audit.accepted(fact)
+            case ByHand() if fact.robot in self._terms.motors:
+                audit.by_hand(fact)
+            case o.MotionNews():
+                self._sees_robots = True
+                known = {r: of for r, of in fact.motions.items() if r in self._terms.motors}
+                self._motions |= known
+                audit.moves(now, self._motions)
+            case o.BookNews():
+                self._sees_dva = True
+                audit.knows_places(bool(self._places))
+                audit.shows(now, self._book.page(fact))
+            case o.Heard():
+                for device in fact.devices:
+                    audit.heard(now, device)
+            case o.PlaceNews():
+                self._places |= fact.places
+            case o.Deafened():
+                audit.deafened(now, fact.robot, fact.deaf)
+            case o.Slowed():
+                audit.slowed(now, fact.processing)
+            case o.FactGap():
+                self._gap = self._gap or fact
+                self._missing += fact.missing
+
+    def verdicts(self, until: str = "") -> list[Verdict]:
+        """The verdicts by now; see `verdicts`."""
+        return verdicts(self.recorder, self._not_judged(), until)
+
+    def _not_judged(self) -> dict[str, str]:
+        gap = self._gap
+        if gap is not None:
+            why = f"from {gap.time:.1f} s on {self._missing} facts could not be kept"
+            return dict.fromkeys(RULES, why)
+        why_not: dict[str, str] = {}
+        if not self._terms.motors:
+            why_not |= dict.fromkeys(OF_ROBOTS, "no robot takes part")
+        elif not self._sees_robots:
+            why_not |= dict.fromkeys(OF_ROBOTS, "how the robots moved is not known here")
+        if not self._sees_dva:
+            why_not |= dict.fromkeys(("S6", "S7"), "what the DVA's book showed is not known here")
+        return why_not
+
+
+def judged(
+    facts: Iterable[Any] | None, terms: o.SafetyTerms | None, until: str = ""
+) -> list[Verdict]:
+    """The verdicts on a recorded run.
+
+    Args:
+        facts: In order; None: it was recorded without them.
+        terms: What the run was held to; None: likewise.
+        until: See `verdicts`.
+    """
+    if facts is None or terms is None:
+        lacks = dict.fromkeys(RULES, "it lacks what the DVA's book showed")
+        lacks |= dict.fromkeys(OF_ROBOTS, "it lacks how robots moved, and what reached them when")
+        return verdicts(Recorder(), lacks)
+    judge = Judge(terms)
+    for fact in facts:
+        judge.take(fact)
+    return judge.verdicts(until)

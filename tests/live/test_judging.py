@@ -1,0 +1,190 @@
+"""A live run is judged by what its parts say, whoever speaks first and whatever they hide."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import defaultdict
+from typing import Any
+
+import pytest
+
+from dva_sim.agents.robot.controller import Decision, RobotController
+from dva_sim.kernel.recorder import Sent
+from dva_sim.live.judging import FRAME, HERE, SAID, SEEN, LiveJudge
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full.observation_json import as_plain
+from dva_sim.simulation.full.observations import (
+    Arrived,
+    BookNews,
+    Heard,
+    MotionNews,
+    RobotMotion,
+    terms_of,
+)
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, id_of, kind_of
+from dva_sim.simulation.full.verdicts import RULES
+
+ROBOT, PHONE, OTHER = id_of("robot", 1), id_of("operator", 1), id_of("operator", 2)
+WORLD, AT_DVA, REST = 1, 0, 2  # parts
+
+Line = list[Any]
+
+
+def drive(seconds: float = 25.0) -> Run:
+    """A drive in virtual time, with an emergency that the DVA sends."""
+    run = Run(scenarios.build(scenarios.load("drive-to-event"), {}), 1, keep_traffic=True)
+    run.clock.call_at(20.0, lambda: run.dva.device.ask(ROBOT, m.Emergency()))
+    run.clock.run(seconds)
+    return run
+
+
+def part_of(fact: Any) -> int:
+    """The process of a live run that would have seen a fact."""
+    if isinstance(fact, BookNews | Heard):
+        return AT_DVA
+    if isinstance(fact, Sent | Arrived):
+        seen_by = fact.source if isinstance(fact, Sent) else fact.to
+        kinds = {"dva": AT_DVA, "operator": REST}
+        return kinds.get(kind_of(seen_by)[0], WORLD)
+    return WORLD
+
+
+def line_of(fact: Any) -> Line:
+    """How a part of a live run says a fact."""
+    if not isinstance(fact, Sent):
+        word, time, told = as_plain(fact)
+        return [SEEN, time, word, told]
+    if isinstance(fact.payload, bytes):
+        return [SAID, fact.time, fact.source, fact.destination, fact.payload.decode()]
+    return [FRAME, fact.time, fact.source, fact.payload.observation, fact.payload.captured]
+
+
+def said_by_parts(run: Run) -> dict[int, list[Line]]:
+    """The lines of each part."""
+    lines: dict[int, list[Line]] = defaultdict(list)
+    for device in run.stage.devices:
+        part = part_of(Sent(0.0, device.id_tag, "", 0, b""))
+        lines[part].append([HERE, 0.0, [device.id_tag]])
+    for fact in run.recorder.facts or ():
+        lines[part_of(fact)].append(line_of(fact))
+    return lines
+
+
+def judged(run: Run, lines: dict[int, list[Line]], seed: int = 1) -> dict[str, str]:
+    """How the rules have fared; parts say some lines at a time, each when it comes to it."""
+    judge, luck = LiveJudge(terms_of(run.scenario)), random.Random(seed)
+    for part in lines:
+        judge.joins(part)
+    left = {part: list(said) for part, said in lines.items()}
+    while left:
+        part = min(left, key=lambda one: left[one][0][1] + luck.uniform(0.0, 4.0))
+        some, left[part] = left[part][:20], left[part][20:]
+        judge.hear(part, [json.dumps(line).encode() for line in some])
+        if not left[part]:
+            judge.leaves(part)
+            del left[part]
+    return {verdict.rule: verdict.state for verdict in judge.verdicts()}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_an_honest_run_holds_every_rule_whichever_part_is_read_first(seed: int) -> None:
+    run = drive()
+    assert run.field.robots[ROBOT].applied > 50
+    assert judged(run, said_by_parts(run), seed) == dict.fromkeys(RULES, "held")
+
+
+@pytest.mark.invariant("S3")
+def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
+    run = drive()
+    found = judged(run, said_by_parts(run))
+    assert {rule for rule, state in found.items() if state == "broken"} == {"S3"}
+
+
+@pytest.mark.parametrize("ahead", [-0.3, 0.3])
+def test_no_rule_is_broken_by_two_clocks_that_differ(ahead: float) -> None:
+    """Each rule compares times of one part; the DVA and the phones are on another machine."""
+    run = drive()
+    lines = said_by_parts(run)
+    for part in (AT_DVA, REST):
+        lines[part] = [_later(line, ahead) for line in lines[part]]
+    assert judged(run, lines) == dict.fromkeys(RULES, "held")
+
+
+def _later(line: Line, seconds: float) -> Line:
+    """A line by a clock that is ahead: of the DVA's own times only differences count."""
+    word, time, *rest = line
+    return [word, max(0.0, time + seconds), *rest]
+
+
+def test_without_the_world_robots_are_not_judged_and_without_the_dva_no_events() -> None:
+    run = drive(10.0)
+    lines = said_by_parts(run)
+    alone = judged(run, {WORLD: lines[WORLD]})
+    assert [alone[rule] for rule in RULES] == ["held"] * 5 + ["not judged"] * 2
+    alone = judged(run, {AT_DVA: lines[AT_DVA]})
+    assert [alone[rule] for rule in RULES] == ["not judged"] * 5 + ["held"] * 2
+
+
+def test_what_could_not_be_said_leaves_every_rule_unjudged() -> None:
+    run = drive(10.0)
+    lines = said_by_parts(run)
+    lines[WORLD].insert(50, [SEEN, lines[WORLD][50][1], "gap", {"missing": 3}])
+    assert judged(run, lines) == dict.fromkeys(RULES, "not judged")
+
+
+def test_a_judge_that_has_failed_has_held_nothing() -> None:
+    run = drive(10.0)
+    judge = LiveJudge(terms_of(run.scenario))
+    judge.joins(WORLD)
+    judge.hear(WORLD, [json.dumps(line_of(fact)).encode() for fact in run.recorder.facts or ()])
+    with pytest.raises(KeyError):
+        judge.hear(WORLD, [b'["seen", 11.0, "nonsense", {}]', b'["here", 12.0, []]'])
+    found = judge.verdicts()
+    assert {verdict.state for verdict in found} == {"not judged"}
+    assert "from 11.0 s on" in found[0].text
+
+
+# --- who has really said it ----------------------------------------------------------------
+
+
+def said(time: float, source: str, to: str, body: m.Body, session: int, number: int) -> Sent:
+    data = encode(m.Message(to, number, source, "12:00:00", session, body))
+    return Sent(time, source, to, len(data), data)
+
+
+def reply(time: float, to: str, number: int) -> Sent:
+    return said(time, ROBOT, to, m.Reply(number, m.OK, ""), 0, 900 + number)
+
+
+@pytest.mark.invariant("S5")
+@pytest.mark.parametrize("is_forged", [False, True])
+def test_a_permission_that_nobody_but_its_own_words_says_the_dva_gave_is_none(
+    is_forged: bool,
+) -> None:
+    """Two operators; the robot believes a grant that one of them sends in the DVA's name."""
+    scenario = scenarios.build(scenarios.load("drive-to-event"), {"operator.count": 2})
+    grant = said(1.0, DVA, ROBOT, m.PermissionGrant(PHONE, "both", 5), 5, 1)
+    start = said(1.2, PHONE, ROBOT, m.StartTeleOp(), 5, 2)
+    facts: list[Any] = [
+        Arrived(1.1, DVA, ROBOT, grant.payload),
+        reply(1.1, DVA, 1),
+        start,
+        Arrived(1.3, PHONE, ROBOT, start.payload),
+        reply(1.3, PHONE, 2),
+        MotionNews(2.0, {ROBOT: RobotMotion("Teleoperation", 0.0, 0.0)}),
+    ]
+    if not is_forged:
+        facts.insert(0, grant)
+    judge = LiveJudge(terms_of(scenario))
+    judge.joins(0)
+    here = [HERE, 0.0, [DVA, ROBOT, PHONE, OTHER]]
+    judge.hear(0, [json.dumps(line).encode() for line in (here, *map(line_of, facts))])
+    states = {verdict.rule: verdict.state for verdict in judge.verdicts()}
+    assert states["S5"] == ("broken" if is_forged else "held")

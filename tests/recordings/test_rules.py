@@ -1,0 +1,123 @@
+"""`dva-sim check RECORDING` says of each safety rule whether it was held, broken or not judged."""
+
+import re
+from functools import partial
+
+import pytest
+from command_line import call
+from recordings.runs import drive
+
+from dva_sim.agents.robot.controller import Decision, RobotController
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.protocol import messages as m
+from dva_sim.recordings import writing
+from dva_sim.recordings.writing import write_recording
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.full import observations
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.full.verdicts import RULES
+
+ROBOT = id_of("robot", 1)
+
+
+def checked(path):
+    """The exit code, the state of each rule, and all lines."""
+    ended = call("check", path)
+    assert ended.stderr == ""
+    lines = [line.removeprefix(f"{path}: ") for line in ended.stdout.splitlines()]
+    found = [re.match(r"(S\d) (held|broken|not judged): ", line) for line in lines]
+    return ended.returncode, {one[1]: one[2] for one in found if one}, lines
+
+
+def recorded(path, seconds=16.0, also=lambda _: None):
+    """A recording of the first seconds of a drive."""
+    scenario = scenarios.build(scenarios.load("drive-to-event"), {})
+    run = Run(scenario, 1, keep_traffic=True)
+    also(run)
+    run.clock.run(seconds)
+    write_recording(run.recording(), path)
+    return path
+
+
+def test_a_recording_of_an_honest_run_holds_every_rule(folder):
+    code, rules, lines = checked(folder / "drive.mcap")
+    assert (code, rules) == (0, dict.fromkeys(RULES, "held"))
+    assert lines[-2].startswith("recording: valid; ")
+
+
+def emergency(run):
+    run.clock.call_at(13.0, partial(run.dva.device.ask, ROBOT, m.Emergency()))
+
+
+@pytest.mark.invariant("S3")
+def test_a_broken_rule_is_told_with_when_by_whom_and_how_and_makes_it_invalid(
+    tmp_path, monkeypatch
+):
+    path = recorded(tmp_path / "honest.mcap", also=emergency)
+    assert checked(path)[:2] == (0, dict.fromkeys(RULES, "held"))
+    monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
+    path = recorded(tmp_path / "deaf.mcap", also=emergency)
+    code, rules, lines = checked(path)
+    assert code == 1
+    assert rules == dict.fromkeys(RULES, "held") | {"S3": "broken"}
+    (told,) = [line for line in lines if line.startswith("S3")]
+    assert re.fullmatch(
+        r"S3 broken: robot-1, at 13\.\d s, seen \d+ times: obeys a command .*", told
+    )
+    assert lines[-2:] == ["recording: invalid, breaks 1 safety rule", "1 file: 1 invalid"]
+
+
+def test_a_recording_without_facts_is_not_taken_to_hold_any_rule(tmp_path, monkeypatch):
+    """As those of version 0.8.0 and before."""
+    run = drive()
+    monkeypatch.setattr(run.recorder, "facts", None)
+    write_recording(run, tmp_path / "old.mcap")
+    code, rules, lines = checked(tmp_path / "old.mcap")
+    assert (code, rules) == (0, dict.fromkeys(RULES, "not judged"))
+    for why in ("it lacks how robots moved", "it lacks what the DVA's book showed"):
+        assert any(why in line for line in lines)
+
+
+def test_a_recording_that_was_cut_short_is_judged_up_to_there(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(writing, "CHUNK", 16 * 1024)
+    whole = recorded(tmp_path / "whole.mcap")
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
+    code, rules, lines = checked(path)
+    assert (code, rules) == (0, dict.fromkeys(RULES, "held"))
+    assert "warning: was cut short" in lines
+    assert re.search(r"S1 held: .*, up to \d+ s$", "\n".join(lines), re.MULTILINE)
+
+
+def test_facts_that_nobody_has_written_so_end_in_one_line(tmp_path, monkeypatch):
+    honest = observations.event_facts
+    monkeypatch.setattr(
+        observations, "event_facts", lambda *about: honest(*about) | {"state": "eaten"}
+    )
+    code, rules, lines = checked(recorded(tmp_path / "odd.mcap"))
+    assert (code, rules) == (1, {})
+    assert "facts that no run of dva-sim has written" in lines[0]
+    assert "'eaten' is not a valid State" in lines[0]
+
+
+@pytest.mark.invariant("S4")
+def test_robots_are_held_to_what_they_were_whatever_has_become_of_their_profile(
+    tmp_path, monkeypatch
+):
+    """A profile may be a file of a user, and no recording has it: the limits go with the facts."""
+    path = recorded(tmp_path / "run.mcap")
+    monkeypatch.setattr(observations, "robot_profiles", lambda _: pytest.fail("reads a profile"))
+    assert checked(path)[:2] == (0, dict.fromkeys(RULES, "held"))
+
+
+def test_who_moves_and_says_nothing_is_seen_all_the_same(tmp_path, monkeypatch):
+    """No command was accepted, and none is recorded: the body moves."""
+
+    def walks_off(run):
+        body = run.field.robots[ROBOT].body
+        run.clock.call_at(6.0, lambda: body.drive(0.3, 0.0, 100.0))
+
+    monkeypatch.setattr(RobotAgent, "move", lambda *_: None)
+    code, rules, _ = checked(recorded(tmp_path / "run.mcap", 10.0, walks_off))
+    assert (code, rules["S1"]) == (1, "broken")
