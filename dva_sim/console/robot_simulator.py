@@ -18,6 +18,12 @@ from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.network.keys import KeyRing
+from dva_sim.simulation.full.verdicts import (
+    BOOK_UNKNOWN,
+    OF_THE_DVA,
+    refuse_broken,
+    verdicts,
+)
 from dva_sim.simulation.scenario import Scenario, build
 
 LAST_WORDS = 0.2  # for what was said last [s]
@@ -90,6 +96,7 @@ class RobotSimulator:
             ConfigError: there is no such robot, or no key of it.
             ChildFailed: the web process could not begin, or has ended by itself.
             NetworkError: the host is not this machine.
+            RulesBroken: a safety rule was broken.
         """
         options = self._options
         scenario = options.read()
@@ -103,8 +110,12 @@ class RobotSimulator:
         finally:
             self._processes.end()
             world.close()
+        found = verdicts(world.recorder, dict.fromkeys(OF_THE_DVA, BOOK_UNKNOWN))
+        for verdict in found:
+            self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
+        refuse_broken(found)
 
     def _run(self, world: RobotWorld) -> None:
         with ending_when_asked(world.clock, supervised=False) as ending:

@@ -89,7 +89,7 @@ class EventLedger:
     ) -> None:
         self._book, self._rules, self._dva, self._name = EventBook(), rules, dva, name
         self._place_of, self._at_event = place_of, at_event
-        self.knows_places = True
+        self.knows_places, self._is_new = True, True
         self._heard: dict[str, float] = {}
         self._held_since: dict[Right, float] = {}
         self._asked: dict[tuple[str, int], m.EventReport] = {}
@@ -209,6 +209,9 @@ class EventLedger:
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
         passed, self._now = now - self._now, now
+        if self._is_new:
+            self._is_new = False
+            self._adopt(now)
         if not page.works:
             self._let_no_time_pass(passed)
         yield from self._unheard(page.rights, now, page.works)
@@ -241,6 +244,19 @@ class EventLedger:
         known = (*self._book.open.values(), *self._book.closed.values())
         same = (e for e in known if e.kind == kind)
         return any(apart(e.position, report.position) < near for e in same)
+
+    def _adopt(self, now: float) -> None:
+        """What stands in the book at first is of an earlier life of the DVA, and is taken as it is.
+
+        Who was sent by then may say what was found, as if the order had been heard here.
+        """
+        for event in (*self._book.open.values(), *self._book.closed.values()):
+            word = self._word(event.number)
+            sent = {event.operator: event.responder, event.responder: event.responder}
+            sent[event.actor] = event.actor
+            word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
+            found = FOUND.intersection((*event.times, event.state.value))
+            self._seen[event.number] = Seen(found, _in_hand(event), now, now)
 
     def _let_no_time_pass(self, passed: float) -> None:
         """A DVA that was silenced decides nothing: what waits for it is not late by that."""

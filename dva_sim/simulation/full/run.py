@@ -272,7 +272,8 @@ class Run:
     # --- the network -------------------------------------------------------------------
 
     def _sent(self, now: float, source: str, to: str, size: int, payload: Any) -> None:
-        self.sent(now, source, to, payload)
+        for observer in self._observers:
+            observer.sent(now, source, to, payload)
         self.recorder.message_sent(now, source, to, size, payload)
 
     def _make_links(self) -> dict[str, tuple[Link, Link]]:

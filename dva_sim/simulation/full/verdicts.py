@@ -26,6 +26,8 @@ RULES: Final = {
     "S7": "the times of events are in order",
 }
 OF_ROBOTS: Final = ("S1", "S2", "S3", "S4", "S5")
+OF_THE_DVA: Final = ("S6", "S7")
+BOOK_UNKNOWN = "what the DVA's book showed is not known here"
 HELD, BROKEN, NOT_JUDGED = "held", "broken", "not judged"
 
 
@@ -171,11 +173,11 @@ class Judge:
             return dict.fromkeys(RULES, why)
         why_not: dict[str, str] = {}
         if not self._terms.motors:
-            why_not |= dict.fromkeys(OF_ROBOTS, "no robot takes part")
+            why_not |= dict.fromkeys(OF_ROBOTS, "no robot of the scenario takes part")
         elif not self._sees_robots:
             why_not |= dict.fromkeys(OF_ROBOTS, "how the robots moved is not known here")
         if not self._sees_dva:
-            why_not |= dict.fromkeys(("S6", "S7"), "what the DVA's book showed is not known here")
+            why_not |= dict.fromkeys(OF_THE_DVA, BOOK_UNKNOWN)
         return why_not
 
 

@@ -30,7 +30,7 @@ from dva_sim.protocol.codec import encode
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.event_ledger import SILENT_AFTER
 from dva_sim.simulation.full.observation_json import as_plain, of_plain
-from dva_sim.simulation.full.observations import page_of, terms_of
+from dva_sim.simulation.full.observations import STANDS, FactLog, page_of, terms_of
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.safety_checks import CHECKED, LEASE
 from dva_sim.simulation.full.stage import DVA, id_of
@@ -259,6 +259,28 @@ def test_a_dva_that_never_takes_back_the_permission_of_a_silent_device_breaks_s2
     for name in ("take_back", "take_back_all"):
         monkeypatch.setattr(Sessions, name, lambda *_: None)
     assert broken(falls_silent()) == {"S2"}
+
+
+def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule() -> None:
+    """Its first page has events that others have confirmed, and one that somebody is sent to."""
+    run = made({"horizon_s": 60})
+    run.run()
+    page, terms = page_of(run.dva), terms_of(run.scenario)
+    (event,) = page.book.closed.values()
+    assert "confirmed" in event.times
+    pending = page.book.add("fire", m.Position(38.66, -9.2), 0.5, 0.0)
+    page.book.move(pending, State.ASSIGNED, 0.5)
+    pending.responder = id_of("guard", 1)
+    facts: list[Any] = []
+    log = FactLog(facts.append, (), lambda _: STANDS)
+    log.shows(1.0, page)
+    report = m.EventReport(2, "fire", pending.position, 0.5, 0.9, "confirmed")
+    data = encode(m.Message(DVA, 9, id_of("guard", 1), "12:00:00", 0, report))
+    log.delivered(1.2, id_of("guard", 1), DVA, data)
+    page.book.move(pending, State.CONFIRMED, 1.2)
+    log.shows(1.5, page)
+    found = {verdict.rule: verdict.state for verdict in judged(facts, terms)}
+    assert (found["S6"], found["S7"]) == ("held", "held")
 
 
 def test_a_dva_that_was_silenced_is_late_with_nothing() -> None:
