@@ -14,6 +14,8 @@ import pytest
 from programs import Programs, wait_until
 from websockets.sync.client import connect
 
+from dva_sim.simulation.full.verdicts import RULES
+
 pytestmark = pytest.mark.system
 
 QUIET = ("--no-open", "--port", "0")
@@ -170,12 +172,51 @@ def test_what_was_driven_and_recorded_holds_every_rule(programs, tmp_path, links
     console.send(signal.SIGINT)
     assert console.ends() == 0
     assert "run.mcap written" in console.said
+    assert all(f"\n{rule} held: " in console.said for rule in RULES)
     check = programs.start("check", tmp_path / "run.mcap")
     assert check.ends() == 0, check.said + "".join(check.complained)
     replay = programs.start("replay", tmp_path / "run.mcap")
     assert replay.ends() == 0
     assert "drives robot-1" in replay.said
     assert not list(tmp_path.glob("*.part"))
+
+
+RUNS_AWAY = """
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.worlds.bodies import TickTarget
+
+honest = RobotAgent.start
+
+def start(self):
+    honest(self)
+    self.body._asked.put(0, TickTarget(2.0, 0.0, 1e9))
+    self.body._world.wake(self.body)
+
+RobotAgent.start = start
+"""
+
+
+@pytest.mark.parametrize("links", ["modelled", "real"])
+def test_a_console_whose_robots_break_rules_says_so_at_once_and_at_its_end(
+    programs, tmp_path, monkeypatch, links
+):
+    (tmp_path / "sitecustomize.py").write_text(RUNS_AWAY)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    console = running(programs, "--links", links, "--no-token", "--record", tmp_path / "run.mcap")
+
+    def story():
+        with urllib.request.urlopen(f"{address_of(console)}api/story?from=0") as answer:
+            return answer.read().decode()
+
+    wait_until(lambda: "S1 broken: " in story(), "it is told")
+    assert "S4 broken: its motors are asked for 2.00 m/s and 0.00 rad/s" in story()
+    console.send(signal.SIGINT)
+    assert console.ends() == 1
+    assert console.complained == ["error: the run has broken S1, S4"]
+    assert "S4 broken: robot-1, at" in console.said
+    check = programs.start("check", tmp_path / "run.mcap")
+    assert check.ends() == 1
+    assert "S4 broken: robot-1, at" in check.said
 
 
 def test_without_a_recording_nothing_is_written(programs, console, tmp_path):
