@@ -55,7 +55,7 @@ class RunFacts:
                 yield by_row.get(row["i"], str(row["i"])), "its watchdog stopped it"
 
     def broken(self) -> Iterable[Breach]:
-        """What the audit of the run has found."""
+        """Return the breaches that the audit of the run has found."""
         return self._run.recorder.broken.values()
 
     def is_somebody_free(self) -> bool:

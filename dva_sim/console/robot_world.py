@@ -179,7 +179,7 @@ class RobotWorld:
         self.audit.deafened(self.clock.now, robot, on)
 
     def slowed(self, processing: float) -> None:
-        """The audit is told how long a message takes the robot's computer from now on [s]."""
+        """Note how long a message takes the robot's computer from now on [s]."""
         self.audit.slowed(self.clock.now, processing)
 
     # --- what a console shows: see `ConsoleSubject` ------------------------------------------

@@ -161,7 +161,7 @@ class ConsoleWorld(ToldWorld):
         self.run.deafened(robot, on)
 
     def is_ours(self, device: str) -> bool:
-        """Whether what a device sends is seen as it is sent; else it is one that has joined."""
+        """Return True for a device of this console, whose messages are seen as they are sent."""
         return self.sockets is None or self.sockets.network.is_here(device)
 
     def serve_cameras(self, base: str) -> None:

@@ -275,14 +275,14 @@ class DriveLog:
 
 @dataclass
 class Breach:
-    """A rule that somebody has broken.
+    """Breach of a safety rule by an agent.
 
     Attributes:
-        rule: Which, such as `S1`.
-        who: The name of the agent.
-        time: When it did so first [s].
-        what: How, in words.
-        count: How often that was seen.
+        rule: Name of the rule, such as `S1`.
+        who: Name of the agent.
+        time: Time of the first breach [s].
+        what: The first breach in words.
+        count: Number of breaches seen.
     """
 
     rule: str
@@ -302,8 +302,8 @@ class Recorder:
         messages: How many were sent.
         bytes: Of all of them [B].
         counters: Whatever else is counted, by what it is.
-        broken: What broke each rule first, by rule and agent.
-        facts: What the safety rules are judged by, in order, where that is kept.
+        broken: First breach of each rule by each agent.
+        facts: Facts that the safety rules are judged by, in order; None: not kept.
         on_accepted: Told of each command that a robot accepts.
         on_hand: Told of what is done to a robot by hand.
     """

@@ -1,10 +1,10 @@
-"""A live run held to the safety rules while it goes on, by what its parts say of it.
+"""Judges a live run by the safety rules while it goes on, from the lines that its parts write.
 
-Parts are processes: each writes the facts that it sees itself, in their order and by its own
-clock. All that a rule compares it takes from one part, so that no rule hangs on two clocks: a
-robot's commands, motors and motion are facts of the world's process, events and permissions those
-of the DVA's. Two things are of another part: who really sent a message, for which its time does not
-count, and where somebody is who confirms an event, to half a second.
+Parts are processes. Each writes the facts that it sees itself, in their order and by its own clock.
+A rule compares times of one part only, so that no rule depends on two clocks: commands, motors and
+motion of a robot are facts of the world's process, events and permissions those of the DVA's. Two
+facts come from another part: the true sender of a message, whatever its time, and the place of
+somebody who confirms an event, to half a second.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dva_sim.simulation.full.observation_json import of_plain
 from dva_sim.simulation.full.observations import MOST_SENT, Arrived, FactGap, SafetyTerms, Senders
 from dva_sim.simulation.full.verdicts import Judge, Verdict
 
-WAITS = 10.0  # for what a part says that is silent, or has much to say [s]
+WAITS = 10.0  # for the lines of a part that is silent or behind [s]
 HERE, SEEN, SAID, FRAME = "here", "seen", "sent", "frame"  # first words of the lines that count
 JUDGED: Final = HERE, SEEN, SAID, FRAME
 _STARTS: Final = tuple(f'["{word}"'.encode() for word in JUDGED)
@@ -30,7 +30,7 @@ Line = list[Any]
 
 
 class Facts:
-    """Facts from the lines of parts; who really sent a message is told by who says so.
+    """Reads facts from the lines of parts, and finds the true sender of each message.
 
     Args:
         most: So many messages are remembered; None: all.
@@ -41,14 +41,14 @@ class Facts:
         self._senders = Senders(self._here.__contains__, most)
 
     def note(self, line: Line) -> None:
-        """Remember who is one of ours, and what those have sent; in whatever order that comes."""
+        """Remember the devices of this run and the messages they have sent, in any order."""
         if line[0] == HERE:
             self._here.update(line[2])
         elif line[0] == SAID:
             self._senders.note(line[2], line[4].encode())
 
     def fact(self, line: Line) -> Any:
-        """The fact that a line tells; None if it tells none."""
+        """Return the fact in a line; None if it holds none."""
         if line[0] == SAID:
             _, time, source, to, text = line
             return Sent(time, source, to, len(text), text.encode())
@@ -65,16 +65,16 @@ class Facts:
 
 
 def observation_of(seen: list[Any]) -> Observation:
-    """What a camera saw, from its values in a line."""
+    """Return a camera's observation from its values in a line."""
     *values, hazards, visibility = seen
     return Observation._make((*values, tuple(SeenHazard(*one) for one in hazards), visibility))
 
 
 class LiveJudge:
-    """Judges what parts say, in order of time; they speak from threads of their own.
+    """Judges the lines of all parts in order of time; each part has a thread of its own.
 
     Args:
-        terms: What the run is held to.
+        terms: Limits that the run is held to.
     """
 
     def __init__(self, terms: SafetyTerms) -> None:
@@ -86,12 +86,12 @@ class LiveJudge:
         self._lock = threading.Lock()
 
     def joins(self, part: int) -> None:
-        """A part is going to speak."""
+        """Expect lines from a part."""
         with self._lock:
             self._heard[part] = 0.0
 
     def hear(self, part: int, lines: Iterable[bytes]) -> None:
-        """A part has said something: whole lines."""
+        """Take whole lines of a part."""
         with self._lock:
             for line in lines:
                 if line.startswith(_STARTS):
@@ -106,7 +106,7 @@ class LiveJudge:
         heapq.heappush(self._waiting, (time, self._count, line))
 
     def leaves(self, part: int) -> None:
-        """A part has ended."""
+        """Expect no more lines from a part."""
         with self._lock:
             self._heard.pop(part, None)
             self._judge_up_to(min(self._heard.values(), default=self._latest))
@@ -121,10 +121,9 @@ class LiveJudge:
         self._is_judging = False
 
     def verdicts(self) -> list[Verdict]:
-        """How each rule has fared, when all parts have ended.
+        """Return the verdict on each rule, once all parts have ended.
 
-        A judge that has ended in the middle of its work, by an error of its own, has judged nothing
-        of what came later.
+        After an error of the judge itself, nothing that came later has been judged.
         """
         with self._lock:
             if not self._is_judging:

@@ -1,4 +1,4 @@
-"""Pipes from the parts of a live run to who keeps and judges it: no part ever waits for them."""
+"""Pipes that carry the lines of a live run's parts; no part ever waits for its reader."""
 
 from __future__ import annotations
 

@@ -64,10 +64,10 @@ class LiveRecorder(Recorder):
     Args:
         clock: The part's.
         outlet: Takes lines.
-        keeps: Whether there is to be a recording; else only what the rules are judged by is said.
+        keeps: Write everything for a recording; else only the facts that rules are judged by.
 
     Attributes:
-        log: Takes what the rules are judged by and this part sees; None: it sees nothing of that.
+        log: Takes the facts that this part sees; None: it sees neither robots nor the DVA.
         is_own: Whether a device, by its id, is of this run: what it sends is kept where it is
             sent, what others send where it arrives.
     """
@@ -84,7 +84,7 @@ class LiveRecorder(Recorder):
         self._facts: dict[str, Any] = {}
 
     def put(self, *line: Any) -> bool:
-        """Keep a line: whether it was. That one is missing which the rules need is said later."""
+        """Keep a line, and return whether that was possible; a gap in the facts is noted later."""
         if not self.keeps and line[0] not in JUDGED:
             return True
         if self._missing:
@@ -119,11 +119,11 @@ class LiveRecorder(Recorder):
         self.put(SEEN, time, word, told)
 
     def is_alive(self) -> None:
-        """Say that this part has told all that it knows up to now: nobody has to wait for it."""
+        """Note that all facts of this part up to now are written."""
         self.here(())
 
     def here(self, nodes: Iterable[str]) -> None:
-        """Say which devices are of this process: what they send is said here, and nowhere else."""
+        """Note the devices of this process; only this part writes down what they send."""
         self.put(HERE, self._clock.now, sorted(nodes))
 
     def tell(self, time: float, who: str, what: str, kind: str = "event") -> None:
@@ -173,7 +173,7 @@ class LiveRecorder(Recorder):
         return True
 
     def _is_message(self, data: bytes) -> bool:
-        """Whether it is one by the schema; what is none costs as much room as if it were kept."""
+        """Return True for a valid message; an invalid one uses up room as if it were kept."""
         try:
             decode(data)
         except ProtocolError:
@@ -346,11 +346,11 @@ class Keeper:
 
 
 class RunKeeping:
-    """What keeps and judges a live run: a recording, where one is wanted, and the safety rules.
+    """Keeps a live run as a recording, if one is wanted, and judges it by the safety rules.
 
     Args:
-        options: How the run is done.
-        scenario: What is run.
+        options: Options of the run.
+        scenario: The scenario that is run.
 
     Raises:
         ConfigError: the recording cannot be written.
@@ -376,7 +376,7 @@ class RunKeeping:
         return None
 
     def verdicts(self) -> list[Verdict]:
-        """How the safety rules have fared, once all is finished."""
+        """Return the verdicts on the safety rules, once all parts have ended."""
         return self._judge.verdicts()
 
 
@@ -531,7 +531,7 @@ class _Told:
         self._until(when)
 
     def _seen(self, when: float, *_: Any) -> None:
-        """See `_facts_in`."""
+        """Note only the time: `_facts_in` reads the fact."""
         self._until(when)
 
     @property
@@ -571,7 +571,7 @@ class _Told:
 
 
 def _facts_in(told: Sequence[Line]) -> list[Any]:
-    """What the rules are judged by, in order of time; what one part says stays in its order."""
+    """Return the facts in order of time, those of one part in the order of their lines."""
     reads = Facts(most=None)
     for line in told:
         reads.note(line)

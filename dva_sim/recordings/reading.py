@@ -149,7 +149,7 @@ class Opened:
         lasted: How long the run lasted [s]; longer than the playback if the file was cut short.
         traces: The lines of what was decided, by who decides.
         audit: The rows of the audit log.
-        terms: What the run is held to by the safety rules; None: the file has no facts for that.
+        terms: Limits that the safety rules hold the run to; None: the file has no facts.
     """
 
     playback: Playback
@@ -219,8 +219,7 @@ class _Raw:
         files: What is attached, by name.
         said: Content of the messages, with their time [s], by topic.
         ends: Source and destination of the channels of XML, by topic.
-        order: What the safety rules are judged by, messages among them, as it stands in the file:
-            time [s], topic, content.
+        order: Facts and messages in the order of the file: time [s], topic, content.
         time: Of the last message [s].
         is_cut: Whether the end of the file is missing.
     """
@@ -326,7 +325,7 @@ def _opened(raw: _Raw) -> Opened:
 
 
 def _facts(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Any]:
-    """What the safety rules are judged by: facts, and messages and pictures between them."""
+    """Yield the facts that safety rules are judged by, with messages and pictures in between."""
     ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
     for time, topic, content in raw.order:
         if topic.startswith(channels.OBSERVED):

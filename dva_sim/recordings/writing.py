@@ -316,7 +316,7 @@ def facts(playback: Playback) -> dict[str, Any]:
 
 
 def _held_to(playback: Playback) -> dict[str, Any]:
-    """What the robots are held to, beside the scenario: their profiles may be files of a user."""
+    """Return the limits of the robots: their profiles may be files that a reader lacks."""
     return playback.about_robots or terms_of(playback.scenario).about_robots()
 
 

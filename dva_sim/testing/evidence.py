@@ -25,9 +25,9 @@ Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was l
 
 
 def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Verdict]]:
-    """What is wrong with a recording, doubts, what was looked at, and how each rule has fared.
+    """Return problems of a recording, doubts, a note on its size, and a verdict on each rule.
 
-    Its messages are judged, the decisions it holds, and by the safety rules what it shows.
+    Problems are invalid messages and decisions that would be made otherwise now.
     """
     from dva_sim.recordings.audit_log import verify_plain  # late: start-up
     from dva_sim.recordings.reading import read_recording  # late: start-up
@@ -61,7 +61,7 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
 
 
 def judged_recording(opened: Opened) -> list[Verdict]:
-    """How each safety rule has fared in a recorded run, as far as the recording goes."""
+    """Return the verdict on each safety rule, as far as the recording goes."""
     from dva_sim.simulation.full.verdicts import judged  # late: start-up
 
     until = "" if opened.is_whole else f", up to {opened.playback.duration:.0f} s"

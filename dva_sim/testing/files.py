@@ -59,7 +59,7 @@ class FileVerdict:
 
     @property
     def broken(self) -> int:
-        """How many safety rules are broken."""
+        """Return the number of safety rules that are broken."""
         return len({verdict.rule for verdict in self.rules if verdict.is_broken})
 
 

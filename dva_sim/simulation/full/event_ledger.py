@@ -140,7 +140,7 @@ class EventLedger:
         self._heard[source] = now
 
     def waits_for(self, data: bytes) -> bool:
-        """Whether what the DVA sends is worth reading: an order, or an answer waited for."""
+        """Return True for an order of the DVA, or an answer that is waited for."""
         asked = self._asked or self._called_false
         return any(what in data for what in _ORDERED) or (bool(asked) and b"<reply>" in data)
 
@@ -239,16 +239,16 @@ class EventLedger:
             yield from self._of_event(event, seen.get(event.number), now)
 
     def _is_booked(self, report: m.EventReport) -> bool:
-        """Whether there is an event that a report may be of, open or closed."""
+        """Return True if the book has an event, open or closed, that fits a report."""
         near, kind = max(self._rules.merge_distance, SAME_SPOT), report.kind
         known = (*self._book.open.values(), *self._book.closed.values())
         same = (e for e in known if e.kind == kind)
         return any(apart(e.position, report.position) < near for e in same)
 
     def _adopt(self, now: float) -> None:
-        """What stands in the book at first is of an earlier life of the DVA, and is taken as it is.
+        """Accept the first page as it is: its events are of an earlier life of the DVA.
 
-        Who was sent by then may say what was found, as if the order had been heard here.
+        Their responders count as ordered there, although no order was heard here.
         """
         for event in (*self._book.open.values(), *self._book.closed.values()):
             word = self._word(event.number)
@@ -259,12 +259,12 @@ class EventLedger:
             self._seen[event.number] = Seen(found, _in_hand(event), now, now)
 
     def _let_no_time_pass(self, passed: float) -> None:
-        """A DVA that was silenced decides nothing: what waits for it is not late by that."""
+        """Shift all deadlines: a DVA that was silenced decides nothing meanwhile."""
         for number, seen in self._seen.items():
             self._seen[number] = seen._replace(since=seen.since + passed, waits=seen.waits + passed)
 
     def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
-        """Permissions of those of whom nothing was heard for longer than the DVA may wait."""
+        """Yield permissions whose holders have been silent for longer than the DVA may wait."""
         before, self._held_since = self._held_since, {}
         for right in rights:
             since = now if not works else before.get(right, now)

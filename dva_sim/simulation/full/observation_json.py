@@ -22,7 +22,7 @@ Plain = dict[str, Any]
 
 
 class _Form(NamedTuple):
-    """How a kind of fact is written, apart from its time, and read again."""
+    """Functions that write a kind of fact, apart from its time, and read it."""
 
     kind: type
     write: Callable[[Any], Plain]
@@ -30,7 +30,7 @@ class _Form(NamedTuple):
 
 
 def _as_named(kind: type, **renamed: str) -> _Form:
-    """Of a kind whose fields are as JSON has them, but for some names."""
+    """Return the form of a kind whose fields fit JSON as they are, some under other names."""
     fields = [name for name in kind._fields if name != "time"]  # type: ignore[attr-defined]
     names = {name: renamed.get(name, name) for name in fields}
 
@@ -137,18 +137,18 @@ FORMS: Final[dict[str, _Form]] = {
     "slowed": _as_named(o.Slowed, processing="processing_s"),
     "gap": _as_named(o.FactGap),
 }
-"""By the word that a kind is written with."""
+"""Forms by the word that stands for each kind of fact."""
 _WORDS: Final = {form.kind: word for word, form in FORMS.items()}
 
 
 def as_plain(fact: Any) -> tuple[str, float, Plain]:
-    """A fact that is no message sent: the word of its kind, its time [s], and the rest."""
+    """Return word, time [s] and content of a fact other than a sent message."""
     word = _WORDS[type(fact)]
     return word, fact.time, FORMS[word].write(fact)
 
 
 def of_plain(word: str, time: float, told: Mapping[str, Any]) -> Any:
-    """The fact that was written so.
+    """Return the fact that `as_plain` has written.
 
     Raises:
         KeyError, TypeError, ValueError, AttributeError: it was written otherwise.

@@ -36,12 +36,12 @@ class MotorLimits(NamedTuple):
 
 @dataclass
 class SafetyTerms:
-    """What a run is held to, as its scenario states it.
+    """Limits that the safety rules hold a run to.
 
     Attributes:
         watchdog: How long a command may be in force after its arrival [s].
         max_age: And after the picture behind it was taken [s].
-        rules: What the DVA insists on.
+        rules: Deadlines of the DVA.
         at_event: From how far somebody may see what was reported somewhere [m].
         processing: Mean time that a message takes a robot's computer [s].
         motors: Limits of the robots by id.
@@ -59,16 +59,16 @@ class SafetyTerms:
     dva: str = DVA
 
     def about_robots(self) -> dict[str, Any]:
-        """What a scenario alone does not tell: it stands in the profiles of its robots."""
+        """Return the limits that stand in the profiles of the robots, and not in the scenario."""
         motors = {robot: list(limits) for robot, limits in self.motors.items()}
         return {"processing_s": self.processing, "motors": motors}
 
 
 def terms_of(scenario: Scenario, robots: Mapping[str, Any] | None = None) -> SafetyTerms:
-    """What a run of a scenario is held to.
+    """Return the limits for a run of a scenario.
 
     Args:
-        scenario: What is run.
+        scenario: The scenario.
         robots: From `about_robots`; None: the profiles of the robots are read.
 
     Raises:
@@ -97,10 +97,10 @@ def terms_of(scenario: Scenario, robots: Mapping[str, Any] | None = None) -> Saf
 
 
 class RobotMotion(NamedTuple):
-    """How a robot moves, and what its motors are asked for; nothing of it is the robot's word.
+    """Motion of a robot and set point of its motors, as seen from outside.
 
     Attributes:
-        mode: What it does, as it says: the only word of it.
+        mode: Its mode, by its own word; all else is measured.
         speed: Measured along its heading [m/s].
         turn_rate: Measured [rad/s].
         asked_speed: What the motors were asked for last [m/s].
@@ -126,7 +126,7 @@ STANDS = RobotMotion("Idle", 0.0, 0.0)
 
 
 def motion_of(robot: RobotAgent) -> RobotMotion:
-    """How a robot moves now."""
+    """Return the motion of a robot now."""
     body = robot.body
     speed, turn_rate, until = body.asked
     return RobotMotion(
@@ -148,8 +148,8 @@ class Page(NamedTuple):
 
     Attributes:
         book: The events.
-        rights: Who may act on which robot.
-        works: Whether the DVA is at work: one that was silenced decides nothing.
+        rights: Permissions to act on robots.
+        works: False while the DVA is silenced: then it decides nothing.
     """
 
     book: EventBook
@@ -158,7 +158,7 @@ class Page(NamedTuple):
 
 
 def page_of(dva: DvaAgent) -> Page:
-    """What the book of a DVA shows now."""
+    """Return the present page of a DVA's book."""
     grants = dva.desk.sessions.permissions.grants.values()
     rights = [Right(grant.robot, grant.holder, grant.session) for grant in grants]
     return Page(dva.desk.book, rights, not dva.device.silent)
@@ -168,42 +168,42 @@ class Listener(Protocol):
     """Takes what is said, in order of time [s]."""
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
-        """A node has sent a message, or a picture; `to` is empty if that went to anybody."""
+        """Take a message or picture that a node has sent; `to` may be empty."""
 
     def delivered(self, now: float, source: str, to: str, payload: Any) -> None:
-        """A message has reached a node; `source` has really sent it."""
+        """Take a message that has reached a node; `source` is its true sender."""
 
 
 class Observer(Listener, Protocol):
     """Takes all facts, in order of time [s]."""
 
     def accepted(self, command: Accepted) -> None:
-        """A robot has accepted a command to drive."""
+        """Take a command to drive that a robot has accepted."""
 
     def by_hand(self, done: ByHand) -> None:
-        """Somebody drives a robot at the robot itself: no message says so."""
+        """Take an action by hand, at the robot itself, of which no message tells."""
 
     def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
-        """How the robots move, by id."""
+        """Take the motion of robots, by id."""
 
     def shows(self, now: float, page: Page) -> None:
-        """What the DVA's book shows."""
+        """Take the present page of the DVA's book."""
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
-        """A robot's computer hangs and hears nothing, or hears again."""
+        """Take the news that a robot's computer hangs, or hears again."""
 
     def slowed(self, now: float, processing: float) -> None:
-        """From now on a message takes a robot's computer so long on average [s]."""
+        """Take a new mean time that a message takes a robot's computer [s]."""
 
 
 MOST_SENT = 50_000  # messages of which is known who has sent them
 
 
 class Senders:
-    """Who has really sent a message over sockets, where nothing but the message says so.
+    """Finds the true sender of a message over sockets, where only the message names one.
 
     Args:
-        is_ours: Whether a device is one of those whose every message is noted.
+        is_ours: Tells the devices whose every message is noted.
         most: So many messages are remembered; None: all.
     """
 
@@ -212,13 +212,13 @@ class Senders:
         self._sent: OrderedDict[tuple[str, int], None] = OrderedDict()
 
     def note(self, source: str, payload: bytes) -> None:
-        """One of ours sends a message."""
+        """Note a message that a device of ours sends."""
         self._sent[source, hash(payload)] = None
         if self._most is not None and len(self._sent) > self._most:
             self._sent.popitem(last=False)
 
     def sender(self, claimed: str, payload: bytes) -> str:
-        """The sender as a message claims it; empty if that is one of ours, and has not sent it."""
+        """Return the claimed sender; empty if it is one of ours that has not sent the message."""
         forged = self._is_ours(claimed) and (claimed, hash(payload)) not in self._sent
         return "" if forged else claimed
 
@@ -231,8 +231,8 @@ class Arrived(NamedTuple):
 
     Attributes:
         time: When [s].
-        source: Who really sent it; empty: nobody of this run, although it says so.
-        to: Whom it has reached.
+        source: Its true sender; empty if it claims to be of a device that has not sent it.
+        to: Its receiver.
         payload: Its bytes.
     """
 
@@ -243,37 +243,37 @@ class Arrived(NamedTuple):
 
 
 class Heard(NamedTuple):
-    """Whom the DVA has heard since the last such fact; heartbeats and status are kept as that."""
+    """Devices whose heartbeat or status has reached the DVA since the last such fact."""
 
     time: float
     devices: tuple[str, ...]
 
 
 class MotionNews(NamedTuple):
-    """How robots move, as far as that has changed, by id."""
+    """Motion of the robots that move otherwise than before, by id."""
 
     time: float
     motions: dict[str, RobotMotion]
 
 
 class PlaceNews(NamedTuple):
-    """Where robots and guards are, as far as they have moved, by id."""
+    """Places of robots and guards that have moved, by id."""
 
     time: float
     places: dict[str, Position]
 
 
 class BookNews(NamedTuple):
-    """What the DVA's book shows, as far as that has changed.
+    """Changes of the DVA's book since the last look at it.
 
     Attributes:
         time: When [s].
         events: Events that have changed, as `event_facts` has them.
         gone: Numbers of events that are in it no longer.
-        total: How many events there ever were, and ...
-        counts: ... how many stand in each state; None: as before.
-        rights: Who may act on which robot; None: as before.
-        works: Whether the DVA is at work.
+        total: Number of all events so far.
+        counts: Number of events in each state; None: as before.
+        rights: Permissions to act on robots; None: as before.
+        works: False while the DVA is silenced.
     """
 
     time: float
@@ -301,7 +301,7 @@ class Slowed(NamedTuple):
 
 
 class FactGap(NamedTuple):
-    """So many facts could not be kept, here or shortly before."""
+    """Number of facts that could not be kept, here or shortly before."""
 
     time: float
     missing: int
@@ -314,7 +314,7 @@ _QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody
 
 
 class FactLog:
-    """Keeps the facts that a recording needs: an observer that judges nothing.
+    """Observer that keeps facts for a recording, and judges nothing.
 
     Args:
         put: Takes facts, in order.
@@ -322,7 +322,7 @@ class FactLog:
         dva: Id of the DVA.
         look: Gives the motion of a robot now, by its id.
         page: Gives what the DVA's book shows now; None: the DVA is elsewhere.
-        keeps_sent: Whether messages are kept as they are sent; else somebody else does that.
+        keeps_sent: Keep sent messages, too; else the caller does that.
     """
 
     def __init__(
@@ -356,10 +356,10 @@ class FactLog:
         """See `Observer`."""
         if not isinstance(payload, bytes) or not (to == self._dva or to in self._robots):
             return
-        if to == self._dva and any(quiet in payload for quiet in _QUIET):
-            self._heard[source] = None
-        else:
+        if not any(quiet in payload for quiet in _QUIET):
             self._put(Arrived(now, source, to, payload))
+        elif to == self._dva:
+            self._heard[source] = None
 
     def accepted(self, command: Accepted) -> None:
         """See `Observer`."""
@@ -384,7 +384,7 @@ class FactLog:
             self._put(MotionNews(now, new))
 
     def places(self, now: float, places: Mapping[str, Position]) -> None:
-        """Where robots and guards are."""
+        """Take the places of robots and guards, by id."""
         new = {device: at for device, at in places.items() if self._places.get(device) != at}
         self._places |= new
         if new:
@@ -430,7 +430,7 @@ _SENT = "responder", "operator", "actor"
 
 
 class _BookDiff:
-    """Finds out what has changed in a book, by looking at all of it."""
+    """Finds the changes of a book by comparing all of it."""
 
     def __init__(self) -> None:
         self._events: dict[int, tuple[Any, ...]] = {}
@@ -438,7 +438,7 @@ class _BookDiff:
         self._rights: list[Right] = []
 
     def news(self, now: float, page: Page) -> BookNews:
-        """What a page shows that the last one did not."""
+        """Return the changes since the last page."""
         book, events = page.book, list[dict[str, Any]]()
         every = [(e, _BOTH if n in book.closed else _OPEN) for n, e in book.open.items()]
         every += [(e, _CLOSED) for n, e in book.closed.items() if n not in book.open]
@@ -463,7 +463,7 @@ class _BookDiff:
 
 
 class BookCopy:
-    """The DVA's book put together from what has changed.
+    """A copy of the DVA's book, rebuilt from its changes.
 
     Args:
         merge_distance: Reports of one kind nearer than this are one event [m].
@@ -473,7 +473,7 @@ class BookCopy:
         self.book, self._rights = EventBook(merge_distance), list[Right]()
 
     def page(self, news: BookNews) -> Page:
-        """What the book shows by now."""
+        """Apply changes, and return the present page."""
         book = self.book
         for number in news.gone:
             book.open.pop(number, None)

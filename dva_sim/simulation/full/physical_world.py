@@ -95,7 +95,7 @@ class Field(RunHazards):
         return next((m.Position(*place) for place in places), None)
 
     def places(self) -> dict[str, m.Position]:
-        """Where all robots and guards are, by id."""
+        """Return the places of all robots and guards, by id."""
         devices = [*self.robots, *(guard.device.id_tag for guard in self.guards)]
         return {device: at for device in devices if (at := self.place_of(device)) is not None}
 

@@ -320,11 +320,11 @@ class Run:
     # --- observers: see `Observer` -----------------------------------------------------
 
     def observe(self, observer: Observer) -> None:
-        """Tell somebody the facts of this run from now on."""
+        """Pass all facts of this run to an observer from now on."""
         self._observers = *self._observers, observer
 
     def _keep_facts(self) -> FactLog:
-        """What keeps the facts of the run for its recording."""
+        """Return an observer that keeps the facts of the run for its recording."""
         facts = self.recorder.facts = []
         return FactLog(facts.append, self.field.robots, self._motion_of, lambda: page_of(self.dva))
 

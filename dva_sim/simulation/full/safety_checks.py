@@ -32,6 +32,7 @@ OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, un
 ROUNDED = 0.002  # of ticks [s]
 LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
+ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
 MOST_KEPT = 1000  # of the newest messages to a robot, of its sessions, and of events
 
 CHECKED: Final = {
@@ -166,11 +167,11 @@ class Witness:
         return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
 
     def in_hand(self, now: float) -> bool:
-        """Whether somebody drives it by hand who has not been silent for too long."""
+        """Return True while somebody drives it by hand who was heard within the lease."""
         return self.hand is not None and now - self.heard <= LEASE
 
     def stands(self, when: float) -> None:
-        """An emergency has stopped it, or should have: it is in nobody's hand any longer."""
+        """Note that an emergency has stopped it, or should have; no hand drives it any longer."""
         self.stopped, self.hand = max(self.stopped, when), None
 
     def may_be_on_a_mission(self, now: float) -> bool:
@@ -205,7 +206,7 @@ class SafetyAudit:
 
     Args:
         recorder: Told what broke which rule.
-        terms: What the run is held to.
+        terms: Limits that the run is held to.
         motion_of: Gives the motion of a robot now, by its id.
         place_of: Where a device really is, by its id; None: it has no place.
     """
@@ -255,16 +256,16 @@ class SafetyAudit:
             self._ledger.hears(source, _read(payload), now)
 
     def knows_places(self, known: bool) -> None:
-        """Whether anybody knows where robots and guards are: else they are taken at their word."""
+        """Note whether places are known; without them, any finding is taken as made there."""
         self._ledger.knows_places = known
 
     def heard(self, now: float, device: str) -> None:
-        """The DVA has heard a device, by what needs no judgement."""
+        """Note that the DVA has heard a device."""
         self._ledger.is_heard(device, now)
 
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness, message = self.witness(robot), _read(data)
-        if message is None:
+        if message is None or isinstance(message.body, m.Heartbeat):
             return
         if isinstance(message.body, m.Reply):
             if source == self._dva:
@@ -461,7 +462,7 @@ class SafetyAudit:
         self._report(self._ledger.check(now, page), now, self._dva)
 
     def _overstays(self, witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
-        """Whether somebody keeps the robot of whom it hears nothing that it may obey."""
+        """Yield a drive that goes on without a valid command for longer than the lease."""
         does, silent = witness.does, now - witness.heard
         if does is None or does.level != "teleoperation" or silent <= LEASE + LEASE_SLACK:
             return
@@ -496,7 +497,7 @@ class SafetyAudit:
 
 
 def offset_of(picture: Any) -> float | None:
-    """What is to be added to the clock of the robot that took a picture to have the time [s]."""
+    """Return the offset of the run's clock from that of the robot that took a picture [s]."""
     if isinstance(picture, CameraFrame):
         return picture.captured - picture.observation.tick / 1000
     tick = picture.get("tick_ms")  # as a recording has it
@@ -504,7 +505,7 @@ def offset_of(picture: Any) -> float | None:
 
 
 def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
-    """Rules that break by what motors are asked for: to move for too long, or to move at all."""
+    """Yield the rules that a set point of the motors breaks: too long, or after an emergency."""
     until = motion.asked_until
     is_sent = motion.mode == Mode.MISSION and witness.may_be_on_a_mission(now)
     if is_sent:
@@ -513,7 +514,8 @@ def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterato
         yield "S3", f"is still asked to move, {now - witness.stopped:.1f} s after an emergency"
     elif not is_sent and until > max(witness.allowed + PHYSICS_TICK + ROUNDED, witness.looked):
         late = until - max(witness.allowed, witness.last_mission)
-        yield "S1", f"is asked to move for {late:.2f} s longer than it may"
+        longer = f"for {late:.2f} s longer than it may" if late < ENDLESS else "without end"
+        yield "S1", f"is asked to move {longer}"
 
 
 def broken_by_moving(

@@ -1,7 +1,7 @@
-"""Verdicts: which safety rules a run has held, which were broken by whom, and which nobody judged.
+"""Verdicts on the safety rules: each was held, broken by somebody, or not judged.
 
-A `Judge` takes the facts of a run, of one that goes on or of a recording, and lets the audit hold
-them against the rules. It knows nothing of the program that was run, and runs none of it.
+A `Judge` takes the facts of a live run or of a recording, and lets the audit compare them with the
+rules. It runs nothing of the program that was recorded.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ HELD, BROKEN, NOT_JUDGED = "held", "broken", "not judged"
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a rule has fared.
+    """Verdict on one rule.
 
     Attributes:
-        rule: Which, such as `S1`.
+        rule: Name of the rule, such as `S1`.
         state: `held`, `broken` or `not judged`.
-        text: What the rule says, how it was broken, or why nobody judged it.
+        text: The rule in words, a breach of it, or the reason why it was not judged.
     """
 
     rule: str
@@ -47,7 +47,7 @@ class Verdict:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the rule is broken."""
+        """Return True if the rule is broken."""
         return self.state == BROKEN
 
     def __str__(self) -> str:
@@ -55,7 +55,7 @@ class Verdict:
 
 
 def broken_lines(broken: Iterable[Breach]) -> dict[str, list[str]]:
-    """For each broken rule a line for each agent that broke it: who, since when, how often, how."""
+    """Return a line for each rule and agent that broke it: agent, first time, count, breach."""
     lines: dict[str, list[str]] = {}
     for breach in sorted(broken, key=lambda each: (each.rule, each.time, each.who)):
         times = f", seen {breach.count} times" if breach.count > 1 else ""
@@ -67,12 +67,12 @@ def broken_lines(broken: Iterable[Breach]) -> dict[str, list[str]]:
 def verdicts(
     recorder: Recorder, not_judged: Mapping[str, str] | None = None, until: str = ""
 ) -> list[Verdict]:
-    """A verdict on each rule, in order; on one that several agents broke, one for each.
+    """Return a verdict on each rule, in order; one for each agent where several broke it.
 
     Args:
-        recorder: Told by an audit what was broken.
-        not_judged: Rules that nobody could judge, each with the reason.
-        until: Up to when the run was judged, in words; empty: all of it.
+        recorder: Holds the breaches that an audit has found.
+        not_judged: Rules that could not be judged, each with the reason.
+        until: Time up to which the run was judged, in words; empty: all of it.
     """
     broken, why_not = broken_lines(recorder.broken.values()), not_judged or {}
     found: list[Verdict] = []
@@ -93,7 +93,7 @@ class RulesBroken(DvaSimError):
 
 
 def refuse_broken(found: Iterable[Verdict]) -> None:
-    """Let a run whose rules were broken not end as if nothing had happened.
+    """Raise an error if any rule was broken.
 
     Raises:
         RulesBroken: one was broken.
@@ -103,16 +103,16 @@ def refuse_broken(found: Iterable[Verdict]) -> None:
 
 
 def broken_rules(found: Iterable[Verdict]) -> str:
-    """Which rules a run has broken, in a line; empty: none."""
+    """Return the names of all broken rules in a line; empty: none."""
     broken = dict.fromkeys(verdict.rule for verdict in found if verdict.is_broken)
     return f"the run has broken {', '.join(broken)}" if broken else ""
 
 
 class Judge:
-    """Lets the audit judge facts, in their order.
+    """Lets the audit judge facts in their order.
 
     Args:
-        terms: What the run is held to.
+        terms: Limits that the run is held to.
     """
 
     def __init__(self, terms: o.SafetyTerms) -> None:
@@ -129,7 +129,7 @@ class Judge:
         return self._motions.get(robot, o.STANDS)
 
     def take(self, fact: Any) -> None:
-        """Judge one more fact; none that is missing can be told from one that never was."""
+        """Judge one more fact."""
         audit, now = self._audit, fact.time
         match fact:
             case Sent():
@@ -163,7 +163,7 @@ class Judge:
                 self._missing += fact.missing
 
     def verdicts(self, until: str = "") -> list[Verdict]:
-        """The verdicts by now; see `verdicts`."""
+        """Return the verdicts so far; see the function `verdicts`."""
         return verdicts(self.recorder, self._not_judged(), until)
 
     def _not_judged(self) -> dict[str, str]:
@@ -184,11 +184,11 @@ class Judge:
 def judged(
     facts: Iterable[Any] | None, terms: o.SafetyTerms | None, until: str = ""
 ) -> list[Verdict]:
-    """The verdicts on a recorded run.
+    """Return the verdicts on a recorded run.
 
     Args:
-        facts: In order; None: it was recorded without them.
-        terms: What the run was held to; None: likewise.
+        facts: Its facts in order; None: it was recorded without them.
+        terms: Limits that it is held to; None: likewise.
         until: See `verdicts`.
     """
     if facts is None or terms is None:
