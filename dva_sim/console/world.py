@@ -143,12 +143,14 @@ class ConsoleWorld(ToldWorld):
         self.hold: Callable[[str], object] = lambda _: None
 
     def _windows(self) -> RobotWindows:
-        """The robots' windows; a reply that is dropped is told to the audit, like any that goes."""
+        """The robots' windows; a reply that is dropped is audited and kept, like any that goes."""
         run, recorder = self.run, self.recorder
         recorder.robots = run.field.robots.keys()
 
         def lost(robot: str, reply: bytes) -> None:
             run.sent(run.clock.now, robot, "", reply)
+            if recorder.kept is not None:
+                recorder.kept.message(robot, reply, sent=True)
 
         about = self.feed.numbers, run.stage.labels
         windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
