@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from dva_sim.agents.observation import CameraFrame, Observation, SeenHazard
-from dva_sim.kernel.recorder import Sent
+from dva_sim.kernel.recorder import Moment, Sent
 from dva_sim.simulation.full.observation_json import of_plain
 from dva_sim.simulation.full.observations import MOST_SENT, Arrived, FactGap, SafetyTerms, Senders
 from dva_sim.simulation.full.verdicts import Judge, Verdict
@@ -119,6 +119,12 @@ class LiveJudge:
             if fact is not None:
                 self._judge.take(fact)
         self._is_judging = False
+
+    def news(self) -> list[Moment]:
+        """Return what was found since the last call, for the timeline; of each rule the first."""
+        with self._lock:
+            found, self._judge.recorder.timeline = self._judge.recorder.timeline, []
+            return found
 
     def verdicts(self) -> list[Verdict]:
         """Return the verdict on each rule, once all parts have ended.

@@ -305,15 +305,16 @@ class Keeper:
         self.problem: str | None = None
         self._room = MOST_BYTES
         self._file = _emptied(self.path)
-        self.inlets = Inlets(self._keep, judge)
+        self.inlets = Inlets(self.keep, judge)
         self._lock = threading.Lock()
-        self._keep(json.dumps(start).encode() + b"\n")
+        self.keep(json.dumps(start).encode() + b"\n")
 
     def inlet(self) -> int:
         """See `Inlets`."""
         return self.inlets.inlet()
 
-    def _keep(self, lines: bytes) -> None:
+    def keep(self, lines: bytes) -> None:
+        """Put whole lines into the file, as long as it takes them."""
         with self._lock:
             if self.problem is not None:
                 return
@@ -368,12 +369,19 @@ class RunKeeping:
         """See `Inlets`."""
         return self._inlets.inlet()
 
+    def news(self) -> list[Moment]:
+        """Return the rules that were found broken since the last call; they are recorded, too."""
+        found = self._judge.news()
+        if self._keeper is not None:
+            for moment in found:
+                self._keeper.keep(json.dumps(["told", *moment]).encode() + b"\n")
+        return found
+
     def finish(self) -> str | None:
         """Make the recording when all parts have ended; see `Keeper`."""
-        if self._keeper is not None:
-            return self._keeper.finish()
         self._inlets.join()
-        return None
+        self.news()
+        return None if self._keeper is None else self._keeper.finish()
 
     def verdicts(self) -> list[Verdict]:
         """Return the verdicts on the safety rules, once all parts have ended."""

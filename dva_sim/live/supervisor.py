@@ -188,6 +188,7 @@ class Supervisor:
             DvaSimError: what one of them was given is not as it should be.
         """
         self._read(LOOK)
+        self._tell_broken_rules()
         for child in self._children:
             code = child.process.poll()
             if code is not None and code != 0 and not self._interrupted:
@@ -198,6 +199,13 @@ class Supervisor:
                 raise kind(f"{child.name} has ended by itself: {why}")
             if code is None and time.monotonic() - child.heard > SPEAK_WITHIN:
                 raise PartFailed(f"{child.name} has said nothing for {SPEAK_WITHIN:g} s")
+
+    def _tell_broken_rules(self) -> None:
+        """Report the rules that were found broken since the last look."""
+        found = [list(moment) for moment in self._keeping.news()] if self._keeping else []
+        if found:
+            now = time.monotonic() - self._epoch
+            self._hear("rules", Report("rules", 0, now, [], [], found, {}, True, None, 0.0))
 
     def _read(self, wait: float) -> None:
         for key, _ in self._selector.select(wait):

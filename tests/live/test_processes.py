@@ -91,12 +91,14 @@ def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_don
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     assert run.ends() == 1
     assert "an emergency: obeyed" in run.said
-    (told,) = [line for line in run.said.splitlines() if " broken: " in line]
+    story, told = [line for line in run.said.splitlines() if "S3 broken" in line]
+    assert re.fullmatch(r" +\d+\.\d s  robot-1 +S3 broken: obeys a command after an .*", story)
     assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: obeys a command after an .*", told)
     assert run.complained == ["error: the run has broken S3"]
     ended = call("check", tmp_path / "run.mcap")
     assert ended.returncode == 1
     assert f"run.mcap: {told}" in ended.stdout
+    assert "S3 broken: " in call("replay", tmp_path / "run.mcap").stdout
 
 
 def count_in(recording: Path, element: bytes) -> int:
