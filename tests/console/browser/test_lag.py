@@ -38,7 +38,7 @@ def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page: Page) 
     page.goto(f"{fake(*SMALL).drive}#/drive")
 
     warning = page.locator(".warnings")
-    expect(warning).to_contain_text("Robots are held")
+    expect(warning).to_contain_text("Robots were stopped")
     expect(warning).to_contain_text("430 ms behind")
     expect(warning).to_contain_text("250 ms")
     expect(page.locator(".hint")).to_contain_text("behind real time")
