@@ -25,6 +25,7 @@ import small_study as kit
 from dva_sim.experiments.execution import runner
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.report import write_report
+from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.errors import DvaSimError
 
@@ -37,6 +38,17 @@ STEP_KB = 16
 
 def run(out: Path, study: Any) -> None:
     run_study(study, out, jobs=1, episode=reportable)
+
+
+def run_after(out: Path, study: Any) -> None:
+    """Run it as soon as no other process writes into the folder; none that was killed does."""
+    while True:
+        try:
+            run(out, study)
+        except FolderInUse:
+            time.sleep(0.01)
+        else:
+            return
 
 
 def reportable(job: StudyJob) -> kit.Tables:
@@ -166,7 +178,7 @@ def kills(folder: Path) -> dict[str, Any]:
 
 
 def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random) -> dict[str, int]:
-    """Two runners on one folder, until one of the two was killed often enough.
+    """Two runners on one folder, one after the other, until the first was killed often enough.
 
     Where the other left it too little to do, it ends before it dies.
     """
@@ -174,7 +186,7 @@ def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random)
     while seen["pairs killed"] < PAIRS:
         out = folder / f"pair-{seen['pairs']}"
         killed = killed_at_a_call(out, study, luck.randrange(1, calls))
-        other = forked(lambda out=out: run(out, study))
+        other = forked(lambda out=out: run_after(out, study))
         assert ended(other)
         seen["pairs"] += 1
         seen["pairs killed"] += not ended(killed)

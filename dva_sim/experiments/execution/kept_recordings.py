@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.experiments.execution import executors, scheduling
+from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
 from dva_sim.experiments.study import cell_grid
@@ -34,6 +35,7 @@ from dva_sim.simulation.scenario import Scenario
 FOLDER = "recordings"
 _FULL = os.strerror(errno.ENOSPC)
 
+Progress = Callable[[int, int], object]
 Row = Mapping[str, Any]
 RunPosition = tuple[str, int, int, int]  # part, cell, person, trial
 
@@ -61,7 +63,7 @@ def record_study(
     out: Path,
     *,
     jobs: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Progress | None = None,
     limit_s: float = scheduling.LIMIT_S,
 ) -> list[str]:
     """Make the recordings that a study asks for and its results folder does not hold yet.
@@ -79,19 +81,25 @@ def record_study(
 
     Raises:
         ConfigError: what `refuse_what_cannot_be_recorded` says, or no results there.
+        FolderInUse: another process writes into the folder.
         DvaSimError: the folder cannot be written.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
     refuse_what_cannot_be_recorded(study)
     if study.record is None:
         return []
+    with FolderLock(out):
+        return _record(study, out, jobs, progress or (lambda *_: None), limit_s)
+
+
+def _record(study: Study, out: Path, jobs: int | None, tell: Progress, limit_s: float) -> list[str]:
     rows = rows_of(Results.load(out))
     wanted = {name_of(job): job for job in chosen(study, rows)}
     folder = _tidied(out / FOLDER, wanted)
     rest = [job for name, job in wanted.items() if not (folder / name).exists()]
     own = {measure.about.name for measure in own_measures(study).values()}
     prints = {name_of(job): _fingerprint(job, rows[position_of(job)], own) for job in rest}
-    done, total, tell = len(wanted) - len(rest), len(wanted), progress or (lambda *_: None)
+    done, total = len(wanted) - len(rest), len(wanted)
     tell(done, total)
     problems = []
     try:

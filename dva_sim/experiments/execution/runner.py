@@ -21,6 +21,7 @@ from dva_sim.experiments.execution.checkpoint import Checkpoint
 from dva_sim.experiments.execution.dask_cluster import DaskCluster
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
 from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate, run_job
+from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
 from dva_sim.experiments.results.tables import design_row, write_tables
@@ -68,6 +69,7 @@ def run_study(
     Raises:
         ConfigError: the study is not valid, the folder holds another one, or there is no such
             cluster.
+        FolderInUse: another process writes into the folder.
         DvaSimError: the disk is full, another program holds the checkpoint, or the cluster is lost.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
@@ -77,6 +79,7 @@ def run_study(
     manifest = manifest_of(study, cells, todo)
     with ExitStack() as stack:
         workers = stack.enter_context(_workers(jobs, scheduler))
+        stack.enter_context(FolderLock(out))
         checkpoint = stack.enter_context(_opened(out, manifest["hash"]))
         checkpoint.describe(manifest)
         own = tuple(own_measures(study))
@@ -102,15 +105,12 @@ def run_study(
 def _opened(out: Path, identity: str) -> Checkpoint:
     """The checkpoint of a results folder, which must be this study's or new."""
     try:
-        out.mkdir(parents=True, exist_ok=True)
         if not (out / JOURNAL).exists() and (out / MANIFEST).exists():
             found = json.loads((out / MANIFEST).read_text(encoding="utf-8")).get("hash")
             if found != identity:
                 raise ConfigError(f"{out} holds another study ({found}); give another folder")
-    except FileExistsError:
-        raise ConfigError(f"{out} is a file; give a folder for the results") from None
     except OSError as error:
-        raise DvaSimError(f"{out} cannot be written: {error.strerror}") from None
+        raise DvaSimError(f"{out} cannot be read: {error.strerror}") from None
     except ValueError:
         raise ConfigError(f"{out} holds something else; give another folder") from None
     return Checkpoint(out, identity)

@@ -7,6 +7,7 @@ in any run before, and a study that is changed and registered anew meets others 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -113,12 +114,27 @@ def register(study: Study, again: bool = False) -> str:
     )
     made = made.model_copy(update={"hash": made.proper_hash})
     cell_grid.cells(study.model_copy(update={"seed": made.seed}))  # its points are valid, too
-    try:
-        path.write_text(_as_text(made), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+    _write(path, _as_text(made), found is not None)
     names, size = ", ".join(study.hypotheses), f"{study.persons} persons x {study.replications}"
     return f"Registered {names} on {size} trials, in {path}\nRun unchanged, it confirms or refutes"
+
+
+def _write(path: Path, text: str, replaces: bool) -> None:
+    """Write a registration; of two processes at once, only one makes it."""
+    part = path.with_name(f".{path.name}.{os.getpid()}") if replaces else path
+    try:
+        file = part.open("w" if replaces else "x", encoding="utf-8", newline="\n")
+    except FileExistsError:
+        raise ConfigError(f"{path} was made by another process meanwhile") from None
+    except OSError as error:
+        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
+    try:
+        with file:
+            file.write(text)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def plan_of(study: Study) -> dict[str, Any]:

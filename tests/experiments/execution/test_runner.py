@@ -181,12 +181,13 @@ def test_ctrl_c_while_a_lock_of_the_pool_is_taken_ends_the_run_all_the_same(tmp_
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_two_runners_on_one_folder_do_not_disturb_each_other(tmp_path, plain, started):
+def test_of_two_runners_on_one_folder_one_makes_the_study(tmp_path, plain, started):
+    """The other is refused, unless it has begun when the first one has ended."""
     study, out = kit.write_study(tmp_path), tmp_path / "shared"
     pair = [started(study, out) for _ in range(2)]
     for runner in pair:
         runner.communicate(timeout=PATIENCE_S)
-    assert [runner.returncode for runner in pair] == [0, 0]
+    assert min(runner.returncode for runner in pair) == 0
     assert kit.files(out) == plain
 
 
