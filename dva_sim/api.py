@@ -106,11 +106,12 @@ def replay(
     camera: str | None = None,
     inset: bool = False,
     ros2: str | Path | None = None,
+    mcap: str | Path | None = None,
 ) -> Episode:
     """A recorded run from its file alone, drawn or taken to ROS 2 if asked to.
 
     Args:
-        file: A recording: `.mcap`, or the `.mcap.part` of a live run.
+        file: A recording: `.mcap`, or `.mcap.part` as a run that was killed left it.
         video: Write a film: `.gif` or `.mp4`.
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
         strip: Draw several moments in one figure, likewise.
@@ -119,18 +120,21 @@ def replay(
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
         ros2: Write a ROS 2 bag; the folder is new.
+        mcap: Write a whole recording of an `.mcap.part`; the file is new.
 
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
     from dva_sim.experiments.report.episode import open_recording, write_replay  # late: start-up
     from dva_sim.experiments.report.notebook import episode_of  # late: start-up
-    from dva_sim.live.recording import whole  # late: start-up
+    from dva_sim.live.recording import readable  # late: start-up
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     wanted = Wanted.of(video, still, strip, at, panels=panels, camera=camera, inset=inset)
-    opened = open_recording(whole(Path(file)), wanted)
-    list(write_replay(opened, wanted, None if ros2 is None else Path(ros2)))
+    bag, kept = (None if to is None else Path(to) for to in (ros2, mcap))
+    with readable(Path(file), kept) as found:
+        opened = open_recording(found, wanted)
+        list(write_replay(opened, wanted, bag))
     return episode_of(opened.playback.scenario, opened.playback.seed, opened.tables or {})
 
 
@@ -361,8 +365,10 @@ def load(folder: str | Path) -> Results:
     Raises:
         ConfigError: it is not one, or its study has not been completed.
     """
+    from dva_sim.experiments.execution.kept_run import complete  # late: start-up
     from dva_sim.experiments.report.notebook import Results  # late: start-up
 
+    complete(Path(folder))
     return Results.load(folder)
 
 

@@ -15,6 +15,7 @@ from dva_sim.cli.verbosity import print_json
 from dva_sim.experiments.analysis.compare import Comparison, GateVerdict, judge
 from dva_sim.experiments.analysis.compare_rows import Difference, Levels
 from dva_sim.experiments.analysis.fail_conditions import parse
+from dva_sim.experiments.execution.kept_run import complete
 from dva_sim.experiments.report.terminal import print_table, program
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ExitCode
@@ -46,6 +47,8 @@ def compare(
         ConfigError: one is no results folder, or there is no such measure, factor or condition.
     """
     gates = [parse(text) for text in fail_if]
+    for folder in (first, second):
+        complete(folder)
     comparison = Comparison(Results.load(first), Results.load(second))
     verdicts = [verdict for gate in gates for verdict in judge(gate, comparison)]
     if as_json:

@@ -94,6 +94,7 @@ FORMS: dict[str, dict[str, Any]] = {
     "format": {"metavar": "csv|parquet"},
     "jobs": {"names": ("-j", "--jobs"), "parser": whole(1, MOST_JOBS)},
     "limit_s": {"names": ("--limit",), "metavar": "SECONDS"},
+    "mcap": {"metavar": "FILE"},
     "out": {"names": ("-o", "--out"), "metavar": "FOLDER"},
     "panels": {"parser": whole(1, 24)},
     "pilot": {"metavar": "PERSONS", "parser": whole(1)},

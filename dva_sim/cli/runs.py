@@ -60,6 +60,7 @@ def episode(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> Non
 def replay(
     file: str,
     ros2: str | None,
+    mcap: str | None,
     console: Annotated[bool, Option("--console", help="Play it on a page in the browser.")] = False,
     host: Host = "127.0.0.1",
     port: Port = 8765,
@@ -75,6 +76,7 @@ def replay(
         dva-sim replay drill.mcap --console  # play, pause, jump, on a page in the browser
         dva-sim replay drill.mcap --strip drill.png  # several moments in one figure
         dva-sim replay drill.mcap --ros2 bag  # for the tools of ROS 2
+        dva-sim replay drill.mcap.part --mcap cut.mcap  # of a run that was killed
     """
     if console:
         page = {"host": host, "port": port, "open": not no_open, "token": not no_token}
@@ -85,7 +87,8 @@ def replay(
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     with loudness(quiet, verbose):
-        stories.replay(Path(file), Wanted.of(**pictures), None if ros2 is None else Path(ros2))
+        bag, kept = (None if to is None else Path(to) for to in (ros2, mcap))
+        stories.replay(Path(file), Wanted.of(**pictures), bag, kept)
 
 
 def _show_replay(**asked: Any) -> None:

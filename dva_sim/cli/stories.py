@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -377,26 +378,33 @@ def episode(request: EpisodeRequest, where: Console = console) -> None:
     _say_written(request.write(runs), request.pictures, where)
 
 
-def replay(file: Path, pictures: Wanted, ros2: Path | None, where: Console = console) -> None:
+def replay(
+    file: Path,
+    pictures: Wanted,
+    ros2: Path | None = None,
+    mcap: Path | None = None,
+    where: Console = console,
+) -> None:
     """Tell the story of a recording, and draw or export what is asked for.
 
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    from dva_sim.live.recording import whole  # late: start-up
+    from dva_sim.live.recording import is_part, readable  # late: start-up
 
-    file, given = whole(file), file
-    if file != given:
-        where.print(f"{file} made of {given}", soft_wrap=True)
-    opened = open_recording(file, pictures)
-    run = opened.playback
-    tell_story(run, where)
-    if opened.tables is not None:
-        tell_outcome(opened.tables, f"simulated by dva-sim {opened.about['version']}", where)
-    if not opened.is_whole:
+    with readable(file, mcap) as found:
+        opened = open_recording(found, pictures)
+        run = opened.playback
+        tell_story(run, where)
+        if opened.tables is not None:
+            tell_outcome(opened.tables, f"simulated by dva-sim {opened.about['version']}", where)
         there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
-        where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
-    _say_written(write_replay(opened, pictures, ros2), pictures, where)
+        if is_part(file):
+            there = f"{run.duration:.0f} s are there, unless the run still goes on"
+        if is_part(file) or not opened.is_whole:
+            where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
+        made = [] if mcap is None else [f"Recording: {mcap}"]
+        _say_written(chain(made, write_replay(opened, pictures, ros2)), pictures, where)
 
 
 def _say_written(files: Iterable[str], pictures: Wanted, where: Console) -> None:

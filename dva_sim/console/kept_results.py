@@ -6,21 +6,19 @@ no name: what a phone calls itself stays out of the tables.
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from dva_sim.console.world import ConsoleWorld
-from dva_sim.experiments.results.manifest import machine, manifest_of, write_json
-from dva_sim.experiments.results.results import MACHINE, MANIFEST, TABLES, digests
-from dva_sim.experiments.results.tables import write_tables
+from dva_sim.experiments.execution.kept_run import KeptRun, complete, is_left
+from dva_sim.experiments.results.folder_lock import LOCK, FolderLock
+from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.full.drive_tables import drive_tables
-from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.full.run_journal import RunJournal
 from dva_sim.simulation.full.stage import kind_of
 from dva_sim.simulation.scenario import Scenario
 
@@ -29,7 +27,9 @@ LOOK = 1.0  # from one look at who drives with what to the next, real time [s]
 
 
 class KeptResults:
-    """A results folder in the making.
+    """A results folder in the making, which no other process writes into until it is closed.
+
+    What happens is in its journal a second later at most, whatever becomes of the console.
 
     Args:
         out: The folder.
@@ -44,13 +44,14 @@ class KeptResults:
 
     Raises:
         ConfigError: no such scenario, or the folder holds something already.
+        FolderInUse: another process writes into the folder.
     """
 
     def __init__(
         self, out: Path, scenario: str, changes: Sequence[str], seed: int, overwrite: bool
     ) -> None:
-        if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not overwrite)):
-            raise ConfigError(f"{out} holds something already: give another folder, or --overwrite")
+        if out.exists() and not out.is_dir():
+            raise ConfigError(f"{out} holds something already: give the name of a folder")
         part = {"scenario": scenario, "changes": dict(parse_changes(changes))}
         asked = {"persons": 1, "replications": 1, "seed": seed, "parts": {PART: part}}
         question = f"What did people do who drove in {scenario!r} at a console?"
@@ -61,11 +62,60 @@ class KeptResults:
         self.scenario, self.seed = self._job.scenario, self._job.seed
         self._persons: dict[str, int] = {}  # numbers by device, as they began to drive
         self._world: ConsoleWorld | None = None
+        self._kept: KeptRun | None = None
+        self._problem = ""
+        was_left = is_left(out) and not overwrite
+        if was_left:
+            complete(out)
+        self._lock = FolderLock(out)
+        try:
+            if any(path.name != LOCK for path in out.iterdir()) and not overwrite:
+                held = (
+                    "a run that was cut off, whose tables are made now" if was_left else "something"
+                )
+                raise ConfigError(
+                    f"{out} holds {held} already: give another folder, or --overwrite"
+                )
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Let others write into the folder; nothing is left of it where nothing was kept."""
+        self._lock.close()
+        with suppress(OSError):
+            self._out.rmdir()
 
     def follow(self, world: ConsoleWorld) -> None:
-        """Note from now on who drives, and with what."""
-        self._world = world
+        """Keep from now on what happens: who drives, with what, and all that is measured.
+
+        Raises:
+            DvaSimError: the folder cannot be written.
+        """
+        manifest = manifest_of(self._study, self._cells, [self._job])
+        manifest |= {"runs": 1, "stopped": None, "failures": []}
+        self._kept = KeptRun(self._out, manifest, self.scenario, self.seed)
+        self._world, self._journal = world, RunJournal(world.run, self._label_of)
+        world.recorder.on_tidy = self._keep
+        world.recorder.on_tidied = self._journal.forget
         world.clock.pulse(LOOK, self._look)
+
+    def _label_of(self, id_tag: str) -> str:
+        """The label of a device, unless a person may have given it."""
+        assert self._world is not None
+        if kind_of(id_tag)[0] in PEOPLES:
+            return name_of(id_tag)
+        return self._world.run.stage.labels.get(id_tag, id_tag)
+
+    def _keep(self) -> None:
+        assert self._world is not None
+        assert self._kept is not None
+        self._look()
+        self._kept.put(self._journal.lines())
+        if self._kept.problem != self._problem:
+            self._problem = self._kept.problem
+            told = f"cannot be written: {self._problem}" if self._problem else "is written again"
+            self._world.note(f"the folder of results {self._out} {told}")
 
     def _look(self) -> None:
         assert self._world is not None
@@ -86,25 +136,16 @@ class KeptResults:
             log.by = by
 
     def write(self) -> None:
-        """Write all.
+        """Write all; nothing where nothing was followed.
 
         Raises:
             DvaSimError: the disk is full or refuses to be written.
         """
-        assert self._world is not None
-        self._look()
-        recording = self._world.run.recording()
-        names = {tag: name_of(tag) for tag in recording.labels if kind_of(tag)[0] in PEOPLES}
-        recording.labels = recording.labels | names
-        tables = tables_of(recording) | drive_tables(recording)
-        study, jobs = self._study, [self._job]
-        manifest = manifest_of(study, self._cells, jobs)
-        self._out.mkdir(parents=True, exist_ok=True)
-        write_tables(self._out, jobs, lambda _: tables)
-        manifest |= {"runs": 1, "stopped": None, "failures": []}
-        write_json(self._out / MANIFEST, manifest | {"tables": digests(self._out / TABLES)})
-        facts: dict[str, Any] = {"wall_s": recording.duration, "platform": platform.platform()}
-        write_json(self._out / MACHINE, machine(jobs, {}) | facts)
+        if self._world is None or self._kept is None:
+            return
+        self._world.run.recording()  # the last look at rules and places
+        self._keep()
+        self._kept.close()
 
 
 PEOPLES = ("console", "phone")  # kinds of devices that people name

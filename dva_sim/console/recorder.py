@@ -22,19 +22,19 @@ Note = Callable[[DriveLog], object]
 class ConsoleRecorder(Recorder):
     """A recorder of a run that may last for ever.
 
-    Args:
-        measured: Whether all is kept, to be measured in the end.
-
     Attributes:
         on_applied: Told of each drive that has had a command take effect.
+        on_tidy: Called before what is old is forgotten.
+        on_tidied: Called afterwards.
         kept: Takes lines for a recording, if there is to be one.
         robots: Ids of those of whom it is noted when a message to them was sent.
     """
 
-    def __init__(self, measured: bool = False) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._measured = measured
         self.on_applied: Note = lambda _: None
+        self.on_tidy: Callable[[], object] = lambda: None
+        self.on_tidied: Callable[[], object] = lambda: None
         self.kept: LiveRecorder | None = None
         self.robots: Container[str] = ()
         self._sent: OrderedDict[bytes, float] = OrderedDict()
@@ -86,12 +86,13 @@ class ConsoleRecorder(Recorder):
         self._numbers[id(drive)] = self._known
 
     def tidy(self) -> None:
-        """Keep what is new for the recording, and forget what is old unless it is measured."""
+        """Keep what is new for the recording and the results, and forget what is old."""
         for drive in self.drives:
             if self.kept is not None:
                 self._keep(self.kept, drive)
-        if not self._measured:
-            self._forget()
+        self.on_tidy()
+        self._forget()
+        self.on_tidied()
 
     def _forget(self) -> None:
         for drive in self.drives:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from typing import Any
 
 from dva_sim.console.actions import Actions
 from dva_sim.console.audit_keeper import auditing
 from dva_sim.console.children import ChildFailed
+from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.recorder import keep_run
@@ -19,6 +20,7 @@ from dva_sim.live.pipes import Outlet
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
+from dva_sim.simulation.scenario import Scenario
 
 LAST_WORDS = 0.2  # of virtual time, for robots that are told to stop [s]
 
@@ -46,22 +48,31 @@ class ConsoleSupervisor:
             DvaSimError: what was to be recorded is not, or not all of it.
             RulesBroken: a safety rule was broken.
         """
-        options, scenario, seed = self._options, self._options.read(), self._options.seed
+        options, scenario = self._options, self._options.read()
         results = options.kept_results()
-        if results is not None:
-            scenario, seed = results.scenario, results.seed
-        measured = results is not None
+        if results is None:
+            self._play(scenario, options.seed, None)
+        else:
+            with closing(results):
+                self._play(results.scenario, results.seed, results)
+
+    def _play(self, scenario: Scenario, seed: int, results: KeptResults | None) -> None:
+        """Run it, and write all that is wanted of it, whatever else goes wrong."""
+        options = self._options
         world = ConsoleWorld(
-            *(scenario, options.scenario, seed), sockets=options.sockets(), measured=measured
+            *(scenario, options.scenario, seed),
+            sockets=options.sockets(),
+            measured=results is not None,
         )
         world.phones.motion_folder = options.motion_folder()
         if results is not None:
             results.follow(world)
-        with self._recorded(world):
-            self._run(world)
-        if results is not None:
-            results.write()
-            self._say(f"{options.results} written")
+        try:
+            with self._recorded(world):
+                self._run(world)
+        finally:
+            if results is not None:
+                self._write(results)
         found = verdicts(world.recorder)
         for verdict in found:
             self._say(str(verdict))
@@ -70,6 +81,17 @@ class ConsoleSupervisor:
         if options.record is not None:
             self._say(f"{options.record} written")
         refuse_broken(found)
+
+    def _write(self, results: KeptResults) -> None:
+        """Write the results, also where something has gone wrong before, which is told as well."""
+        before = sys.exc_info()[1]
+        try:
+            results.write()
+        except DvaSimError as error:
+            if isinstance(before, DvaSimError):
+                raise type(before)(f"{before}; {error}") from None
+            raise
+        self._say(f"{self._options.results} written")
 
     @contextmanager
     def _recorded(self, world: ConsoleWorld) -> Iterator[None]:

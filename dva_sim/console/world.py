@@ -87,7 +87,7 @@ class ConsoleWorld(ToldWorld):
             # A later link may lose or delay anything: only the segments are right for all.
             scenario = scenario.model_copy(update={"network_depth": "segment"})
         self.scenario, self.name, self.seed = scenario, name, seed
-        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder(measured)
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
         cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
         self.sockets = sockets(scenario, self.clock, self.recorder) if sockets else None
         watched = Watched(self.clock, self.recorder, cameras, PEOPLE, measured, self.sockets)

@@ -4,7 +4,7 @@ Each part writes lines into a pipe and never waits: what has no room is dropped 
 thread of the supervisor puts them into `FILE.part`, so that no robot ever waits for a disk, and
 what a part has said is kept when it is killed. When all have ended, a recording is made of the
 lines, in the form of those of virtual runs. Of a run whose supervisor was killed `FILE.part` is
-left, and can be replayed, too.
+left, and can be read like a recording; nothing that reads it changes it.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from dva_sim.agents.observation import CameraFrame
@@ -33,7 +34,14 @@ from dva_sim.live.pipes import Inlets, Outlet
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import Position
-from dva_sim.recordings.writing import HELD_TO, PART, SENT, check_target, write_recording
+from dva_sim.recordings.writing import (
+    HELD_TO,
+    PART,
+    SENT,
+    SUFFIX,
+    check_target,
+    write_recording,
+)
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.full.dva_trace import OWN_CODE
 from dva_sim.simulation.full.hazards import draw_incidents
@@ -270,7 +278,7 @@ def _emptied(path: Path) -> IO[bytes]:
     """
     try:
         with ExitStack() as stack:
-            file = stack.enter_context(path.open("ab", buffering=0))
+            file = stack.enter_context(path.open("a+b", buffering=0))
             _lock(file, path)
             file.write(b"?")
             file.truncate(0)
@@ -335,12 +343,22 @@ class Keeper:
 
     def finish(self) -> str | None:
         """Make the recording when all parts have ended; in one line why not, or not all of it."""
-        self.close()
+        self.inlets.join()
         try:
-            lasted = finish(self.path, self._target)
-        except DvaSimError as error:
-            why = self.problem or error
-            return f"{self._target} was not recorded: {why}; {self.path} is left for dva-sim replay"
+            if self.path.exists():
+                told = _told(self.path)
+            else:  # the folder was removed meanwhile; the open file still has the lines
+                told = _Told(self._file, self.path)
+                self._target.parent.mkdir(parents=True, exist_ok=True)
+            lasted = _record(told, self._target)
+            self.path.unlink(missing_ok=True)
+        except (DvaSimError, OSError) as error:
+            why, left = self.problem or error, ""
+            if self.path.exists():
+                left = f"; {self.path} is left for `dva-sim replay`"
+            return f"{self._target} was not recorded: {why}{left}"
+        finally:
+            self._file.close()
         if self.problem is None:
             return None
         return f"{self._target} is recorded up to {lasted:.0f} s only: {self.problem}"
@@ -391,50 +409,95 @@ class RunKeeping:
 # --- from lines to a recording -----------------------------------------------------------
 
 
-def finish(part: Path, target: Path, own_code: bool = True) -> float:
-    """Make a recording of the lines of a run, and remove them; how long it lasts [s].
+def record(part: Path, target: Path) -> float:
+    """Make a recording of the lines that a run left, which stay; how long it lasts [s].
 
     Args:
-        part: The lines.
+        part: The lines. Their run may still go on.
         target: The recording.
-        own_code: Whether classes in files that the scenario names may be run: not if the lines
-            were found somewhere.
 
     Raises:
-        DvaSimError: there are no such lines, or the recording cannot be written.
+        DvaSimError: there are no such lines, they name a class in a file, or the recording cannot
+            be written.
     """
-    told = _Told(part)
-    if not own_code and OWN_CODE in json.dumps(told.start["scenario"]["events"]):
+    told = _told(part)
+    if OWN_CODE in json.dumps(told.start["scenario"]["events"]):
         raise ConfigError("names a class in a file, which is run for no recording", part)
+    return _record(told, target)
+
+
+def _told(part: Path) -> _Told:
+    """The lines of a file.
+
+    Raises:
+        ConfigError: they cannot be read, or are something else.
+    """
+    try:
+        with part.open("rb") as file:
+            return _Told(file, part)
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", part) from error
+
+
+def _record(told: _Told, target: Path) -> float:
     playback = told.playback()
     about = {"time": "real, from the start of the run", "live": "over sockets"}
     write_recording(playback, target, about=about, traces=told.traces, audit=told.audit)
-    part.unlink(missing_ok=True)
     return playback.duration
 
 
-def whole(file: Path) -> Path:
-    """A recording to replay; what a live run left whose supervisor was killed is made one first.
+def is_part(file: Path) -> bool:
+    """Whether a file holds, by its name, the lines of a run that goes on or was killed."""
+    return file.suffix == PART
+
+
+@contextmanager
+def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
+    """A recording to read: a file as it is, or made of the lines of a run for the moment.
+
+    Args:
+        file: A recording, or the lines of a run.
+        kept: Where the recording that is made stays, if it is wanted.
 
     Raises:
-        DvaSimError: it cannot be made one.
+        DvaSimError: it cannot be made, or there is nothing to be made.
     """
-    if file.suffix != PART:
-        return file
-    target = file.with_suffix("")
-    check_target(target, way=f"rename it, or {file}")
-    finish(file, target, own_code=False)
-    return target
+    if not is_part(file):
+        if kept is not None:
+            raise ConfigError(f"is a recording already; only of a {SUFFIX}{PART} one is made", file)
+        yield file
+        return
+    if kept is not None:
+        check_target(kept, way="give another name")
+        record(file, kept)
+        yield kept
+        return
+    with TemporaryDirectory(prefix="dva-sim-") as folder:
+        made = Path(folder) / file.stem
+        record(file, made)
+        yield made
+
+
+def _all_of(file: IO[bytes]) -> bytes:
+    """What an unbuffered file holds, which may give less at once than is asked for."""
+    pieces = list[bytes]()
+    while piece := file.read(1 << 24):
+        pieces.append(piece)
+    return b"".join(pieces)[:MOST_BYTES]
 
 
 class _Told:
     """The lines of a run, sorted.
 
+    Args:
+        file: Holds them.
+        part: Its name.
+
     Raises:
         ConfigError: they cannot be read, or are something else.
     """
 
-    def __init__(self, part: Path) -> None:
+    def __init__(self, file: IO[bytes], part: Path) -> None:
         self.recorder = Recorder(keep_traffic=True)
         self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
         self.audit: list[tuple[float, dict[str, Any]]] = []
@@ -444,9 +507,8 @@ class _Told:
         self._facts: list[Fact] = []
         self._drives: dict[tuple[str, int], DriveLog] = {}
         try:
-            with part.open("rb") as file:
-                _lock(file, part)
-                first, *lines = file.read(MOST_BYTES).split(b"\n")
+            file.seek(0)
+            first, *lines = _all_of(file).split(b"\n")
             self.start = json.loads(first)
             if self.start["format"] > FORMAT:
                 raise ValueError("made by a later version")

@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # late: start-up
     from dva_sim.recordings.reading import Opened
     from dva_sim.simulation.full.verdicts import Verdict
 
+UNFINISHED: Final = "its run was cut off, or still goes on; what is there was checked"
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 
 
@@ -29,11 +30,13 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
 
     Problems are invalid messages and decisions that would be made otherwise now.
     """
+    from dva_sim.live.recording import is_part, readable  # late: start-up
     from dva_sim.recordings.audit_log import verify_plain  # late: start-up
     from dva_sim.recordings.reading import read_recording  # late: start-up
 
     try:
-        opened = read_recording(path)
+        with readable(path) as file:
+            opened = read_recording(file)
     except ConfigError as error:
         return [Problem(1, 1, error.problem)], [], "", []
     traffic = [(s, s.payload) for s in opened.playback.recorder.traffic or ()]
@@ -53,6 +56,8 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
             problems.append(Problem(1, 1, f"audit log: row {wrong.number} {wrong.text}"))
         note += f", an audit log whose last row is {found.rows} with the hash {found.head}"
     doubts = [] if opened.is_whole else ["was cut short"]
+    if is_part(path):
+        doubts = [UNFINISHED]
     try:
         return problems, doubts, note, judged_recording(opened)
     except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -30,6 +30,7 @@ _SUFFIXES: Final = {
     ".yaml": "configuration",
     ".yml": "configuration",
     ".mcap": "recording",
+    ".part": "recording",
     ".jsonl": "trace",
     ".sqlite": "audit log",
 }
@@ -78,9 +79,6 @@ def check_file(path: Path) -> FileVerdict:
         return _check_yaml(path)
     if kind in _EVIDENCE:
         return _check_evidence(kind, path)
-    if path.suffix == ".part":
-        told = "holds what a live run left; dva-sim replay makes a recording of it"
-        return FileVerdict("unknown", [Problem(1, 1, told)])
     return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
 
 

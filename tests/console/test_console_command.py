@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import urllib.error
 import urllib.request
@@ -14,6 +15,8 @@ import pytest
 from programs import Programs, wait_until
 from websockets.sync.client import connect
 
+import dva_sim
+from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.simulation.full.verdicts import RULES
 
 pytestmark = pytest.mark.system
@@ -127,6 +130,40 @@ def test_a_world_that_is_killed_takes_the_others_with_it(programs, console):
     console.process.kill()
     console.process.wait()
     programs.wait_for_none()
+
+
+def test_killed_it_loses_the_last_seconds_alone(programs, tmp_path):
+    out = tmp_path / "mine"
+    console = running(programs, "-o", out)
+    second = programs.start("console", *QUIET, "-o", out)
+    assert second.ends() == 2
+    (told,) = second.complained
+    assert told.startswith(f"error: {out} is being written by process {console.process.pid} on ")
+    wait_until(lambda: shown(out) > 2.0, "two seconds are kept")
+    console.process.kill()
+    console.process.wait()
+    assert shown(out) > 2.0
+    assert dva_sim.load(out).runs.rows == 1
+    programs.wait_for_none()
+
+
+def shown(out):
+    """How much of a run its folder shows [s]."""
+    runs = load_so_far(out).runs
+    return runs["simulated_s"][0] if runs.rows else 0.0
+
+
+def test_its_results_are_written_though_the_recording_breaks_off(programs, tmp_path):
+    (tmp_path / "film").mkdir()
+    console = running(programs, "-o", tmp_path / "mine", "--record", tmp_path / "film" / "run.mcap")
+    shutil.rmtree(tmp_path / "film")
+    (tmp_path / "film").write_text("a file where the folder was")
+    console.send(signal.SIGINT)
+    assert console.ends() == 2
+    (told,) = console.complained
+    assert "run.mcap was not recorded: " in told
+    assert "is left" not in told
+    assert dva_sim.load(tmp_path / "mine").runs.rows == 1
 
 
 def test_a_port_that_is_taken_is_told_in_a_line(programs, console):

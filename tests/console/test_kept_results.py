@@ -1,17 +1,26 @@
 """What people did at a console is a results folder with the tables of any run."""
 
 import json
+import shutil
+import sqlite3
 
 import pytest
 from console_page import Page
+from programs import wait_until
 
+import dva_sim
 from dva_sim.console.kept_results import KeptResults, name_of
+from dva_sim.console.recorder import KEPT
+from dva_sim.experiments.execution import kept_run
+from dva_sim.experiments.execution.checkpoint import load_so_far
+from dva_sim.experiments.execution.kept_run import KEPT_RUN, KeptRun
+from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.results.results import Results
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.simulation.full.stage import DVA, id_of, kind_of
 
 
-def driven(monkeypatch, out, seed=1):
+def driven(monkeypatch, out, seed=1, end=KeptResults.write):
     """A folder after two drives of two robots by one person, under two patterns."""
     results = KeptResults(out, "hands-on", ["link.delay_s=0.1"], seed, False)
     scenario = results.scenario.model_dump(mode="json")
@@ -27,8 +36,15 @@ def driven(monkeypatch, out, seed=1):
         page.let_go()
         assert page.do("stop")[0]
         page.let(1.0)
-    results.write()
-    return Results.load(out)
+    end(results)
+    results.close()
+    return Results.load(out) if end is KeptResults.write else None
+
+
+def killed(results):
+    """End as by kill -9: what is in the journal by then is there, and nothing else."""
+    results._kept._waiting.put(None)
+    results._kept._thread.join()
 
 
 def test_a_drive_of_a_person_is_a_row(monkeypatch, tmp_path):
@@ -78,6 +94,7 @@ def test_what_a_person_calls_a_device_is_in_no_table(monkeypatch, tmp_path):
     assert page.do("start")[0]
     page.let(3.0)
     results.write()
+    results.close()
     for table in Results.load(out).tables:
         rows = Results.load(out).table(table)
         assert not any("Jane" in str(value) for column in rows.values() for value in column)
@@ -89,7 +106,8 @@ def test_a_folder_that_holds_something_is_left_as_it_is(tmp_path):
         KeptResults(tmp_path, "hands-on", [], 1, False)
     with pytest.raises(ConfigError, match="holds something already"):
         KeptResults(tmp_path / "mine.txt", "hands-on", [], 1, True)
-    KeptResults(tmp_path, "hands-on", [], 1, True)
+    KeptResults(tmp_path, "hands-on", [], 1, True).close()
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
 def test_the_manifest_tells_what_was_changed(monkeypatch, tmp_path):
@@ -105,3 +123,130 @@ def test_a_device_has_a_kind_and_a_number_by_its_id(kind):
     assert name_of(id_of(kind, 2)) == f"{kind}-2"
     assert kind_of("AA:BB:CC:DD:EE:FF") == ("", 0xEEFF)
     assert kind_of(DVA)[0] == "dva"
+
+
+def test_of_a_console_that_was_killed_the_next_command_makes_the_tables(monkeypatch, tmp_path):
+    whole = driven(monkeypatch, tmp_path / "whole")
+    driven(monkeypatch, tmp_path / "killed", end=killed)
+    assert not (tmp_path / "killed" / "manifest.json").exists()
+    found = load_so_far(tmp_path / "killed")
+    assert found.partial == ""
+    assert not (tmp_path / "killed" / KEPT_RUN).exists()
+    for table in ("drives", "commands", "events"):
+        assert found.table(table).rows == whole.table(table).rows
+    assert list(found.table("commands")["t_made_s"]) == list(whole.table("commands")["t_made_s"])
+    assert whole.runs["simulated_s"][0] - found.runs["simulated_s"][0] <= 1.0
+
+
+@pytest.mark.parametrize("command", ["export", "compare", "report", "load", "console"])
+def test_any_command_that_takes_results_makes_them_first(monkeypatch, tmp_path, command):
+    out = tmp_path / "out"
+    driven(monkeypatch, out, end=killed)
+    if command == "export":
+        dva_sim.export(out, tmp_path / "runs.csv")
+    elif command == "compare":
+        dva_sim.compare(out, out)
+    elif command == "report":
+        dva_sim.report(out)
+    elif command == "load":
+        dva_sim.load(out)
+    else:
+        with pytest.raises(ConfigError, match="a run that was cut off, whose tables are made now"):
+            KeptResults(out, "hands-on", [], 1, False)
+    assert Results.load(out).table("drives").rows == 4
+    assert not (out / KEPT_RUN).exists()
+
+
+def test_while_it_goes_on_it_is_shown_up_to_now_and_left_alone(monkeypatch, tmp_path):
+    seen = []
+
+    def show(results):
+        wait_until(lambda: load_so_far(tmp_path / "out").runs["simulated_s"][0] > 10, "it is kept")
+        before = {path.name for path in (tmp_path / "out").iterdir()}
+        seen.append(load_so_far(tmp_path / "out"))
+        assert {path.name for path in (tmp_path / "out").iterdir()} == before
+        with pytest.raises(FolderInUse):
+            dva_sim.load(tmp_path / "out")
+        with pytest.raises(FolderInUse):
+            KeptResults(tmp_path / "out", "hands-on", [], 1, True)
+        results.write()
+
+    driven(monkeypatch, tmp_path / "out", end=show)
+    assert seen[0].partial.startswith("Partial: the run goes on; what follows is of its first 1")
+    assert seen[0].table("drives").rows == 4
+    assert Results.load(tmp_path / "out").partial == ""
+
+
+def test_a_folder_that_was_removed_meanwhile_is_made_again_with_all(monkeypatch, tmp_path):
+    def end(results):
+        shutil.rmtree(tmp_path / "out")
+        results.write()
+
+    driven(monkeypatch, tmp_path / "out", end=end)
+    assert Results.load(tmp_path / "out").table("drives").rows == 4
+
+
+def test_a_disk_that_is_full_for_a_while_costs_nothing(monkeypatch, tmp_path):
+    keep, failed = KeptRun._keep, []
+
+    def full(kept, lines):
+        if len(failed) < 5 and lines:
+            failed.append(len(lines))
+            raise sqlite3.OperationalError("database or disk is full")
+        keep(kept, lines)
+
+    monkeypatch.setattr(KeptRun, "_keep", full)
+    monkeypatch.setattr(kept_run, "AGAIN", 0.01)
+    assert driven(monkeypatch, tmp_path / "out").table("drives").rows == 4
+    assert len(failed) == 5
+
+
+def test_a_disk_that_stays_full_is_told_and_what_it_took_is_kept(monkeypatch, tmp_path):
+    def end(results):
+        killed_thread = results._kept._thread
+        monkeypatch.setattr(KeptRun, "_keep", full)
+        monkeypatch.setattr(kept_run, "AGAIN", 0.01)
+        with pytest.raises(DvaSimError, match="could not be written: database or disk is full"):
+            results.write()
+        assert not killed_thread.is_alive()
+
+    def full(kept, lines):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    driven(monkeypatch, tmp_path / "out", end=end)
+    assert load_so_far(tmp_path / "out").table("drives").rows == 4
+
+
+def test_memory_does_not_grow_with_what_was_kept(monkeypatch, tmp_path):
+    results = KeptResults(tmp_path / "out", "hands-on", [], 1, False)
+    page = Page(monkeypatch, results.scenario.model_dump(mode="json"), measured=True)
+    results.follow(page.world)
+    assert page.do("take", robots=[0])[0]
+    assert page.do("start")[0]
+    page.want(0.3, 0.5)
+    page.let(30.0)
+    (drive,) = page.world.recorder.drives
+    assert drive.sent > 500
+    for grown in (drive.frames, drive.commands, drive.applied, drive.intents):
+        assert len(grown) <= KEPT + 100
+    assert sum(map(len, page.world.recorder.tracks.values())) <= 100
+    results.write()
+    results.close()
+    commands = Results.load(tmp_path / "out").table("commands")
+    assert commands.rows > 500
+    assert commands["t_made_s"][-1] - commands["t_made_s"][0] > 25
+
+
+def test_a_journal_that_is_damaged_is_told_in_a_line(tmp_path):
+    (tmp_path / KEPT_RUN).write_bytes(b"no journal at all, but as long as a file of SQLite is" * 99)
+    with pytest.raises(ConfigError, match="is not the journal of a run, or damaged"):
+        load_so_far(tmp_path)
+
+
+def test_a_class_in_a_file_is_run_for_no_results(monkeypatch, tmp_path):
+    driven(monkeypatch, tmp_path / "out", end=killed)
+    with sqlite3.connect(tmp_path / "out" / KEPT_RUN) as journal:
+        journal.execute("UPDATE run SET scenario = replace(scenario, '\"fire\"', '\"x.py:X\"')")
+    journal.close()
+    with pytest.raises(ConfigError, match="names a class in a file, which is run for no results"):
+        load_so_far(tmp_path / "out")

@@ -6,6 +6,7 @@ import inspect
 import json
 import os
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live import recording
 from dva_sim.live.pipes import Outlet
-from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile, finish
+from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.recordings.reading import read_recording
@@ -272,36 +273,63 @@ def test_a_message_that_is_none_is_found_in_a_recording(tmp_path: Path) -> None:
     assert f"message 21, at 3.0 s, from {PHONE}: " in ended.stdout
 
 
-def test_lines_that_were_left_are_made_a_recording_by_replay(tmp_path: Path) -> None:
+def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path: Path) -> None:
     """As of a run whose supervisor was killed, in the middle of a line."""
     keeper = record(tmp_path / "run.mcap")
     keeper.close()
     with keeper.path.open("ab") as file:
         file.write(b'["sent", 9.9, "02')
+    left = keeper.path.read_bytes()
     told = call("check", str(keeper.path))
-    assert told.returncode == 1
-    assert "dva-sim replay makes a recording of it" in told.stdout
-    target = tmp_path / "run.mcap"
-    target.write_text("of an earlier run")
-    ended = call("replay", str(keeper.path))
-    assert ended.returncode == 2
-    assert f"{target} would be replaced; rename it, or {keeper.path}" in ended.stderr
-    target.unlink()
+    assert told.returncode == 0, told.stdout
+    assert "its run was cut off, or still goes on" in told.stdout
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "is now in mode Idle" in ended.stdout
-    assert found_in(tmp_path / "run.mcap") == ([], [], "20 messages")
+    assert "run.mcap.part was cut short: 2 s are there" in ended.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap.part"]
+    assert keeper.path.read_bytes() == left
 
 
-def test_the_lines_of_a_run_that_goes_on_are_left_alone(tmp_path: Path) -> None:
+def test_a_recording_is_made_of_lines_that_were_left_where_one_is_asked_for(
+    tmp_path: Path,
+) -> None:
     keeper = record(tmp_path / "run.mcap")
+    keeper.close()
+    made = tmp_path / "made.mcap"
+    ended = call("replay", str(keeper.path), "--mcap", str(made))
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert found_in(made) == ([], [], "20 messages")
+    assert keeper.path.exists()
+    again = call("replay", str(keeper.path), "--mcap", str(made))
+    assert again.returncode == 2
+    assert f"{made} would be replaced; give another name" in again.stderr
+    already = call("replay", str(made), "--mcap", str(tmp_path / "other.mcap"))
+    assert already.returncode == 2
+    assert "is a recording already" in already.stderr
+
+
+def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path: Path) -> None:
+    keeper = record(tmp_path / "run.mcap")
+    inlet = keeper.inlet()
     ended = call("replay", str(keeper.path))
-    assert ended.returncode == 2
-    assert ended.stderr == f"error: {keeper.path}: belongs to a run that still goes on\n"
+    assert (ended.returncode, ended.stderr) == (0, "")
     with pytest.raises(ConfigError, match="belongs to a run that still goes on"):
         Keeper(tmp_path / "run.mcap", scenario_of(), 1)
+    os.write(inlet, b'["told", 3.0, "dva", "is here", "event"]\n')
+    os.close(inlet)
     assert keeper.finish() is None
     assert found_in(tmp_path / "run.mcap") == ([], [], "20 messages")
+    assert read_recording(tmp_path / "run.mcap").playback.recorder.timeline[-1].time == 3.0
+
+
+def test_a_run_whose_folder_is_removed_meanwhile_is_recorded(tmp_path: Path) -> None:
+    folder = tmp_path / "there"
+    folder.mkdir()
+    keeper = record(folder / "run.mcap")
+    shutil.rmtree(folder)
+    assert keeper.finish() is None
+    assert found_in(folder / "run.mcap") == ([], [], "20 messages")
 
 
 def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path: Path) -> None:
@@ -340,7 +368,7 @@ def test_what_holds_no_lines_ends_in_one_line(tmp_path: Path, data: bytes) -> No
     part = tmp_path / "run.mcap.part"
     part.write_bytes(data)
     with pytest.raises(ConfigError, match="holds no lines of a live run"):
-        finish(part, tmp_path / "run.mcap")
+        recording.record(part, tmp_path / "run.mcap")
     with pytest.raises(ConfigError, match="holds no lines of a live run"):
         dva_sim.replay(part)
     assert part.exists()

@@ -13,7 +13,7 @@ from dva_sim.console.replay.player import Player, playing
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.live.process import ending_when_asked
-from dva_sim.live.recording import whole
+from dva_sim.live.recording import readable
 from dva_sim.recordings.reading import read_recording
 
 Say = Callable[[str], object]
@@ -24,7 +24,7 @@ class ReplayOptions(PageOptions):
     """What to play, and where it is to be seen.
 
     Attributes:
-        file: A recording, or what a live run has left of one; None: those of `results`.
+        file: A recording, or the lines of a run that was killed; None: those of `results`.
         results: Folder of a study whose recordings can be chosen.
     """
 
@@ -40,8 +40,8 @@ class ReplayOptions(PageOptions):
         shelf = None if self.results is None else Shelf(self.results)
         if self.file is None:
             return Player(None, shelf)
-        file = whole(self.file)
-        return Player(RecordedRun(read_recording(file), file.name), shelf)
+        with readable(self.file) as file:
+            return Player(RecordedRun(read_recording(file), self.file.name), shelf)
 
 
 def show_replay(options: ReplayOptions, say: Say) -> None:

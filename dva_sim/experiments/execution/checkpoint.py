@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.results.manifest import failures
 from dva_sim.experiments.results.results import JOURNAL, MANIFEST, TABLES, Results, digests
-from dva_sim.experiments.results.tables import write_tables
+from dva_sim.experiments.results.tables import TablesOf, write_tables
 from dva_sim.experiments.study.cell_grid import RunKey, StudyRun, runs_in
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.simulation.models import Tables
@@ -241,6 +242,9 @@ def _remedy(problem: str) -> str:
 def load_so_far(folder: str | Path) -> Results:
     """Open a results folder, also one whose study is still running or was interrupted.
 
+    Of a run that people took part in and that was killed, the tables are made first; of one that
+    still goes on, they are made aside, as of now.
+
     Of an unfinished study, only persons count who have all of their runs, so that every
     comparison is paired and no cell has other persons than its neighbour. The key `partial` of
     the manifest then tells how much is there.
@@ -249,6 +253,14 @@ def load_so_far(folder: str | Path) -> Results:
         ConfigError: it is no results folder, or no person has all runs yet.
     """
     folder = Path(folder)
+    if kept_run.is_left(folder):
+        try:
+            kept_run.complete(folder)
+        except ConfigError:
+            raise
+        except DvaSimError:  # it goes on, or the folder can only be read
+            manifest, tables = kept_run.tables_so_far(folder)
+            return _aside(folder, manifest, runs_in(manifest), lambda _: tables)
     if (folder / MANIFEST).exists() or not (folder / JOURNAL).exists():
         return Results.load(folder)
     with Checkpoint(folder, None, must_exist=True) as checkpoint:
@@ -275,7 +287,14 @@ def _so_far(folder: Path, checkpoint: Checkpoint) -> Results:
     manifest["partial"] = {"done": len(done & keys), "of": len(keys), "persons": persons}
     manifest["runs"] = len({run.key for run in whole})
     manifest["failures"] = failures(whole, failed)
-    aside = _tables_aside(whole, checkpoint)
+    return _aside(folder, manifest, whole, checkpoint.tables)
+
+
+def _aside(
+    folder: Path, manifest: dict[str, Any], runs: Sequence[StudyRun], tables_of: TablesOf
+) -> Results:
+    """Results whose tables are kept for as long as somebody reads them."""
+    aside = _tables_aside(runs, tables_of)
     manifest["tables"] = digests(aside / TABLES)
     results = Results(folder, manifest, aside)
     weakref.finalize(results, shutil.rmtree, aside, ignore_errors=True)
@@ -289,14 +308,14 @@ def _of_whole_persons(runs: Sequence[StudyRun], ended: Iterable[RunKey]) -> list
     return [run for run in runs if run.person not in unfinished]
 
 
-def _tables_aside(runs: Sequence[StudyRun], checkpoint: Checkpoint) -> Path:
+def _tables_aside(runs: Sequence[StudyRun], tables_of: TablesOf) -> Path:
     """Tables of some runs, in a folder of their own that does not disturb who still runs."""
     try:
         aside = Path(tempfile.mkdtemp(prefix="dva-sim-"))
     except OSError as error:
         raise DvaSimError(f"tables cannot be kept for a moment: {error.strerror}") from None
     try:
-        write_tables(aside, runs, checkpoint.tables)
+        write_tables(aside, runs, tables_of)
     except BaseException:
         shutil.rmtree(aside, ignore_errors=True)
         raise

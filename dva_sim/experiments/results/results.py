@@ -274,6 +274,10 @@ class Results:
         found = self.manifest.get("partial")
         if found is None:
             return ""
+        if "until_s" in found:
+            return (
+                f"Partial: the run goes on; what follows is of its first {found['until_s']:.0f} s."
+            )
         persons = self.study["persons"]
         return (
             f"Partial: {found['done']} of {found['of']} runs are done. What follows rests on the "

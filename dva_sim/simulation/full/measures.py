@@ -319,21 +319,20 @@ def drive_measures(recording: Recording) -> Row:
 
 def _cause(row: Row, attempts: list[DriveLog], recording: Recording) -> str:
     """Why an event was not confirmed: a robot without power or jammed, else how it ended."""
-    bodies = [recording.robots[drive.robot].body for drive in attempts]
-    if not all(body.powered for body in bodies):
+    if not all(recording.robots[drive.robot].powered for drive in attempts):
         return "battery"
     return "jammed" if row["jams"] else str(row["outcome"])
 
 
 def _body_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     """What the robots' bodies went through."""
-    bodies = [recording.robots[robot].body for robot in sorted({d.robot for d in attempts})]
+    robots = [recording.robots[robot] for robot in sorted({d.robot for d in attempts})]
     return {
-        "path_m": sum(body.distance for body in bodies),
-        "contacts": sum(body.contacts for body in bodies),
-        "contact_impulse_n_s": sum(body.impulse for body in bodies),
-        "person_contacts": sum(body.person_contacts for body in bodies),
-        "jams": sum(body.jams for body in bodies),
+        "path_m": sum(robot.distance for robot in robots),
+        "contacts": sum(robot.contacts for robot in robots),
+        "contact_impulse_n_s": sum(robot.impulse for robot in robots),
+        "person_contacts": sum(robot.person_contacts for robot in robots),
+        "jams": sum(robot.jams for robot in robots),
     }
 
 
@@ -344,10 +343,10 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
     drives = [driven(d, end) for d, (_, end) in zip(attempts, spans, strict=True)]
     applied, in_force = sum(len(d.applied) for d in drives), sum(d.hold.sum() for d in drives)
     trips = [t for d in attempts for t in d.round_trips]
-    inboxes = [recording.robots[robot].inbox for robot in sorted({d.robot for d in attempts})]
+    robots = [recording.robots[robot] for robot in sorted({d.robot for d in attempts})]
     if not any(d.sent for d in attempts):
         driving = 0.0  # nobody drove: the robot was on a mission
-    motor = recording.robots[attempts[0].robot].body.spec.motor_time_constant
+    motor = recording.robots[attempts[0].robot].motor
     return (
         command_ages(drives)
         | delay_budget(drives, motor)
@@ -357,12 +356,12 @@ def _command_measures(attempts: list[DriveLog], recording: Recording) -> Row:
             "commands_applied": applied,
             "commands_stale": recording.recorder.counters["robot refused: stale"],
             "commands_superseded": sum(d.superseded for d in attempts)
-            + sum(inbox.superseded for inbox in inboxes),
+            + sum(robot.superseded for robot in robots),
             **_round_trips(trips),
             "samples_per_value": _ratio(
                 sum(d.samples for d in attempts), sum(d.values for d in attempts)
             ),
-            "queue_max": max(inbox.longest for inbox in inboxes),
+            "queue_max": max(robot.longest_queue for robot in robots),
             "timeouts": sum(d.timeouts for d in attempts),
             "alerts": sum(d.alerts for d in attempts),
             "stop_share": 1.0 - float(in_force) / driving if driving else NAN,

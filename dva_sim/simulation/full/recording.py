@@ -46,6 +46,48 @@ class PersonLog(NamedTuple):
     out: float = math.inf
 
 
+class RobotLog(NamedTuple):
+    """What became of a robot.
+
+    Attributes:
+        powered: Whether its battery still moves it.
+        distance: Length of its path [m].
+        contacts: Contacts with walls and others.
+        impulse: Impulse of all contacts [N s].
+        person_contacts: Contacts with people.
+        jams: Times that it was jammed.
+        motor: Time constant of its motors [s].
+        superseded: Commands that a newer one replaced while they waited.
+        longest_queue: Most commands that waited at once.
+    """
+
+    powered: bool
+    distance: float
+    contacts: int
+    impulse: float
+    person_contacts: int
+    jams: int
+    motor: float
+    superseded: int
+    longest_queue: int
+
+
+def log_of(robot: RobotAgent) -> RobotLog:
+    """What has become of a robot by now."""
+    body, inbox = robot.body, robot.inbox
+    return RobotLog(
+        powered=body.powered,
+        distance=body.distance,
+        contacts=body.contacts,
+        impulse=body.impulse,
+        person_contacts=body.person_contacts,
+        jams=body.jams,
+        motor=body.spec.motor_time_constant,
+        superseded=inbox.superseded,
+        longest_queue=inbox.longest,
+    )
+
+
 class Ending(NamedTuple):
     """What became of an incident, as far as the DVA knows.
 
@@ -110,15 +152,16 @@ class Recording(Playback):
     """All that is left of one run, to be measured.
 
     Attributes:
-        robots: The robots by id, as they ended.
+        robots: What became of the robots, by id.
+        links: Modelled links to each robot and back, by its id.
         people: What became of the people on foot.
         depth: How the network was modelled: `message`, `segment` (where any connection was), or
             `datagram`.
         persons: Numbers of the operators whose places people took.
     """
 
-    robots: dict[str, RobotAgent]
-    links: dict[str, tuple[Link, Link]]
+    robots: dict[str, RobotLog]
+    links: dict[str, tuple[Link, Link]] = field(default_factory=dict)
     people: list[PersonLog] = field(default_factory=list)
     depth: str = "message"
     persons: tuple[int, ...] = ()

@@ -38,7 +38,13 @@ from dva_sim.simulation.full.observations import (
     terms_of,
 )
 from dva_sim.simulation.full.physical_world import Field, is_dangerous
-from dva_sim.simulation.full.recording import PersonLog, Recording, ending_of, event_about
+from dva_sim.simulation.full.recording import (
+    PersonLog,
+    Recording,
+    ending_of,
+    event_about,
+    log_of,
+)
 from dva_sim.simulation.full.safety_checks import SafetyAudit
 from dva_sim.simulation.full.stage import Stage, id_of
 from dva_sim.simulation.scenario import Scenario, request_timeout_s
@@ -209,10 +215,15 @@ class Run:
             self.clock.run(now)
         return self.recording()
 
-    def recording(self) -> Recording:
-        """What is left of it now."""
-        self._watch()
-        self._sample()
+    def recording(self, sampled: bool = True) -> Recording:
+        """What is left of it now.
+
+        Args:
+            sampled: Rules are checked, and places noted, once more.
+        """
+        if sampled:
+            self._watch()
+            self._sample()
         stage, field = self.stage, self.field
         events = list(self.dva.events.values())
         return Recording(
@@ -230,7 +241,7 @@ class Run:
                 ending_of(event_about(i, events, stage.site, field.robots)) for i in field.incidents
             ],
             events=events,
-            robots=field.robots,
+            robots={name: log_of(robot) for name, robot in field.robots.items()},
             links=self.links,
             people=self._people(),
             depth=self._connector.deepest,
