@@ -12,7 +12,7 @@ ROBOT, TABLET = "70:1A:04:F9:81:D6", "56:2B:04:E4:56:D8"
 
 
 def real(low: float, high: float) -> st.SearchStrategy[float]:
-    return st.floats(low, high)
+    return st.floats(low, high).map(lambda value: value + 0.0)  # -0.0 is written as 0.0
 
 
 def characters(least: int, most: int) -> st.SearchStrategy[str]:

@@ -28,8 +28,9 @@ def _real(name: str, kind: str) -> Callable[[float], str]:
 
     def write(value: float) -> str:
         if low <= value <= high:
-            # float() because a numpy scalar spells its own type in its repr.
-            return repr(float(value))
+            # float() because a numpy scalar spells its own type in its repr; 0.0 for -0.0, which
+            # no reader expects of a speed.
+            return repr(float(value) + 0.0)
         raise bad(f"{name} must be within {low:g} and {high:g}, not {value!r}")
 
     return write

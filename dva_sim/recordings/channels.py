@@ -418,7 +418,9 @@ def commanded(playback: Playback) -> Iterator[ChannelMessage]:
     for number, drive in enumerate(playback.recorder.drives):
         topic, whose = f"/{names[drive.operator]}/{COMMANDS}", labels[drive.robot]
         for time, speed, turn_rate in drive.commands:
-            made = {"speed_m_s": round(speed, 5), "turn_rate_rad_s": round(turn_rate, 5)}
+            # Plus 0.0, since what is rounded to nothing may be -0.0.
+            values = round(speed, 5) + 0.0, round(turn_rate, 5) + 0.0
+            made = dict(zip(("speed_m_s", "turn_rate_rad_s"), values, strict=True))
             yield stamped(time, topic, "dva_sim.Command", drive=number, robot=whose, **made)
 
 

@@ -73,7 +73,7 @@ def test_the_messages_of_a_drive_are_read_without_the_parser(sent):
     [
         message(m.SetTeleOp(99.99999999999999, -99.99999999999999, MAX_TICK), MAX_SESSION),
         message(m.SetTeleOp(5e-324, -2.2250738585072014e-308, 0), 0),
-        message(m.SetTeleOp(0.00012345678901234567, -0.0)),
+        message(m.SetTeleOp(0.00012345678901234567, 0.0)),
         m.Message(ROBOT, MAX_UINT32, TABLET, "23:59:59.123456789", 1, m.Reply(MAX_UINT32, 999, "")),
         message(m.Reply(0, m.BAD_MESSAGE, "~ \"'!" * 42)),
         message(m.RobotStatus("Idle", m.Position(89.9, -179.9), -999999.9, 0.0, 0.0, 0)),
@@ -85,6 +85,12 @@ def test_what_a_drive_can_say_at_its_bounds_is_read_without_the_parser(sent):
     data = encode(sent)
     assert agrees(data)
     assert repr(read_canonical(data)) == repr(sent)
+
+
+def test_minus_zero_of_another_make_is_read_without_the_parser():
+    data = encode(message(m.SetTeleOp(0.5, 0.0))).replace(b">0.0<", b">-0.0<")
+    assert agrees(data)
+    assert repr(read_canonical(data).body) == repr(m.SetTeleOp(0.5, -0.0))
 
 
 @search()

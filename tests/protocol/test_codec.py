@@ -218,6 +218,21 @@ def test_numbers_of_numpy_are_numbers():
     assert decode(encode(message(sent))).body == m.SetTeleOp(0.5, -0.25, 86320)
 
 
+@pytest.mark.parametrize("low", [-0.0, np.float64(-0.0), np.float32(-0.0)])
+def test_minus_zero_is_written_as_zero(low):
+    at = m.Position(low, low)
+    bodies = [
+        m.SetTeleOp(low, low),
+        m.RobotStatus("Idle", at, low, low, low, 1),
+        m.SensorValue("temperature", (low, 1.0), "degC", 1),
+        m.DevSub("temperature", low),
+    ]
+    for body in bodies:
+        data = encode(message(body))
+        assert b"-0.0" not in data
+        assert b">0.0<" in data
+
+
 def test_the_turn_rate_printed_in_the_dissertation_is_valid_though_above_the_robots_limit():
     assert decode(encode(message(m.SetTeleOp(0.5, 0.56)))).body == m.SetTeleOp(0.5, 0.56)
 

@@ -201,4 +201,6 @@ def _array(values: list[Value], kind: str) -> NDArray[Any]:
         return np.array(texts, dtype=object)
     dtype = {"DOUBLE": np.float64, "BIGINT": np.int64, "BOOLEAN": np.bool_}[kind]
     filled: NDArray[Any] = np.array([0 if v is None else v for v in values], dtype=dtype)
+    if kind == "DOUBLE":
+        filled += 0.0  # -0.0 becomes 0.0
     return np.ma.masked_array(filled, mask=[v is None for v in values])

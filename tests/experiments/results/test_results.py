@@ -108,3 +108,13 @@ def test_a_table_of_runs_that_has_gone_is_told(tmp_path):
     (out / "tables" / "runs.parquet").unlink()
     with pytest.raises(ConfigError, match=r"has no table 'runs'; tables: tracks"):
         _ = Results.load(out).runs
+
+
+def test_minus_zero_is_zero_in_a_table(tmp_path):
+    def simulate(job):
+        return {"runs": [{"turn_rate_rad_s": -0.0, "speed_mps": -0.5}]}
+
+    out = run_study(study_in(tmp_path), tmp_path / "out", jobs=1, episode=simulate)
+    runs = Results.load(out).runs
+    assert not np.signbit(runs["turn_rate_rad_s"]).any()
+    assert set(runs["speed_mps"]) == {-0.5}
