@@ -35,11 +35,11 @@ STORY_LINES = 12
 ALWAYS_TOLD = "refused", "not sent", "form", "not recorded"  # in the names of counters
 HELD = 2.0  # lines of several parts are told in order: so long does one wait for earlier ones [s]
 DEFAULT_DVA = f"127.0.0.1:{DEFAULT_PORT}"  # of a part that is run alone and told no other
-WIDTH = 120  # where there is no terminal to ask [characters]
+WIDTH = 80  # where there is no terminal to ask [characters]
 COLUMNS = (
     "heard\ns ago",
     "heart-\nbeats/s",
-    "commands\n/s",
+    "com-\nmands/s",
     "refused\nso far",
     "picture\ns old",
     "round\ntrip ms",
@@ -54,6 +54,7 @@ class Board:
         self.events: list[dict[str, Any]] = []
         self.story: list[list[Any]] = []
         self.time = 0.0
+        self.dva = ""
         self._registered: set[str] = set()
 
     def hear(self, report: Report) -> list[list[Any]]:
@@ -62,6 +63,7 @@ class Board:
         for row in report.rows:
             self.devices.setdefault(row["label"], {}).update(row)
         if report.part == "dva":
+            self.dva = report.dva or self.dva
             self.events = report.events
             registered = {row["label"] for row in report.rows}
             for label in self._registered - registered:
@@ -71,15 +73,20 @@ class Board:
         return sorted(report.story)
 
     def table(self) -> Table:
-        """The devices: what they are, do, and how the link to each is."""
-        table = Table(title=f"after {self.time:.0f} s", title_justify="left", box=SIMPLE_HEAD)
-        for column in ("device", "type", "doing", "address"):
-            table.add_column(column, no_wrap=True)
+        """The devices: what they are, do, and how the link to each is.
+
+        Two lines for each, so that the columns fit 80 characters; a label or an address that is
+        longer goes on below.
+        """
+        title = f"after {self.time:.0f} s"
+        table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=0)
+        for column in ("device\ntype", "doing\naddress"):
+            table.add_column(column, overflow="fold")
         for column in COLUMNS:
-            table.add_column(column, justify="right")
+            table.add_column(column, justify="right", no_wrap=True)
         for label, row in sorted(self.devices.items()):
             # As it is: a label may look like markup, and comes from whoever registers.
-            table.add_row(*(Text(cell) for cell in (label, *_cells(row))))
+            table.add_row(*(Text(cell) for cell in _cells(label, row)))
         return table
 
     def lines_of_story(self) -> Text:
@@ -98,13 +105,12 @@ def story_line(line: list[Any]) -> str:
     return f"{time:7.1f} s  {who:<14} {what}"
 
 
-def _cells(row: dict[str, Any]) -> list[str]:
+def _cells(label: str, row: dict[str, Any]) -> list[str]:
     listened_to = row.get("type") != DETECTOR  # a detector speaks only when it has something to say
     silent = row.get("silent") and listened_to
     return [
-        row.get("type", ""),
-        row.get("doing", ""),
-        row.get("address", ""),
+        f"{label}\n{row.get('type', '')}".rstrip(),
+        f"{row.get('doing', '')}\n{row.get('address', '')}".rstrip("\n"),
         "silent" if silent else _number(row.get("heard_s"), ".1f"),
         _number(row.get("beats_hz") if listened_to else None, ".1f"),
         _number(row.get("commands_hz"), ".1f"),
@@ -134,6 +140,7 @@ def run_all(options: LiveOptions) -> None:
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def hear(_: str, report: Report) -> None:
+            _say_where(screen.console, board, report)
             board.hear(report)
             screen.update(Group(board.table(), board.lines_of_story()))
 
@@ -147,6 +154,12 @@ def warn(console: Console, options: LiveOptions) -> None:
     """Say what does not go together, before anything starts."""
     for told in contradictions(options.read(), live=True):
         _print(console, f"warning: {told}")
+
+
+def _say_where(console: Console, board: Board, report: Report) -> None:
+    """Say once where the DVA listens, for those who want to join."""
+    if report.dva is not None and report.dva != board.dva:
+        _print(console, f"DVA: {report.dva}")
 
 
 def _print(console: Console, line: str) -> None:
@@ -174,6 +187,7 @@ def run_one(part: str, options: LiveOptions, number: int) -> None:
     with Live(console=console, refresh_per_second=4, transient=True) as screen:
 
         def say(report: Report) -> None:
+            _say_where(screen.console, board, report)
             for line in board.hear(report):
                 _print(screen.console, story_line(line))
             if console.is_terminal:
@@ -194,6 +208,7 @@ class InOrder:
 
     def hear(self, report: Report) -> None:
         """Take a report, and print what nothing earlier can come to any more."""
+        _say_where(self._console, self._board, report)
         self._waiting = sorted(self._waiting + self._board.hear(report))
         while self._waiting and self._waiting[0][0] <= self._board.time - HELD:
             _print(self._console, story_line(self._waiting.pop(0)))

@@ -13,7 +13,7 @@ from dva_sim.console.web.addresses import own_address
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
-from dva_sim.recordings.writing import check_target
+from dva_sim.live.recording import check_both
 from dva_sim.simulation.scenario import Scenario, build, load
 
 LINKS = "modelled", "real"
@@ -123,7 +123,7 @@ class ConsoleOptions(PageOptions):
         if self.links == "real" and scenario.zeromq.conflate != "none":
             raise ConfigError("zeromq.conflate: only on modelled links, since messages have parts")
         if self.record is not None:
-            check_target(self.record, self.overwrite)
+            check_both(self.record, self.overwrite)
         if self.audit is not None:
             check_audit_target(self.audit)
         return scenario

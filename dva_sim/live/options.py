@@ -12,7 +12,8 @@ from typing import Any
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
-from dva_sim.recordings.writing import PART, SUFFIX, check_target, try_to_write
+from dva_sim.live.recording import check_both
+from dva_sim.recordings.writing import SUFFIX, try_to_write
 from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
 
@@ -111,9 +112,7 @@ class LiveOptions:
 
     def _check_record(self, record: Path, part: str | None) -> None:
         if self.records_run:
-            lines = record.with_name(record.name + PART)
-            refuse_to_replace([lines], self.overwrite, f"dva-sim replay {lines}, or --overwrite")
-            check_target(record, self.overwrite)
+            check_both(record, self.overwrite)
             return
         if not record.is_dir() and (record.suffix or record.exists()):
             raise ConfigError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import signal
 import socket
 import sys
@@ -71,12 +72,13 @@ def run_part(
 ) -> list[Verdict]:
     """Be one part until the end of the run, Ctrl-C, SIGTERM, or the end of standard input.
 
-    One that is alone gives up if it has heard of nobody for `PATIENCE`, or a DVA until the end.
+    One that is alone gives up if it has heard of nobody for `PATIENCE`. A DVA that is alone serves
+    others, and lasts until it is ended, or for as long as the options say.
 
     Args:
         name: `dva`, `world` or `operator`.
         options: What to run and where.
-        say: Takes a report each second, and one at the end.
+        say: Takes a report as soon as the part listens, each second, and one at the end.
         number: Which operator.
         epoch: Start of the run by `time.monotonic`, which all processes of a machine share [s].
         supervised: End when standard input does: whoever started this process is gone.
@@ -135,8 +137,10 @@ def _run_part(
         gc.freeze()  # what stays for the whole run is not looked through again and again
         reporter = _Reporter(name, number, stage, part, network)
         clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
-        lasts = scenario.horizon_s if options.duration is None else options.duration
-        patience = lasts if name == "dva" else min(PATIENCE, lasts)
+        serves = name == "dva" and not supervised
+        usual = math.inf if serves else scenario.horizon_s
+        lasts = usual if options.duration is None else options.duration
+        patience = lasts if serves else min(PATIENCE, lasts)
         with ending_when_asked(clock, supervised) as ending:
             if not supervised:
                 clock.run(patience)

@@ -27,6 +27,7 @@ from dva_sim.core.events import Event, State
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.kernel.streams import Streams
 from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, Facts, LiveJudge, observation_of
 from dva_sim.live.options import LiveOptions
@@ -288,6 +289,22 @@ def _emptied(path: Path) -> IO[bytes]:
         raise ConfigError(f"cannot be written: {error.strerror}", path) from error
 
 
+def check_both(target: Path, overwrite: bool) -> None:
+    """Tell what keeps a recording from being made, before anything is run.
+
+    Args:
+        target: The recording.
+        overwrite: It, and the lines that an earlier run left, may be replaced.
+
+    Raises:
+        ConfigError: either is there, or nothing can be written.
+    """
+    part = target.with_name(target.name + PART)
+    way = f"dva-sim replay {part} --mcap NAME keeps it; give another name, or --overwrite"
+    refuse_to_replace([part], overwrite, way)
+    check_target(target, overwrite)
+
+
 class Keeper:
     """Puts what all parts say into one file.
 
@@ -355,7 +372,7 @@ class Keeper:
         except (DvaSimError, OSError) as error:
             why, left = self.problem or error, ""
             if self.path.exists():
-                left = f"; {self.path} is left for `dva-sim replay`"
+                left = f"; {self.path} is left for dva-sim replay"
             return f"{self._target} was not recorded: {why}{left}"
         finally:
             self._file.close()

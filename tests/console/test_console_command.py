@@ -147,6 +147,18 @@ def test_killed_it_loses_the_last_seconds_alone(programs, tmp_path):
     programs.wait_for_none()
 
 
+def test_what_an_earlier_run_left_of_a_recording_is_not_replaced(programs, tmp_path):
+    left = tmp_path / "run.mcap.part"
+    left.write_text("lines of a run that was killed")
+    console = programs.start("console", *QUIET, "--record", "run.mcap")
+    assert console.ends() == 2
+    assert console.complained == [
+        "error: run.mcap.part would be replaced; "
+        "dva-sim replay run.mcap.part --mcap NAME keeps it; give another name, or --overwrite"
+    ]
+    assert left.read_text() == "lines of a run that was killed"
+
+
 def shown(out):
     """How much of a run its folder shows [s]."""
     runs = load_so_far(out).runs

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import signal
+from contextlib import nullcontext
+
 import pytest
+from free_ports import free_port
 
 from dva_sim.cli import call
 from dva_sim.kernel.errors import RunsFailed
 from dva_sim.live import process
 from dva_sim.live.options import LiveOptions
 from dva_sim.live.process import NobodyThere, run_part
+from dva_sim.network.realtime import LiveClock
 
 
 @pytest.fixture(autouse=True)
@@ -31,6 +37,40 @@ def test_a_dva_that_no_device_joins_says_so_at_its_end():
     with pytest.raises(NobodyThere, match=r"no device joined the DVA at 127\.0\.0\.1:\d+ within"):
         run_part("dva", options, lambda _: None)
     assert issubclass(NobodyThere, RunsFailed)
+
+
+@pytest.mark.parametrize(
+    ("part", "supervised", "changes", "lasts"),
+    [
+        ("dva", False, {}, math.inf),
+        ("dva", False, {"duration": 7.0}, 7.0),
+        ("dva", True, {}, 40.0),
+        ("world", False, {"dva": "127.0.0.1:9"}, 40.0),
+    ],
+)
+def test_a_dva_that_serves_others_outlasts_the_scenario(
+    monkeypatch, part, supervised, changes, lasts
+):
+    asked = []
+    monkeypatch.setattr(LiveClock, "run", lambda _, until=math.inf: asked.append(until))
+    monkeypatch.setattr(process, "_refuse_to_be_alone", lambda *_: None)
+    monkeypatch.setattr(process, "ending_when_asked", lambda *_: nullcontext(NotAsked()))
+    options = LiveOptions("drive-to-event", ("horizon_s=40",), **changes)
+    run_part(part, options, lambda _: None, supervised=supervised)
+    assert asked[-2] == lasts
+
+
+class NotAsked:
+    is_asked = False
+
+
+def test_a_dva_says_at_once_where_it_listens_also_to_a_pipe(programs):
+    port = free_port()
+    program = programs.start("live", "drive-to-event", "--only", "dva", "--port", port)
+    program.wait_to_say(f"DVA: 127.0.0.1:{port}\n")
+    program.send(signal.SIGTERM)
+    assert program.ends() == 0
+    assert program.said.startswith(f"DVA: 127.0.0.1:{port}\n")
 
 
 @pytest.mark.parametrize("words", ["foo", "foo:", "127.0.0.1", "127.0.0.1:x", ":5600", ""])

@@ -47,7 +47,9 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
         assert line in run.said
     for line in ("200 of 200 commands obeyed", "an emergency: obeyed", "refused (wrong mode)"):
         assert line in run.said
-    story = [float(line.split(" s ")[0]) for line in run.said.partition("after ")[0].splitlines()]
+    first, *lines = run.said.partition("after ")[0].splitlines()
+    assert first.startswith("DVA: 127.0.0.1:")
+    story = [float(line.split(" s ")[0]) for line in lines]
     assert story == sorted(story)
     # Nobody who follows a script goes to the fire.
     assert "The run ended (the script is done): event 1 (fire) is pending." in run.said
@@ -204,11 +206,13 @@ def test_what_was_recorded_until_the_supervisor_is_killed_can_be_replayed(
     programs.wait_for_none()
     again = call(*SCRIPTED, "--record", "run.mcap", cwd=tmp_path)
     assert again.returncode == 2
-    assert "run.mcap.part would be replaced; dva-sim replay run.mcap.part, or" in again.stderr
-    told = call("replay", tmp_path / "run.mcap.part")
+    assert "run.mcap.part would be replaced; dva-sim replay run.mcap.part --mcap" in again.stderr
+    left = (tmp_path / "run.mcap.part").read_bytes()
+    told = call("replay", tmp_path / "run.mcap.part", "--mcap", tmp_path / "run.mcap")
     assert told.returncode == 0, told.stderr
     assert "is now in mode Teleoperation" in told.stdout
     assert count_in(tmp_path / "run.mcap", b"<StartTeleOp") > 0
+    assert (tmp_path / "run.mcap.part").read_bytes() == left
 
 
 @pytest.mark.parametrize("part", ["dva", "world", "operator"])
