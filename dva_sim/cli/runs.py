@@ -359,9 +359,18 @@ def keys(
 
     Existing keys are kept. `dva-sim live --keys FOLDER` uses them.
 
+    FOLDER/public/ID.key goes to every machine, and FOLDER/secret/ID.key_secret to the machine of
+    its device alone; the colons of an id are written as hyphens. Both files are text: a line
+    public-key = "..." and, in the secret one, secret-key = "...", each 40 characters in Z85, as the
+    CURVE sockets of ZeroMQ take them.
+
+    A device of another make is named by its id. It connects with its own pair, and with the public
+    key of the device that it connects to as server key; protocol/README.md shows how, under Keys.
+
     Examples:
         dva-sim keys keys drive-to-event  # for each device of the scenario
         dva-sim keys keys dva robot-1 operator-1  # for these devices
+        dva-sim keys keys 56:2B:04:E4:56:D8  # for a device of another make
     """
     from dva_sim.cli.live_screen import make_keys  # late: start-up
 

@@ -7,16 +7,18 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from command_line import call
 from patience import PATIENCE_S
 
 from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol.codec import decode
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.physical_world import Field
-from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.full.stage import Stage, id_of, team_of
 
 SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
 ROBOT = id_of("robot", 1)
@@ -42,7 +44,10 @@ def live_until(clock, condition):
 
 
 def programs_of_the_specification():
-    return re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
+    """The client, the control room, and others; first what gives sockets their keys."""
+    lock, *others = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
+    assert "def lock(" in lock
+    return [*others, lock]
 
 
 def run(code, dva, clock, folder):
@@ -87,6 +92,45 @@ def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
     assert robot.controller.mode == "Idle"
 
 
+@pytest.mark.parametrize("is_known", [True, False])
+def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_known):
+    code = programs_of_the_specification()
+    me = re.search(r'ME, DVA, sent = "(.*?)"', code[0])[1]
+    scenario = scenarios.build(
+        scenarios.load("drive-to-event"), {"events": [{"kind": "fire", "at_s": 500}]}
+    )
+    folder = tmp_path / "keys"
+    told = call("keys", folder, "dva", "robot-1", *team_of(scenario), *([me] if is_known else []))
+    assert told.returncode == 0, told.stderr
+    clock = LiveClock()
+    network = SocketNetwork(clock, KeyRing(folder))
+    if not is_known:
+        call("keys", folder, me)  # the device has keys that nobody has been given
+    try:
+        stage = Stage(
+            scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
+        )
+        dva = add_dva(stage)
+        field = Field(stage)
+        field.populate()
+        live_until(clock, lambda: dva.beats[ROBOT] > 0)
+        program = code[0].replace("def ask(", f"{code[-1]}\ndef ask(")
+        for name, server in (("dva", "DVA"), ("robot", "it")):
+            locked = f"lock({name}, {str(folder)!r}, {server})\n{name}.connect("
+            program = program.replace(f"{name}.connect(", locked)
+        if not is_known:
+            program = program.replace("dva.connect(", "dva.rcvtimeo = 1000; dva.connect(")
+        out, err = run(program, dva, clock, tmp_path)
+    finally:
+        network.close()
+    if is_known:
+        assert (out, err) == ("the last command was answered with code 0\n", "")
+        assert field.robots[ROBOT].applied == 20
+    else:
+        assert "zmq.error.Again" in err
+        assert me not in dva.desk.registry.entries
+
+
 def test_the_control_room_of_the_specification_acknowledges_and_sends_as_proposed(
     network, tmp_path
 ):
@@ -117,7 +161,7 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
 
 
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):
-    code = re.search(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)[1]
+    code = programs_of_the_specification()[0]
     lives = []
     for now in (1000.25, 1000.5):
         monkeypatch.setattr("time.time", lambda now=now: now)
