@@ -127,7 +127,7 @@ def replay(
     """
     from dva_sim.experiments.report.episode import open_recording, write_replay  # late: start-up
     from dva_sim.experiments.report.notebook import episode_of  # late: start-up
-    from dva_sim.live.recording import readable  # late: start-up
+    from dva_sim.live.recorded_lines import readable  # late: start-up
     from dva_sim.recordings.pictures import Wanted  # late: start-up
 
     wanted = Wanted.of(video, still, strip, at, panels=panels, camera=camera, inset=inset)

@@ -390,7 +390,7 @@ def replay(
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
     """
-    from dva_sim.live.recording import is_part, readable  # late: start-up
+    from dva_sim.live.recorded_lines import is_part, readable  # late: start-up
 
     with readable(file, mcap) as found:
         opened = open_recording(found, pictures)

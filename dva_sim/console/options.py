@@ -13,7 +13,7 @@ from dva_sim.console.web.addresses import own_address
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
-from dva_sim.live.recording import check_both
+from dva_sim.recordings.writing import check_both
 from dva_sim.simulation.scenario import Scenario, build, load
 
 LINKS = "modelled", "real"

@@ -12,8 +12,7 @@ from typing import Any
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
-from dva_sim.live.recording import check_both
-from dva_sim.recordings.writing import SUFFIX, try_to_write
+from dva_sim.recordings.writing import SUFFIX, check_both, try_to_write
 from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
 

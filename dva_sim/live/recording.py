@@ -14,48 +14,32 @@ import json
 import re
 import threading
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from dva_sim.agents.observation import CameraFrame
-from dva_sim.core.audit import Fact
-from dva_sim.core.events import Event, State
+from dva_sim.core.events import Event
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError, DvaSimError
-from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
-from dva_sim.kernel.resources import refuse_to_replace
-from dva_sim.kernel.streams import Streams
-from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, Facts, LiveJudge, observation_of
+from dva_sim.kernel.recorder import Moment, Recorder
+from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, LiveJudge
 from dva_sim.live.options import LiveOptions
 from dva_sim.live.pipes import Inlets, Outlet
+from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, ToldRun, make_recording, told_in
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.protocol.messages import Position
 from dva_sim.recordings.writing import (
     HELD_TO,
     PART,
     SENT,
-    SUFFIX,
-    check_target,
-    write_recording,
 )
-from dva_sim.simulation.full import Playback
-from dva_sim.simulation.full.dva_trace import OWN_CODE
-from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.simulation.full.observations import FactGap, FactLog, terms_of
-from dva_sim.simulation.full.recording import ending_of, event_about
-from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.full.verdicts import Verdict
-from dva_sim.simulation.scenario import Scenario, site_of
-from dva_sim.worlds.hazards import Surroundings
+from dva_sim.simulation.scenario import Scenario
 
-FORMAT = 1  # of the lines
-MOST_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
 BYTES_PER_SECOND = 1024 * 1024  # of a part; a drive takes a twentieth
 MOST_FACTS = 20_000  # of which one knows that they were said
 MOST_STRANGERS = 200  # devices of another make whose messages are kept
@@ -289,22 +273,6 @@ def _emptied(path: Path) -> IO[bytes]:
         raise ConfigError(f"cannot be written: {error.strerror}", path) from error
 
 
-def check_both(target: Path, overwrite: bool) -> None:
-    """Tell what keeps a recording from being made, before anything is run.
-
-    Args:
-        target: The recording.
-        overwrite: It, and the lines that an earlier run left, may be replaced.
-
-    Raises:
-        ConfigError: either is there, or nothing can be written.
-    """
-    part = target.with_name(target.name + PART)
-    way = f"dva-sim replay {part} --mcap NAME keeps it; give another name, or --overwrite"
-    refuse_to_replace([part], overwrite, way)
-    check_target(target, overwrite)
-
-
 class Keeper:
     """Puts what all parts say into one file.
 
@@ -363,11 +331,11 @@ class Keeper:
         self.inlets.join()
         try:
             if self.path.exists():
-                told = _told(self.path)
+                told = told_in(self.path)
             else:  # the folder was removed meanwhile; the open file still has the lines
-                told = _Told(self._file, self.path)
+                told = ToldRun(self._file, self.path)
                 self._target.parent.mkdir(parents=True, exist_ok=True)
-            lasted = _record(told, self._target)
+            lasted = make_recording(told, self._target)
             self.path.unlink(missing_ok=True)
         except (DvaSimError, OSError) as error:
             why, left = self.problem or error, ""
@@ -421,246 +389,3 @@ class RunKeeping:
     def verdicts(self) -> list[Verdict]:
         """Return the verdicts on the safety rules, once all parts have ended."""
         return self._judge.verdicts()
-
-
-# --- from lines to a recording -----------------------------------------------------------
-
-
-def record(part: Path, target: Path) -> float:
-    """Make a recording of the lines that a run left, which stay; how long it lasts [s].
-
-    Args:
-        part: The lines. Their run may still go on.
-        target: The recording.
-
-    Raises:
-        DvaSimError: there are no such lines, they name a class in a file, or the recording cannot
-            be written.
-    """
-    told = _told(part)
-    if OWN_CODE in json.dumps(told.start["scenario"]["events"]):
-        raise ConfigError("names a class in a file, which is run for no recording", part)
-    return _record(told, target)
-
-
-def _told(part: Path) -> _Told:
-    """The lines of a file.
-
-    Raises:
-        ConfigError: they cannot be read, or are something else.
-    """
-    try:
-        with part.open("rb") as file:
-            return _Told(file, part)
-    except OSError as error:
-        raise ConfigError(f"cannot be read: {error.strerror}", part) from error
-
-
-def _record(told: _Told, target: Path) -> float:
-    playback = told.playback()
-    about = {"time": "real, from the start of the run", "live": "over sockets"}
-    write_recording(playback, target, about=about, traces=told.traces, audit=told.audit)
-    return playback.duration
-
-
-def is_part(file: Path) -> bool:
-    """Whether a file holds, by its name, the lines of a run that goes on or was killed."""
-    return file.suffix == PART
-
-
-@contextmanager
-def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
-    """A recording to read: a file as it is, or made of the lines of a run for the moment.
-
-    Args:
-        file: A recording, or the lines of a run.
-        kept: Where the recording that is made stays, if it is wanted.
-
-    Raises:
-        DvaSimError: it cannot be made, or there is nothing to be made.
-    """
-    if not is_part(file):
-        if kept is not None:
-            raise ConfigError(f"is a recording already; only of a {SUFFIX}{PART} one is made", file)
-        yield file
-        return
-    if kept is not None:
-        check_target(kept, way="give another name")
-        record(file, kept)
-        yield kept
-        return
-    with TemporaryDirectory(prefix="dva-sim-") as folder:
-        made = Path(folder) / file.stem
-        record(file, made)
-        yield made
-
-
-def _all_of(file: IO[bytes]) -> bytes:
-    """What an unbuffered file holds, which may give less at once than is asked for."""
-    pieces = list[bytes]()
-    while piece := file.read(1 << 24):
-        pieces.append(piece)
-    return b"".join(pieces)[:MOST_BYTES]
-
-
-class _Told:
-    """The lines of a run, sorted.
-
-    Args:
-        file: Holds them.
-        part: Its name.
-
-    Raises:
-        ConfigError: they cannot be read, or are something else.
-    """
-
-    def __init__(self, file: IO[bytes], part: Path) -> None:
-        self.recorder = Recorder(keep_traffic=True)
-        self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
-        self.audit: list[tuple[float, dict[str, Any]]] = []
-        self.duration, self.radii = 0.0, dict[str, float]()
-        self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
-        self._events: dict[int, Event] = {}
-        self._facts: list[Fact] = []
-        self._drives: dict[tuple[str, int], DriveLog] = {}
-        try:
-            file.seek(0)
-            first, *lines = _all_of(file).split(b"\n")
-            self.start = json.loads(first)
-            if self.start["format"] > FORMAT:
-                raise ValueError("made by a later version")
-            # What is behind the last end of a line is not whole.
-            told = [json.loads(line) for line in lines[:-1]]
-            for kind, *values in told:
-                getattr(self, f"_{kind}")(*values)
-            self.recorder.facts = _facts_in(told) if HELD_TO in self.start else None
-        except OSError as error:
-            raise ConfigError(f"cannot be read: {error.strerror}", part) from error
-        except (ValueError, LookupError, TypeError, AttributeError) as error:
-            raise ConfigError(f"holds no lines of a live run: {error}", part) from error
-
-    def playback(self) -> Playback:
-        """What can be told and shown of the run."""
-        scenario, seed = Scenario.model_validate(self.start["scenario"]), self.start["seed"]
-        site, recorder = site_of(scenario, seed), self.recorder
-        incidents = draw_incidents(scenario.events, site, Streams(seed))
-        real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
-        surroundings = Surroundings(site, [incidents[number].hazard for number in real])
-        for number, when in self._contained.items():
-            surroundings.contain(real.index(number), when)
-        recorder.timeline.sort(key=lambda moment: moment.time)
-        recorder.traffic = sorted(self._traffic(), key=lambda sent: sent.time)
-        recorder.drives = [drive for _, drive in sorted(self._drives.items())]
-        for sent in recorder.traffic:
-            for end in (sent.source, sent.destination):
-                self._labels.setdefault(end, end)
-        events = list(self._events.values())
-        return Playback(
-            scenario=scenario,
-            seed=seed,
-            site=site,
-            recorder=recorder,
-            incidents=incidents,
-            surroundings=surroundings,
-            labels=self._labels,
-            radii=self.radii,
-            duration=self.duration,
-            contained=self._contained,
-            endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
-            events=events,
-            facts=self._facts,
-            about_robots=self.start.get(HELD_TO),
-        )
-
-    def _traffic(self) -> Iterator[Sent]:
-        """Messages; a frame goes to whoever drives the robot, or to nobody by name."""
-        for sent in self.recorder.traffic or ():
-            if sent.destination:
-                yield sent
-                continue
-            drives = [d for d in self._drives.values() if d.robot == sent.source]
-            watching = [d.operator for d in drives if d.ordered <= sent.time]
-            yield sent._replace(destination=watching[-1] if watching else DVA)
-
-    # --- lines by their first word -------------------------------------------------------
-
-    def _until(self, when: float) -> None:
-        self.duration = max(self.duration, when)
-
-    def _told(self, when: float, *words: str) -> None:
-        self._until(when)
-        self.recorder.timeline.append(Moment(when, *words))
-
-    def _view(self, robot: str, seen: list[float]) -> None:
-        when, x, y, heading = seen
-        self.recorder.views[robot].append(TrackPoint(when, x, y, heading, "seen"))
-
-    def _team(self, labels: Mapping[str, str], radii: Mapping[str, float]) -> None:
-        self._labels.update(labels)
-        self.radii.update(radii)
-
-    def _at(self, when: float, places: list[list[Any]]) -> None:
-        self._until(when)
-        for name, x, y, heading, mode in places:
-            self.recorder.tracks[name].append(TrackPoint(when, x, y, heading, mode))
-
-    def _sent(self, when: float, source: str, destination: str, text: str) -> None:
-        self._until(when)
-        data = text.encode()
-        self._traffic_of.append(Sent(when, source, destination, len(data), data))
-
-    def _frame(self, when: float, robot: str, seen: list[Any], captured: float) -> None:
-        size = self.start["scenario"]["camera"]["frame_bytes"]
-        frame = CameraFrame(observation_of(seen), captured)
-        self._traffic_of.append(Sent(when, robot, "", size, frame))
-
-    def _here(self, when: float, _: list[str]) -> None:
-        self._until(when)
-
-    def _seen(self, when: float, *_: Any) -> None:
-        """Note only the time: `_facts_in` reads the fact."""
-        self._until(when)
-
-    @property
-    def _traffic_of(self) -> list[Sent]:
-        assert self.recorder.traffic is not None
-        return self.recorder.traffic
-
-    def _drive(self, operator: str, number: int, facts: list[Any]) -> None:
-        robot, who, event, ordered, started, ended, outcome = facts
-        known = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
-        known.started, known.ended, known.outcome = started, ended, outcome
-
-    def _drove(self, operator: str, number: int, seen: Line, made: Line) -> None:
-        drive = self._drives[operator, number]
-        drive.frames += [Shown(captured, when, 0) for captured, when in seen]
-        drive.commands += [(when, speed, turn_rate) for when, speed, turn_rate in made]
-
-    def _contains(self, number: int, when: float) -> None:
-        self._contained[number] = when
-
-    def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
-        """See `event_facts`; what an earlier version did not say is left open."""
-        times, severity, sent = (*more, 0.0, {})[:3]
-        event = Event(
-            number, kind, Position(*at), severity, state=State(state), times=times, **sent
-        )
-        self._events[number] = event
-
-    def _fact(self, held: dict[str, Any]) -> None:
-        self._facts.append(Fact(**held))
-
-    def _audited(self, row: dict[str, Any]) -> None:
-        self.audit.append((float(row["time_s"]), row))
-
-    def _trace(self, when: float, who: str, line: str) -> None:
-        self.traces[who].append((when, line))
-
-
-def _facts_in(told: Sequence[Line]) -> list[Any]:
-    """Return the facts in order of time, those of one part in the order of their lines."""
-    reads = Facts(most=None)
-    for line in told:
-        reads.note(line)
-    facts = [fact for line in told if (fact := reads.fact(line)) is not None]
-    return sorted(facts, key=lambda fact: fact.time)

@@ -127,6 +127,22 @@ def check_target(path: Path, overwrite: bool = False, **way: str) -> None:
     try_to_write(path.parent)
 
 
+def check_both(target: Path, overwrite: bool) -> None:
+    """Tell what keeps a recording from being made, before anything is run.
+
+    Args:
+        target: The recording.
+        overwrite: It, and the lines that an earlier run left, may be replaced.
+
+    Raises:
+        ConfigError: either is there, or nothing can be written.
+    """
+    part = target.with_name(target.name + PART)
+    way = f"dva-sim replay {part} --mcap NAME keeps it; give another name, or --overwrite"
+    refuse_to_replace([part], overwrite, way)
+    check_target(target, overwrite)
+
+
 def try_to_write(folder: Path) -> None:
     """See whether a folder takes files.
 

@@ -30,7 +30,7 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
 
     Problems are invalid messages and decisions that would be made otherwise now.
     """
-    from dva_sim.live.recording import is_part, readable  # late: start-up
+    from dva_sim.live.recorded_lines import is_part, readable  # late: start-up
     from dva_sim.recordings.audit_log import verify_plain  # late: start-up
     from dva_sim.recordings.reading import read_recording  # late: start-up
 

@@ -19,7 +19,7 @@ from dva_sim.core.dva import Dva
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live import recording
+from dva_sim.live import recorded_lines, recording
 from dva_sim.live.pipes import Outlet
 from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile
 from dva_sim.protocol import messages as m
@@ -368,7 +368,7 @@ def test_what_holds_no_lines_ends_in_one_line(tmp_path: Path, data: bytes) -> No
     part = tmp_path / "run.mcap.part"
     part.write_bytes(data)
     with pytest.raises(ConfigError, match="holds no lines of a live run"):
-        recording.record(part, tmp_path / "run.mcap")
+        recorded_lines.record(part, tmp_path / "run.mcap")
     with pytest.raises(ConfigError, match="holds no lines of a live run"):
         dva_sim.replay(part)
     assert part.exists()

@@ -13,7 +13,7 @@ from dva_sim.console.replay.player import Player, playing
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.live.process import ending_when_asked
-from dva_sim.live.recording import readable
+from dva_sim.live.recorded_lines import readable
 from dva_sim.recordings.reading import read_recording
 
 Say = Callable[[str], object]

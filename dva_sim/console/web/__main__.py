@@ -16,8 +16,8 @@ from dva_sim.console.web.app import make_app
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import CameraStreams
 from dva_sim.console.web.hub import Hub
-from dva_sim.console.web.listener import fitting_places
 from dva_sim.console.web.phones import NoCertificate
+from dva_sim.console.web.port_listener import fitting_places
 from dva_sim.console.web.server import listen, make_server, serve
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.static_files import StaticFiles

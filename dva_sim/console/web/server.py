@@ -13,8 +13,8 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from dva_sim.console.web.actions import MOST_BYTES
-from dva_sim.console.web.listener import WAITING, Listener
 from dva_sim.console.web.port_connections import PortConnection, PortConnections
+from dva_sim.console.web.port_listener import WAITING, PortListener
 from dva_sim.console.web.sockets import HttpProtocol
 from dva_sim.kernel.errors import ConfigError
 
@@ -111,7 +111,7 @@ async def serve(
 ) -> None:
     """Serve until the end."""
     server.config.load()
-    listener = Listener(sock, server.protocol, server.config.ssl, places)
+    listener = PortListener(sock, server.protocol, server.config.ssl, places)
     accepting = asyncio.ensure_future(listener.run())
     serving = asyncio.ensure_future(server.serve(sockets=[]))  # the listener accepts in its place
     waiting = asyncio.ensure_future(ended.wait())

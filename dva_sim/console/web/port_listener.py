@@ -49,7 +49,7 @@ def fitting_places(listeners: int) -> PortConnections:
     return PortConnections(most, MOST_SERVED * most // MOST)
 
 
-class Listener:
+class PortListener:
     """Accepts connections of one port.
 
     Args:

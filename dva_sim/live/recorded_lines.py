@@ -1,0 +1,288 @@
+"""A recording made of the lines that the parts of a live run have written.
+
+The lines stand in `FILE.mcap.part` until the run ends, and stay there when it is killed. What reads
+them changes nothing: their run may still go on.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO, Any
+
+from dva_sim.agents.observation import CameraFrame
+from dva_sim.core.audit import Fact
+from dva_sim.core.events import Event, State
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
+from dva_sim.kernel.streams import Streams
+from dva_sim.live.judging import Facts, observation_of
+from dva_sim.protocol.messages import Position
+from dva_sim.recordings.writing import (
+    HELD_TO,
+    PART,
+    SUFFIX,
+    check_target,
+    write_recording,
+)
+from dva_sim.simulation.full import Playback
+from dva_sim.simulation.full.dva_trace import OWN_CODE
+from dva_sim.simulation.full.hazards import draw_incidents
+from dva_sim.simulation.full.recording import ending_of, event_about
+from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.scenario import Scenario, site_of
+from dva_sim.worlds.hazards import Surroundings
+
+FORMAT = 1  # of the lines
+MOST_BYTES = 128 * 1024 * 1024  # of a run: about an hour of a drive
+
+Line = list[Any]
+
+
+def record(part: Path, target: Path) -> float:
+    """Make a recording of the lines that a run left, which stay; how long it lasts [s].
+
+    Args:
+        part: The lines. Their run may still go on.
+        target: The recording.
+
+    Raises:
+        DvaSimError: there are no such lines, they name a class in a file, or the recording cannot
+            be written.
+    """
+    told = told_in(part)
+    if OWN_CODE in json.dumps(told.start["scenario"]["events"]):
+        raise ConfigError("names a class in a file, which is run for no recording", part)
+    return make_recording(told, target)
+
+
+def told_in(part: Path) -> ToldRun:
+    """Return the lines of a file, sorted.
+
+    Raises:
+        ConfigError: they cannot be read, or are something else.
+    """
+    try:
+        with part.open("rb") as file:
+            return ToldRun(file, part)
+    except OSError as error:
+        raise ConfigError(f"cannot be read: {error.strerror}", part) from error
+
+
+def make_recording(told: ToldRun, target: Path) -> float:
+    """Write a recording; how long it lasts [s].
+
+    Raises:
+        DvaSimError: it cannot be written.
+    """
+    playback = told.playback()
+    about = {"time": "real, from the start of the run", "live": "over sockets"}
+    write_recording(playback, target, about=about, traces=told.traces, audit=told.audit)
+    return playback.duration
+
+
+def is_part(file: Path) -> bool:
+    """Whether a file holds, by its name, the lines of a run that goes on or was killed."""
+    return file.suffix == PART
+
+
+@contextmanager
+def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
+    """A recording to read: a file as it is, or made of the lines of a run for the moment.
+
+    Args:
+        file: A recording, or the lines of a run.
+        kept: Where the recording that is made stays, if it is wanted.
+
+    Raises:
+        DvaSimError: it cannot be made, or there is nothing to be made.
+    """
+    if not is_part(file):
+        if kept is not None:
+            raise ConfigError(f"is a recording already; only of a {SUFFIX}{PART} one is made", file)
+        yield file
+        return
+    if kept is not None:
+        check_target(kept, way="give another name")
+        record(file, kept)
+        yield kept
+        return
+    with TemporaryDirectory(prefix="dva-sim-") as folder:
+        made = Path(folder) / file.stem
+        record(file, made)
+        yield made
+
+
+def _all_of(file: IO[bytes]) -> bytes:
+    """What an unbuffered file holds, which may give less at once than is asked for."""
+    pieces = list[bytes]()
+    while piece := file.read(1 << 24):
+        pieces.append(piece)
+    return b"".join(pieces)[:MOST_BYTES]
+
+
+class ToldRun:
+    """The lines of a run, sorted.
+
+    Args:
+        file: Holds them.
+        part: Its name.
+
+    Raises:
+        ConfigError: they cannot be read, or are something else.
+    """
+
+    def __init__(self, file: IO[bytes], part: Path) -> None:
+        self.recorder = Recorder(keep_traffic=True)
+        self.traces: dict[str, list[tuple[float, str]]] = defaultdict(list)
+        self.audit: list[tuple[float, dict[str, Any]]] = []
+        self.duration, self.radii = 0.0, dict[str, float]()
+        self._labels, self._contained = {DVA: "dva"}, dict[int, float]()
+        self._events: dict[int, Event] = {}
+        self._facts: list[Fact] = []
+        self._drives: dict[tuple[str, int], DriveLog] = {}
+        try:
+            file.seek(0)
+            first, *lines = _all_of(file).split(b"\n")
+            self.start = json.loads(first)
+            if self.start["format"] > FORMAT:
+                raise ValueError("made by a later version")
+            # What is behind the last end of a line is not whole.
+            told = [json.loads(line) for line in lines[:-1]]
+            for kind, *values in told:
+                getattr(self, f"_{kind}")(*values)
+            self.recorder.facts = _facts_in(told) if HELD_TO in self.start else None
+        except OSError as error:
+            raise ConfigError(f"cannot be read: {error.strerror}", part) from error
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
+            raise ConfigError(f"holds no lines of a live run: {error}", part) from error
+
+    def playback(self) -> Playback:
+        """What can be told and shown of the run."""
+        scenario, seed = Scenario.model_validate(self.start["scenario"]), self.start["seed"]
+        site, recorder = site_of(scenario, seed), self.recorder
+        incidents = draw_incidents(scenario.events, site, Streams(seed))
+        real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
+        surroundings = Surroundings(site, [incidents[number].hazard for number in real])
+        for number, when in self._contained.items():
+            surroundings.contain(real.index(number), when)
+        recorder.timeline.sort(key=lambda moment: moment.time)
+        recorder.traffic = sorted(self._traffic(), key=lambda sent: sent.time)
+        recorder.drives = [drive for _, drive in sorted(self._drives.items())]
+        for sent in recorder.traffic:
+            for end in (sent.source, sent.destination):
+                self._labels.setdefault(end, end)
+        events = list(self._events.values())
+        return Playback(
+            scenario=scenario,
+            seed=seed,
+            site=site,
+            recorder=recorder,
+            incidents=incidents,
+            surroundings=surroundings,
+            labels=self._labels,
+            radii=self.radii,
+            duration=self.duration,
+            contained=self._contained,
+            endings=[ending_of(event_about(i, events, site, self.radii)) for i in incidents],
+            events=events,
+            facts=self._facts,
+            about_robots=self.start.get(HELD_TO),
+        )
+
+    def _traffic(self) -> Iterator[Sent]:
+        """Messages; a frame goes to whoever drives the robot, or to nobody by name."""
+        for sent in self.recorder.traffic or ():
+            if sent.destination:
+                yield sent
+                continue
+            drives = [d for d in self._drives.values() if d.robot == sent.source]
+            watching = [d.operator for d in drives if d.ordered <= sent.time]
+            yield sent._replace(destination=watching[-1] if watching else DVA)
+
+    # --- lines by their first word -------------------------------------------------------
+
+    def _until(self, when: float) -> None:
+        self.duration = max(self.duration, when)
+
+    def _told(self, when: float, *words: str) -> None:
+        self._until(when)
+        self.recorder.timeline.append(Moment(when, *words))
+
+    def _view(self, robot: str, seen: list[float]) -> None:
+        when, x, y, heading = seen
+        self.recorder.views[robot].append(TrackPoint(when, x, y, heading, "seen"))
+
+    def _team(self, labels: Mapping[str, str], radii: Mapping[str, float]) -> None:
+        self._labels.update(labels)
+        self.radii.update(radii)
+
+    def _at(self, when: float, places: list[list[Any]]) -> None:
+        self._until(when)
+        for name, x, y, heading, mode in places:
+            self.recorder.tracks[name].append(TrackPoint(when, x, y, heading, mode))
+
+    def _sent(self, when: float, source: str, destination: str, text: str) -> None:
+        self._until(when)
+        data = text.encode()
+        self._traffic_of.append(Sent(when, source, destination, len(data), data))
+
+    def _frame(self, when: float, robot: str, seen: list[Any], captured: float) -> None:
+        size = self.start["scenario"]["camera"]["frame_bytes"]
+        frame = CameraFrame(observation_of(seen), captured)
+        self._traffic_of.append(Sent(when, robot, "", size, frame))
+
+    def _here(self, when: float, _: list[str]) -> None:
+        self._until(when)
+
+    def _seen(self, when: float, *_: Any) -> None:
+        """Note only the time: `_facts_in` reads the fact."""
+        self._until(when)
+
+    @property
+    def _traffic_of(self) -> list[Sent]:
+        assert self.recorder.traffic is not None
+        return self.recorder.traffic
+
+    def _drive(self, operator: str, number: int, facts: list[Any]) -> None:
+        robot, who, event, ordered, started, ended, outcome = facts
+        known = self._drives.setdefault((operator, number), DriveLog(robot, who, event, ordered))
+        known.started, known.ended, known.outcome = started, ended, outcome
+
+    def _drove(self, operator: str, number: int, seen: Line, made: Line) -> None:
+        drive = self._drives[operator, number]
+        drive.frames += [Shown(captured, when, 0) for captured, when in seen]
+        drive.commands += [(when, speed, turn_rate) for when, speed, turn_rate in made]
+
+    def _contains(self, number: int, when: float) -> None:
+        self._contained[number] = when
+
+    def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
+        """See `event_facts`; what an earlier version did not say is left open."""
+        times, severity, sent = (*more, 0.0, {})[:3]
+        event = Event(
+            number, kind, Position(*at), severity, state=State(state), times=times, **sent
+        )
+        self._events[number] = event
+
+    def _fact(self, held: dict[str, Any]) -> None:
+        self._facts.append(Fact(**held))
+
+    def _audited(self, row: dict[str, Any]) -> None:
+        self.audit.append((float(row["time_s"]), row))
+
+    def _trace(self, when: float, who: str, line: str) -> None:
+        self.traces[who].append((when, line))
+
+
+def _facts_in(told: Sequence[Line]) -> list[Any]:
+    """Return the facts in order of time, those of one part in the order of their lines."""
+    reads = Facts(most=None)
+    for line in told:
+        reads.note(line)
+    facts = [fact for line in told if (fact := reads.fact(line)) is not None]
+    return sorted(facts, key=lambda fact: fact.time)
