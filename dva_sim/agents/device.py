@@ -7,9 +7,10 @@ from dataclasses import KW_ONLY, dataclass, field
 from functools import partial
 from itertools import islice
 
+from dva_sim.agents.dva_watch import DvaWatch
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.network.messaging import Request, Requester, Transport
+from dva_sim.network.messaging import Request, Requester, Subscription, Transport
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
@@ -65,6 +66,8 @@ class AgentDevice:
         labels: Names of all devices by id, for the timeline.
         time_of_day: When the run starts [s since midnight], and whether timestamps are exact.
         silent: Whether it sends nothing at all, as it has no power.
+        meanwhile: What it does while the DVA is silent, in words.
+        dva_watch: Whether the DVA is there.
     """
 
     id_tag: str
@@ -81,27 +84,38 @@ class AgentDevice:
     labels: dict[str, str] = field(default_factory=dict)
     time_of_day: tuple[float, bool] = (NOON, False)
     silent: bool = False
+    meanwhile: str = ""
+    dva_watch: DvaWatch = field(default_factory=DvaWatch)
     clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
     _life: int = 0  # what repeats itself belongs to one, and ends with it
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
+    _dva_beats: Subscription | None = None
 
     def __post_init__(self) -> None:
         self.clock = self.network.clock
         self.outbox = Outbox(self.id_tag, *self.time_of_day)
         self.labels[self.id_tag] = self.label
 
-    def register(self, then: Callable[[], object] = do_nothing) -> None:
+    def register(self, then: Callable[[], object] = do_nothing, hears_dva: bool = True) -> None:
         """Make oneself known to the DVA until it has answered, then renew that now and then.
 
         A DVA that was started anew so comes to know everybody again.
 
         Args:
             then: Called when the DVA has answered for the first time.
+            hears_dva: Whether to listen to its heartbeats.
         """
         self._register(then, self._life)
+        self._begin_to_beat(hears_dva)
+
+    def _begin_to_beat(self, hears_dva: bool = True) -> None:
+        """Publish heartbeats, and listen to those of the DVA."""
+        if hears_dva and self._dva_beats is None:
+            hear = self._on_dva_beat
+            self._dva_beats = self.network.subscribe(self.id_tag, self.dva, HEARTBEAT, hear)
         self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
 
     def register_once(
@@ -112,7 +126,7 @@ class AgentDevice:
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
                 self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, self._life)
-                self.clock.every(HEARTBEAT_PERIOD, partial(self._heartbeat, self._life))
+                self._begin_to_beat()
             on_reply(reply)
 
         self.ask(self.dva, self._registration, answered, on_failure)
@@ -121,6 +135,9 @@ class AgentDevice:
         """Send nothing more: the DVA finds out as of any device that falls silent."""
         self.silent = True
         self._life += 1
+        if self._dva_beats is not None:
+            self._dva_beats.close()
+        self._dva_beats, self.dva_watch = None, DvaWatch()
 
     def come_back(self) -> None:
         """Have a new life, and be registered nowhere as yet."""
@@ -167,6 +184,9 @@ class AgentDevice:
 
         def answered(data: bytes) -> None:
             reply = self.reply_to(message, data)
+            if reply is not None and peer == self.dva:
+                self.dva_watch.answered(self.clock.now)
+                self._look_for_dva()
             if reply is None:
                 on_failure()  # what was asked may have been done, but nobody can tell
             else:
@@ -175,7 +195,13 @@ class AgentDevice:
             if reply is not None and reply.code == m.NOT_REGISTERED and peer == self.dva:
                 self.ask(peer, self._registration)  # the next request will be heard
 
-        requester.request(encode(message), answered, on_failure)
+        def failed() -> None:
+            if peer == self.dva:
+                self.dva_watch.failed()
+                self._look_for_dva()
+            on_failure()
+
+        requester.request(encode(message), answered, failed)
 
     def _requester(self, peer: str, urgent: bool) -> Requester:
         """What asks a peer, over a connection of its own for what is urgent."""
@@ -370,7 +396,34 @@ class AgentDevice:
     def _heartbeat(self, life: int) -> bool:
         if life == self._life:
             self.publish(HEARTBEAT, m.Heartbeat())
+            self._look_for_dva()
         return life == self._life
+
+    def _on_dva_beat(self, data: bytes) -> None:
+        message = self.read(data, self.dva)
+        if message is None or not isinstance(message.body, m.Heartbeat):
+            return
+        self.dva_watch.beat(self.clock.now)
+        self._look_for_dva()
+
+    def _look_for_dva(self) -> None:
+        """Say when the DVA has fallen silent, and when it is back."""
+        now, watch = self.clock.now, self.dva_watch
+        if not watch.look(now) or self.silent:
+            return
+        if watch.silent:
+            self.recorder.counters["the DVA was silent to a device"] += 1
+            meanwhile = self.meanwhile and f"; {self.meanwhile}"
+            self.tell(f"{self.dva_alert}{meanwhile}", "link")
+        else:
+            self.tell("hears the DVA again", "link")
+
+    @property
+    def dva_alert(self) -> str:
+        """What a person has to know of a DVA that is silent; empty while it is there."""
+        watch = self.dva_watch
+        silence = f"{watch.silence(self.clock.now):.0f} s"
+        return f"the DVA is silent for {silence}" if watch.silent else ""
 
     def _bad_message(self, error: ProtocolError) -> bytes:
         body = m.Reply(0, error.code, error.reason[:256])

@@ -360,9 +360,9 @@ def keys(
     Existing keys are kept. `dva-sim live --keys FOLDER` uses them.
 
     FOLDER/public/ID.key goes to every machine, and FOLDER/secret/ID.key_secret to the machine of
-    its device alone; the colons of an id are written as hyphens. Both files are text: a line
-    public-key = "..." and, in the secret one, secret-key = "...", each 40 characters in Z85, as the
-    CURVE sockets of ZeroMQ take them.
+    its device alone; the colons of an id are written as hyphens. Both files are text, with a line
+    public-key = KEY and, in the secret one, secret-key = KEY. A key is 40 characters in Z85, in
+    quotes, as the CURVE sockets of ZeroMQ take it.
 
     A device of another make is named by its id. It connects with its own pair, and with the public
     key of the device that it connects to as server key; protocol/README.md shows how, under Keys.

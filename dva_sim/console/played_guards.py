@@ -64,7 +64,7 @@ class PlayedGuards:
                     "label": guard.device.label,
                     "doing": guard.activity,
                     "order": self._order(client, guard),
-                    "alert": guard.alert,
+                    "alert": guard.alert or guard.device.dva_alert,
                 },
             )
 

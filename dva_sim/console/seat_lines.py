@@ -93,7 +93,7 @@ class SeatLines:
             "label": person.device.label,
             "phase": next((phase for phase in PHASES if phase in phases), "free"),
             "order": None if person.order is None else self._order(person.order),
-            "alert": person.alert,
+            "alert": person.alert or person.device.dva_alert,
             "drives": [self._drive(each) for each in held],
         }
 

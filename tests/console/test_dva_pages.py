@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 
 import pytest
@@ -86,6 +87,22 @@ def test_devices_outlast_a_server_that_was_stopped_for_long(page):
     page.do("server_start", port=5555)
     page.let(2.0)
     assert not any(e.silent for e in page.world.run.dva.desk.registry.entries.values())
+
+
+def test_a_person_is_told_for_how_long_the_server_has_been_silent(page):
+    assert page.do("take", robots=[0])[0]
+    page.let(5.0)
+    page.do("server_stop")
+    page.let(15.0)
+    alerts = [line["alert"] for line in page.told("seat") if line["seat"] == page.client]
+    told = dict.fromkeys(alert for alert in alerts if alert)
+    assert len(told) > 2
+    assert all(re.fullmatch(r"the DVA is silent for 1[1-6] s", alert) for alert in told)
+    page.do("server_start", port=5555)
+    page.let(5.0)
+    assert page.seat()["alert"] == ""
+    story = [line["what"] for line in page.told("story")]
+    assert any("the DVA is silent for" in what for what in story)
 
 
 def test_a_stopped_server_decides_and_says_nothing(page):

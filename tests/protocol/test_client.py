@@ -44,10 +44,14 @@ def live_until(clock, condition):
 
 
 def programs_of_the_specification():
-    """The client, the control room, and others; first what gives sockets their keys."""
-    lock, *others = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
+    """The client, the control room, and others; last what the client may have besides.
+
+    That is what listens to the DVA's heartbeats, and what gives sockets their keys.
+    """
+    beats, lock, *others = re.findall(r"```python\n(.*?)```", SPECIFICATION.read_text(), re.DOTALL)
+    assert "def silence(" in beats
     assert "def lock(" in lock
-    return [*others, lock]
+    return [*others, beats, lock]
 
 
 def run(code, dva, clock, folder):
@@ -158,6 +162,20 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
     event = dva.desk.book.get(1)
     assert event.handling.acknowledged.author == me
     assert [f.overrides for f in dva.facts if f.action == "assign"] == [False]
+
+
+def test_a_client_of_another_make_hears_the_heartbeats_of_the_dva(network, tmp_path):
+    client, *_, beats, _ = programs_of_the_specification()
+    stage = Stage(
+        scenarios.build(scenarios.load("drive-to-event"), {}),
+        *(1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))),
+    )
+    dva = add_dva(stage)
+    dva.start()
+    code = client.partition("dva, robot =")[0] + beats
+    code += "while True:\n    before = heard\n    if silence() < 1 and heard != before: break\n"
+    code += "    time.sleep(0.01)\nprint('it is there')\n"
+    assert run(code, dva, network.clock, tmp_path) == ("it is there\n", "")
 
 
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):

@@ -75,6 +75,7 @@ class GuardAgent(OnFoot):
     ) -> None:
         super().__init__(walking, Exposure(device.clock, walking, air))
         self.device, self._walker, self._planner = device, walker, planner
+        device.meanwhile = "an order in hand goes on"
         self._post, self._refuges = walking.place, refuges
         self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
         self.activity = "waiting"

@@ -71,6 +71,7 @@ class PersonGuard(OnFoot):
     ) -> None:
         super().__init__(walking, Exposure(device.clock, walking, air))
         self.device, self._walker, self._planner = device, walker, planner
+        device.meanwhile = "an order in hand goes on"
         self._put, self._contain = put, contain
         self.attended = self.answered = self._needs_help = False
         self.alert = ""

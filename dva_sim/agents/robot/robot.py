@@ -114,6 +114,7 @@ class RobotAgent:
         drive_of: Callable[[str], DriveLog | None],
     ) -> None:
         self.device, self.controller = device, controller
+        device.meanwhile = "it obeys its driver as before"
         self.body, self._world, self._planner, self._setup = body, world, planner, setup
         self._drive_of = drive_of
         self.applied = self.refused = 0

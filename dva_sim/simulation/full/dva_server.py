@@ -6,7 +6,14 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from functools import partial
 
-from dva_sim.agents.device import AUDIT, EVENT, HEARTBEAT, STATUS, AgentDevice
+from dva_sim.agents.device import (
+    AUDIT,
+    EVENT,
+    HEARTBEAT,
+    HEARTBEAT_PERIOD,
+    STATUS,
+    AgentDevice,
+)
 from dva_sim.agents.robot.sensors import sensor_topic
 from dva_sim.core.audit import MOST_KEPT, Fact
 from dva_sim.core.dva import Dva
@@ -18,6 +25,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
+FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
 TICK = 1.0  # how often the desk looks at deadlines [s]
 
 
@@ -63,6 +71,10 @@ class DvaAgent:
             self._attend()
             self._carry_out(self.desk.go_on())
         clock.every(TICK, self._tick, start=clock.now + TICK)
+        clock.every(HEARTBEAT_PERIOD, self._beat, start=clock.now + FIRST_BEAT)
+
+    def _beat(self) -> None:
+        self.device.publish(HEARTBEAT, m.Heartbeat())
 
     def close(self) -> None:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""

@@ -138,7 +138,7 @@ class Field(RunHazards):
         stage = self.stage
         device = stage.device("detector", number)
         device.label = stage.labels[device.id_tag] = label
-        device.register()
+        device.register(hears_dva=False)
         stage.clock.call_at(what.time, self._report, device, incident, what.position)
 
     def _report(self, device: AgentDevice, incident: RunHazard, place: tuple[float, float]) -> None:
