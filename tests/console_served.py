@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from patience import PATIENCE_S
 from websockets.sync.client import ClientConnection, connect
 
-from dva_sim.console.frames import ALIVE, Picture, pack
+from dva_sim.cameras.frames import ALIVE, Picture, pack
 
 HOSTILE = "<script>alert(1)</script>"
 LABELS = ("robot-1", "robot-2", HOSTILE, "robot-4", "robot-5")

@@ -1,163 +1,17 @@
 """The process that draws camera pictures: `python -m dva_sim.console.pictures --fd N --web-fd P`.
 
-It hears from the simulation which frames arrived, and from the web process who is watched; of each
-watched robot it draws the newest frame, in turn. Nobody waits for it, and it waits for nobody: a
-frame or a picture for which there is no time is dropped and counted.
+One socket leads to the simulation, the other one to the web process (`dva_sim.cameras.painting`).
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import select
 import signal
-import socket
 import sys
-import time
 from collections.abc import Sequence
-from typing import Any
 
-from dva_sim.console.drawing import Eyes
-from dva_sim.console.frames import ALIVE, Picture, pack
-
-NICENESS = 3  # the run goes first
-ALIVE_S = 1.0  # so often it says that it lives [s]
-IDLE_S = 0.25  # it looks up at least so often [s]
-AT_ONCE = 1 << 18  # bytes that are read
-RATE_ROOM = 1.25  # of real time: pictures of a robot in a second, of its frames in one of the run
-LEAST_RATE = 12.0  # pictures of a robot in a second that are drawn in any case [1/s]
-MOST_LINE = 1 << 20  # bytes
-
-Line = dict[str, Any]
-
-
-class PaintersEnd:
-    """One end of a socket pair, which never makes its reader or writer wait.
-
-    Attributes:
-        is_open: Whether the other process is there.
-    """
-
-    def __init__(self, number: int) -> None:
-        self._socket = socket.socket(fileno=number)
-        self._socket.setblocking(False)
-        self._rest, self._unsent, self.is_open = b"", b"", True
-
-    def fileno(self) -> int:
-        """Of the socket."""
-        return self._socket.fileno()
-
-    def lines(self) -> list[Line]:
-        """What has come since."""
-        try:
-            data = self._socket.recv(AT_ONCE)
-        except BlockingIOError:
-            return []
-        except OSError:
-            data = b""
-        self.is_open = bool(data)
-        *whole, self._rest = (self._rest + data).split(b"\n")
-        return [json.loads(line) for line in whole]
-
-    def put(self, data: bytes) -> bool:
-        """Write all of it as there is room, or none of it: whether it was taken."""
-        if not self.flush():
-            return False
-        self._unsent = data
-        self.flush()
-        return True
-
-    def flush(self) -> bool:
-        """Write what was begun: True if nothing of it is left."""
-        try:
-            while self._unsent:
-                self._unsent = self._unsent[self._socket.send(self._unsent) :]
-        except BlockingIOError:
-            return False
-        except OSError:
-            self.is_open, self._unsent = False, b""
-        return True
-
-
-class Painter:
-    """Draws what is watched, the newest first.
-
-    Attributes:
-        drawn: Pictures that were drawn.
-        dropped: Frames that were replaced by newer ones before they were drawn, and pictures that
-            nobody took.
-    """
-
-    def __init__(self) -> None:
-        self._eyes: Eyes | None = None
-        self._frames: dict[int, Line] = {}
-        self._due: dict[int, float] = {}
-        self._watched: frozenset[int] = frozenset()
-        self.drawn = self.dropped = 0
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether the site is built, which takes seconds."""
-        return self._eyes is not None
-
-    def hear(self, line: Line) -> None:
-        """Take a line, whoever says it."""
-        kind = line.get("k")
-        if "watch" in line:
-            self._watch(frozenset(line["watch"]))
-        elif kind == "scene":
-            self._eyes = Eyes(line["scenario"], line["seed"])
-        elif kind == "contain" and self._eyes is not None:
-            self._eyes.contain(line["n"], line["t"] / 1000)
-        elif kind == "frame" and line["robot"] in self._watched:
-            self.dropped += self._frames.pop(line["robot"], None) is not None
-            self._frames[line["robot"]] = line
-
-    def _watch(self, robots: frozenset[int]) -> None:
-        self._watched = robots
-        self._frames = {robot: f for robot, f in self._frames.items() if robot in robots}
-        self._due = {robot: due for robot, due in self._due.items() if robot in robots}
-
-    def wait(self, now: float) -> float:
-        """How long nothing has to be drawn [s]."""
-        due = [self._due.get(robot, now) - now for robot in self._frames]
-        return max(0.0, min([*due, IDLE_S]))
-
-    def draw(self, now: float) -> Picture | None:
-        """The picture that has waited longest, if one is due at `now` [s]."""
-        ready = [robot for robot in self._frames if self._due.get(robot, now) <= now]
-        if self._eyes is None or not ready:
-            return None
-        robot = min(ready, key=lambda robot: self._due.get(robot, 0.0))
-        frame = self._frames.pop(robot)
-        self._due[robot] = now + 1.0 / max(LEAST_RATE, RATE_ROOM * self._eyes.rate)
-        self.drawn += 1
-        jpeg = self._eyes.jpeg(frame)
-        captured, arrived = round(frame["captured_ms"]), round(frame["t"])
-        return Picture(robot, frame["number"], captured, arrived, jpeg)
-
-
-def run(world: PaintersEnd, web: PaintersEnd) -> Painter:
-    """Draw until one of both has ended."""
-    painter, alive = Painter(), 0.0
-    while world.is_open and web.is_open:
-        wait = painter.wait(time.monotonic())
-        ready, _, _ = select.select([world, web], [], [], wait)
-        for end in ready:
-            for line in end.lines():
-                painter.hear(line)
-        now = time.monotonic()
-        if (
-            painter.is_ready
-            and now - alive >= ALIVE_S
-            and web.put(pack(Picture(ALIVE, painter.drawn, 0, 0, b"")))
-        ):
-            alive = now
-        picture = painter.draw(now) if web.flush() else None
-        if picture is not None and not web.put(pack(picture)):
-            painter.dropped += 1
-    return painter
+from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
 
 
 def main(given: Sequence[str] | None = None) -> int:

@@ -17,7 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from dva_sim.console.children import END_WITHIN, Child
+from dva_sim.cameras.children import END_WITHIN, Child
 from dva_sim.console.options import PageOptions
 from dva_sim.network.realtime import PacedClock
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dva_sim.console.children import ChildFailed
+from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.refusal import Refused

@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from dva_sim.agents.observation import CameraFrame, Cameras
+from dva_sim.agents.observation import Cameras
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.screens import OwnScreens, camera_url, topic_of
 from dva_sim.console.feed import Feed
 from dva_sim.console.lag import LagRule
 from dva_sim.console.logs import PERIOD, Logs
@@ -21,7 +22,6 @@ from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robot_station import LISTENING, OwnStation
 from dva_sim.console.robot_windows import RobotWindows
 from dva_sim.console.scene import scene_of
-from dva_sim.console.screens import Screens, camera_url, topic_of
 from dva_sim.console.stands import why_stands
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
@@ -42,22 +42,6 @@ Tell = Callable[..., object]
 POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
 PAGES = "robots", "map"
-
-
-class OwnCamera(Screens):
-    """The robot's camera as its own page sees it: without a network between."""
-
-    def _subscribe(self) -> None:
-        """Nobody has to be asked for the pictures."""
-
-    def takes(self, robot: RobotAgent, now: float) -> None:
-        """A picture is taken, if somebody looks and the camera works."""
-        id_tag = robot.device.id_tag
-        if id_tag not in self._watched or robot.blind or robot.device.silent:
-            return
-        frame = CameraFrame(robot.observe(), now)
-        self._film(id_tag, frame)
-        self.arrived(id_tag, frame)
 
 
 class RobotWorld:
@@ -160,10 +144,10 @@ class RobotWorld:
             self.network, lambda label: id_tag if label == robot.device.label else None
         )
         self.logs.listen(robot.device.label, partial(self.windows.heard, id_tag), publications=True)
-        self.screens = OwnCamera(
+        self.screens = OwnScreens(
             self, id_of("console", 1), self.feed.numbers, lambda line, key: self.show(line, key)
         )
-        self.clock.every(1.0 / self.scenario.camera.rate_hz, self._film)
+        self.clock.every(1.0 / self.scenario.camera.rate_hz, self.screens.look)
         self.clock.every(WATCH_PERIOD, self._check_rules)
 
     def _check_rules(self) -> None:
@@ -264,9 +248,6 @@ class RobotWorld:
         if self._newest.get(line["k"]) != said:
             self._newest[line["k"]] = said
             self.tell(line)
-
-    def _film(self) -> None:
-        self.screens.takes(self.robot, self.clock.now)
 
     def _late(self, behind: float) -> None:
         if self.lag.measured(time.monotonic(), behind):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.screens import Screens
 from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audited import Audited
 from dva_sim.console.decisions import about_event
@@ -21,7 +22,6 @@ from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robot_windows import RobotWindows
 from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.scene import scene_of
-from dva_sim.console.screens import Screens
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders
 from dva_sim.console.stands import why_stands

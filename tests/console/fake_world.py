@@ -32,7 +32,7 @@ from fake_dva import FakeDva  # noqa: E402
 from fake_phones import FakePhone, PhoneDesk  # noqa: E402
 from fake_scene import LINK, Scene, Walker  # noqa: E402
 
-from dva_sim.console.frames import ALIVE, Picture, pack  # noqa: E402
+from dva_sim.cameras.frames import ALIVE, Picture, pack  # noqa: E402
 
 STEP = 0.02  # [s]
 

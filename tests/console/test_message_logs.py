@@ -10,8 +10,8 @@ from console_served import HOSTILE, scene
 from logged_messages import DVA, PHONE, ROBOT, asks, batch, line, said
 from lxml import etree
 
+from dva_sim.cameras.pipes import MOST_WAITING, LineOutbox
 from dva_sim.console.logs import BATCH, BATCH_BYTES, CUT, Logs
-from dva_sim.console.pipes import MOST_WAITING, LineOutbox
 from dva_sim.console.web.checks import BadMessage
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.log_entries import Entry

@@ -14,9 +14,9 @@ import pytest
 from patience import PATIENCE_S
 from PIL import Image
 
-from dva_sim.console.drawing import BEST, WORST, Encoder, Eyes
-from dva_sim.console.frames import ALIVE, Picture, Unpacker
-from dva_sim.console.pictures import LEAST_RATE, Painter
+from dva_sim.cameras.drawing import BEST, WORST, Encoder, Eyes
+from dva_sim.cameras.frames import ALIVE, Picture, Unpacker
+from dva_sim.cameras.painting import LEAST_RATE, Painter
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.full.hazards import draw_incidents
 from dva_sim.simulation.scenario import Scenario, site_of

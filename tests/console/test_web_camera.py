@@ -16,7 +16,7 @@ from console_served import Served, serving
 from patience import PATIENCE_S, becomes
 from PIL import Image
 
-from dva_sim.console.frames import Picture, pack
+from dva_sim.cameras.frames import Picture, pack
 
 
 def jpeg(shade: int, size: int = 0) -> bytes:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dva_sim.console.children import ChildFailed
+from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.replay.player import Player, playing

@@ -14,7 +14,7 @@ from dva_sim.console.web.access import Entrance, Role, Tokens, rules
 from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
 from dva_sim.console.web.audit import AuditPages
-from dva_sim.console.web.camera import CameraStreams
+from dva_sim.console.web.camera import ConsoleCameras
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import NoCertificate
 from dva_sim.console.web.port_listener import fitting_places
@@ -67,7 +67,7 @@ async def run(options: argparse.Namespace) -> None:
     phones, told = _phones(options, tokens)
     simulation = Simulation()
     hub = Hub(simulation)
-    cameras = CameraStreams(simulation, hub.clients.watched)
+    cameras = ConsoleCameras(simulation, hub.clients.watched)
     hub.watching = cameras.tell
     ended = simulation.ended
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
@@ -109,7 +109,7 @@ def _phones(options: argparse.Namespace, tokens: Tokens) -> tuple[PhoneListener 
     return listener, list(listener.told)
 
 
-async def _close_when(ended: asyncio.Event, hub: Hub, cameras: CameraStreams) -> None:
+async def _close_when(ended: asyncio.Event, hub: Hub, cameras: ConsoleCameras) -> None:
     await ended.wait()
     cameras.close()
     await hub.close(hub.simulation.why or "the console was ended")

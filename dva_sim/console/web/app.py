@@ -20,9 +20,10 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from dva_sim.cameras.streaming import PictureStream
+from dva_sim.cameras.streams import CameraStreams, headers_of
 from dva_sim.console.web.access import Asked, Entrance, Role
 from dva_sim.console.web.audit import AuditPages
-from dva_sim.console.web.camera import CameraStreams, headers_of
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
@@ -30,7 +31,6 @@ from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.sockets import place_of
 from dva_sim.console.web.static_files import StaticFiles
-from dva_sim.console.web.streaming import PictureStream
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from dva_sim.console.pipes import LinePipe
+from dva_sim.cameras.pipes import LinePipe
 from dva_sim.kernel.errors import ERROR, RunsFailed
 
 SERVING_WITHIN = 30.0  # from the start of the web process to its first word [s]

@@ -8,8 +8,8 @@ from contextlib import aclosing, suppress
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from dva_sim.console.web.camera import BOUNDARY, CameraStreams, Viewer
-from dva_sim.console.web.sockets import wire_of
+from dva_sim.cameras.http import wire_of
+from dva_sim.cameras.streams import BOUNDARY, CameraStreams, Viewer
 
 STALLED = 5.0  # a viewer that has not taken a picture within this is cut [s]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dva_sim.console.frames import JPEG_END as END
-from dva_sim.console.frames import MAGIC, Picture, Unpacker, pack
+from dva_sim.cameras.frames import JPEG_END as END
+from dva_sim.cameras.frames import MAGIC, Picture, Unpacker, pack
 
 pictures = st.builds(
     Picture,

@@ -10,17 +10,39 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from dva_sim.agents.observation import FRAME, CameraFrame
 from dva_sim.agents.people.bystander import SAFE
-from dva_sim.console.played_run import PlayedRun
-from dva_sim.network.messaging import Subscription
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.messaging import Subscription, Transport
+from dva_sim.simulation.full.physical_world import Field
+from dva_sim.simulation.scenario import Scenario
 
 Line = dict[str, Any]
 MOST_UNDER_WAY = 400  # frames of a robot
 BEYOND = 2.0  # how much farther than the camera's range people are drawn
 LEAST_SEEN = 25.0  # people are drawn so far away in any case [m]
+
+
+class FilmedRun(Protocol):
+    """A run whose robots have cameras."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What it consists of."""
+
+    @property
+    def clock(self) -> Clock:
+        """Its time."""
+
+    @property
+    def network(self) -> Transport:
+        """What carries its frames."""
+
+    @property
+    def field(self) -> Field:
+        """Everything that has a place."""
 
 
 class Screens:
@@ -35,7 +57,7 @@ class Screens:
 
     def __init__(
         self,
-        run: PlayedRun,
+        run: FilmedRun,
         screen: str,
         numbers: dict[str, int],
         tell: Callable[[Line, int], object],
@@ -133,6 +155,23 @@ class Screens:
     ) -> list[Any]:
         place = round(x, 3), round(y, 3), round(heading, 3)
         return [kind, self._numbers[name], *place, doing]
+
+
+class OwnScreens(Screens):
+    """Cameras as seen at the robots themselves: without a network between."""
+
+    def _subscribe(self) -> None:
+        """Nobody has to be asked for the pictures."""
+
+    def look(self) -> None:
+        """Take a picture with each camera that somebody looks at and that works."""
+        now = self._run.clock.now
+        for id_tag in self._watched:
+            robot = self._run.field.robots[id_tag]
+            if not robot.blind and not robot.device.silent:
+                frame = CameraFrame(robot.observe(), now)
+                self._film(id_tag, frame)
+                self.arrived(id_tag, frame)
 
 
 def camera_url(base: str, label: str) -> str:

@@ -1,0 +1,204 @@
+"""Pictures of robots' cameras as streams that any browser or player shows.
+
+A picture is drawn once, whoever looks; while nobody looks, nothing is drawn. A slow viewer gets
+the newest picture when it is ready for one, and never those between.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import AsyncGenerator, Callable, Iterable
+from dataclasses import dataclass
+
+from dva_sim.cameras.frames import ALIVE, Picture, Unpacker
+
+BOUNDARY = "dva-sim-frame"
+LINGERS = 1.0  # a robot is drawn so long after the last viewer left [s]
+SILENCE = 3.0  # of who draws, after which there is no picture [s]
+STARTING = 60.0  # before the first word, which comes when the site is built [s]
+ONE_WITHIN = 8.0  # a single picture is waited for so long [s]; links may be slow
+FRESH = 1.0  # a single picture that came so long ago is not waited for [s]
+MOST_VIEWERS = 64
+
+
+@dataclass(eq=False)
+class Viewer:
+    """Somebody who looks at the pictures of a robot.
+
+    Attributes:
+        robot: Which, by its index.
+        rank: Of the viewer's role: one of a higher rank may take the place.
+        is_over: Whether the viewer has to leave, or has left.
+    """
+
+    robot: int
+    rank: int
+    is_over: bool = False
+
+
+class CameraStreams:
+    """The newest picture of each robot that is looked at.
+
+    Args:
+        watch: Told which robots are watched, by their numbers, and whether that is new.
+        said: Robots that are watched elsewhere.
+
+    Attributes:
+        skipped: Pictures that viewers were too slow for.
+    """
+
+    def __init__(
+        self,
+        watch: Callable[[list[int], bool], object],
+        said: Callable[[], Iterable[int]] = tuple,
+    ) -> None:
+        self._watch, self._said = watch, said
+        self._unpacker = Unpacker()
+        self._newest: dict[int, tuple[Picture, float]] = {}
+        self._drawn = asyncio.Condition()
+        self._viewers: dict[Viewer, None] = {}  # in the order in which they came
+        self._lingering: Counter[int] = Counter()
+        self._told: frozenset[int] = frozenset()
+        self._deadline = 0.0
+        self._notified: set[asyncio.Task[None]] = set()
+        self._is_over = False
+        self.skipped = 0
+
+    def begin(self) -> None:
+        """Somebody draws from now on, and will say so in a while."""
+        self._deadline = time.monotonic() + STARTING
+
+    @property
+    def draws(self) -> bool:
+        """Whether somebody is there who draws."""
+        return not self._is_over and time.monotonic() < self._deadline
+
+    # --- pictures in ---------------------------------------------------------------------
+
+    def take(self, data: bytes) -> None:
+        """Take a piece of what whoever draws has written."""
+        now = time.monotonic()
+        self._deadline = max(self._deadline, now + SILENCE)
+        for picture in self._unpacker.feed(data):
+            if picture.robot != ALIVE:
+                self._newest[picture.robot] = picture, now
+        self._wake()
+
+    def _wake(self) -> None:
+        task = asyncio.ensure_future(self._notify())
+        self._notified.add(task)
+        task.add_done_callback(self._notified.discard)
+
+    async def _notify(self) -> None:
+        async with self._drawn:
+            self._drawn.notify_all()
+
+    # --- who looks -----------------------------------------------------------------------
+
+    def tell(self, again: bool = False) -> None:
+        """Say who is watched, if that is new."""
+        looked_at = {viewer.robot for viewer in self._viewers}
+        robots = frozenset(looked_at | self._lingering.keys()) | frozenset(self._said())
+        new = robots != self._told
+        self._told = robots
+        if new or (again and robots):
+            self._watch(sorted(robots), new)
+
+    def admit(self, robot: int, rank: int) -> Viewer | None:
+        """Return a new viewer; None if there are too many, and none of a lower rank.
+
+        One of a lower rank has to leave for one of a higher rank.
+        """
+        if len(self._viewers) >= MOST_VIEWERS:
+            least = min(self._viewers, key=lambda viewer: viewer.rank)
+            if least.rank >= rank:
+                return None
+            least.is_over = True
+            self.leave(least)
+            self._wake()
+        viewer = Viewer(robot, rank)
+        self._viewers[viewer] = None
+        self.tell()
+        return viewer
+
+    def leave(self, viewer: Viewer) -> None:
+        """A viewer is gone; the robot is drawn a little longer. May be repeated."""
+        if viewer in self._viewers:
+            del self._viewers[viewer]
+            self._lingering[viewer.robot] += 1
+            asyncio.get_running_loop().call_later(LINGERS, self._linger_no_more, viewer.robot)
+
+    def _linger_no_more(self, robot: int) -> None:
+        self._lingering[robot] -= 1
+        self._lingering = +self._lingering
+        if robot not in self._lingering and all(v.robot != robot for v in self._viewers):
+            self._newest.pop(robot, None)
+        self.tell()
+
+    # --- pictures out --------------------------------------------------------------------
+
+    async def stream(self, viewer: Viewer) -> AsyncGenerator[bytes, None]:
+        """Pictures as parts of a response, each newer than the one before."""
+        try:
+            yield f"--{BOUNDARY}\r\n".encode()
+            shown: Picture | None = None
+            while (picture := await self._after(viewer, shown)) is not None:
+                if shown is not None and picture.number > shown.number + 1:
+                    self.skipped += picture.number - shown.number - 1
+                shown = picture
+                yield part(picture)
+        finally:
+            self.leave(viewer)
+
+    async def one(self, viewer: Viewer) -> Picture | None:
+        """The newest picture; None if there is none for too long."""
+        try:
+            known = self._newest.get(viewer.robot)
+            if known is not None and time.monotonic() - known[1] < FRESH:
+                return known[0]
+            async with asyncio.timeout(ONE_WITHIN if self.draws else 0.0):
+                return await self._after(viewer, known[0] if known else None)
+        except TimeoutError:
+            return None
+        finally:
+            self.leave(viewer)
+
+    async def _after(self, viewer: Viewer, shown: Picture | None) -> Picture | None:
+        """The newest picture once it is another one; None if there will be no more."""
+        robot = viewer.robot
+
+        def is_new() -> bool:
+            return robot in self._newest and self._newest[robot][0] is not shown
+
+        def is_over() -> bool:
+            return self._is_over or viewer.is_over
+
+        async with self._drawn:
+            await self._drawn.wait_for(lambda: is_over() or is_new())
+        return None if is_over() else self._newest[robot][0]
+
+    def close(self) -> None:
+        """Take no more pictures, and end all streams."""
+        self._is_over = True
+        self._wake()
+
+
+def part(picture: Picture) -> bytes:
+    """A picture as a part of a multipart response, with the boundary behind it.
+
+    A viewer shows a picture when it knows that it is whole: the next boundary says so at once.
+    """
+    head = "".join(f"{name}: {value}\r\n" for name, value in headers_of(picture).items())
+    head += f"Content-Type: image/jpeg\r\nContent-Length: {len(picture.jpeg)}\r\n\r\n"
+    return head.encode() + picture.jpeg + f"\r\n--{BOUNDARY}\r\n".encode()
+
+
+def headers_of(picture: Picture) -> dict[str, str]:
+    """What a picture says about itself, in virtual time [ms]."""
+    return {
+        "X-Frame-Number": str(picture.number),
+        "X-Frame-Time-Ms": str(picture.captured_ms),
+        "X-Arrived-Ms": str(picture.arrived_ms),
+    }
