@@ -119,6 +119,14 @@ def live(
         ),
     ] = 0,
     keys: Annotated[Path | None, folder("Folder of keys: CURVE is on.")] = None,
+    camera_port: Annotated[
+        int | None,
+        count(
+            "Port of the robots' pictures (HTTP); default: 8764, with --keys none. 0: any.",
+            metavar="PORT",
+            most=65_535,
+        ),
+    ] = None,
     record: Annotated[
         Path | None,
         Option(metavar="FILE|FOLDER", help="A recording (.mcap); or a folder of traces."),
@@ -156,6 +164,7 @@ def live(
     options = LiveOptions(
         *(scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds),
         overwrite=overwrite,
+        camera_port=camera_port,
     )
     with loudness(quiet, verbose):
         if only is None:

@@ -67,6 +67,7 @@ class KeptResults:
         was_left = is_left(out) and not overwrite
         if was_left:
             complete(out)
+        self._is_new = not out.exists()
         self._lock = FolderLock(out)
         try:
             if any(path.name != LOCK for path in out.iterdir()) and not overwrite:
@@ -81,10 +82,11 @@ class KeptResults:
             raise
 
     def close(self) -> None:
-        """Let others write into the folder; nothing is left of it where nothing was kept."""
+        """Let others write into the folder; a new one in which nothing was kept is removed."""
         self._lock.close()
-        with suppress(OSError):
-            self._out.rmdir()
+        if self._is_new:
+            with suppress(OSError):
+                self._out.rmdir()
 
     def follow(self, world: ConsoleWorld) -> None:
         """Keep from now on what happens: who drives, with what, and all that is measured.

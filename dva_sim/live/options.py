@@ -18,6 +18,7 @@ from dva_sim.simulation.scenario import Scenario, build, load
 
 PARTS = ("dva", "world", "operator")
 PATHS = ("keys", "record", "state")  # options that name files
+CAMERA_PORT = 8764  # of the robots' pictures; if it is taken, any that is free
 TRACED = {None: "*", "dva": "dva", "world": "robot-*", "operator": ""}  # by who is run alone
 OPERATORS = ("simulated", "scripted")
 
@@ -39,6 +40,7 @@ class LiveOptions:
         state: File in which the DVA keeps what must survive it; None: it keeps nothing.
         duration: How long the run lasts [s]; None: to the scenario's horizon.
         overwrite: What was recorded before may be replaced.
+        camera_port: Port of the robots' pictures; None: the usual one, and with keys none.
     """
 
     scenario: str
@@ -53,6 +55,12 @@ class LiveOptions:
     state: Path | None = None
     duration: float | None = None
     overwrite: bool = False
+    camera_port: int | None = None
+
+    @property
+    def shows_pictures(self) -> bool:
+        """Whether the robots' pictures are served: with keys, which HTTP lacks, if asked for."""
+        return self.keys is None or self.camera_port is not None
 
     @property
     def records_run(self) -> bool:

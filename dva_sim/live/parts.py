@@ -9,6 +9,7 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any, Protocol
@@ -17,14 +18,17 @@ from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.operator.scripted import ScriptedOperator, drill
 from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.service import CameraService
 from dva_sim.core.events import Event
 from dva_sim.core.registry import MAX_DEVICES, DeviceEntry
 from dva_sim.core.sessions import Permissions
 from dva_sim.core.store import Store
+from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
 from dva_sim.live.options import PARTS, LiveOptions, trace_of
 from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_facts
+from dva_sim.network.messaging import Transport
 from dva_sim.protocol.exchange import LOW_BITS
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.dva_trace import traced
@@ -32,6 +36,7 @@ from dva_sim.simulation.full.observations import STANDS, FactLog, motion_of, pag
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import FILM_PERIOD, WATCH_PERIOD
 from dva_sim.simulation.full.stage import Stage
+from dva_sim.simulation.scenario import Scenario
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
 SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years
@@ -179,6 +184,16 @@ def _devices_that_fit() -> int:
     return max(1, min(MAX_DEVICES, (usable - FILES_APART) // FILES_PER_DEVICE))
 
 
+@dataclass(frozen=True)
+class _FilmedWorld:
+    """What a service of pictures has to know of the world; see `FilmedRun`."""
+
+    scenario: Scenario
+    clock: Clock
+    network: Transport
+    field: Field
+
+
 class WorldPart:
     """Robots, guards, hazards and the physics of a site."""
 
@@ -205,6 +220,12 @@ class WorldPart:
         clock = self._stage.clock
         clock.every(FILM_PERIOD, partial(self._sample, recorder, log))
         clock.every(WATCH_PERIOD, lambda: log.places(clock.now, self._field.places()))
+
+    def film(self, service: CameraService) -> None:
+        """Let a service show what the robots see."""
+        stage = self._stage
+        run = _FilmedWorld(stage.scenario, stage.clock, stage.network, self._field)
+        service.film(run, stage.seed)
 
     def _sample(self, recorder: LiveRecorder, log: FactLog) -> None:
         now, field = self._stage.clock.now, self._field

@@ -9,12 +9,16 @@ import socket
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
+from dva_sim.agents.observation import OVER_ZMQ, Cameras, topic_in
+from dva_sim.cameras.screens import topic_of
+from dva_sim.cameras.service import CameraService
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
-from dva_sim.live.options import LiveOptions
-from dva_sim.live.parts import DvaPart, LivePart, make_part
+from dva_sim.live.options import CAMERA_PORT, LiveOptions
+from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
 from dva_sim.live.pipes import Outlet
 from dva_sim.live.recording import LiveRecorder, RunKeeping
 from dva_sim.network.keys import KeyRing
@@ -127,13 +131,26 @@ def _run_part(
     team = frozenset(team_of(scenario))
     recorder.is_own = team.__contains__ if supervised else network.is_here
     network.watcher = recorder.message
-    try:
+    with ExitStack() as at_end:
+        at_end.callback(network.close)
         joining = _joining(network, options, name)
-        stage = Stage(scenario, options.seed, network, recorder, joining, _time_of_day(clock))
+        service = None
+        if name == "world" and options.shows_pictures:
+            port = CAMERA_PORT if options.camera_port is None else options.camera_port
+            service = CameraService(options.host, port, clock, tell)
+            at_end.callback(service.close)
+        url = OVER_ZMQ.url if service is None else service.url
+        cameras = Cameras(url, lambda url: topic_in(url) or topic_of(url))
+        stage = Stage(
+            *(scenario, options.seed, network, recorder, joining, _time_of_day(clock)),
+            cameras=cameras,
+        )
         if options.dva is not None and name != "dva":
             network.introduce(DVA, options.dva)
         part = make_part(name, stage, options, number)
         recorder.here(device.id_tag for device in stage.devices)
+        if service is not None and isinstance(part, WorldPart):
+            part.film(service)
         gc.freeze()  # what stays for the whole run is not looked through again and again
         reporter = _Reporter(name, number, stage, part, network)
         clock.every(REPORT_PERIOD, lambda: say(reporter.report()))
@@ -150,8 +167,6 @@ def _run_part(
             part.finish()
             clock.run(clock.now + LAST_WORDS)
         say(reporter.report())
-    finally:
-        network.close()
 
 
 def _refuse_to_be_alone(

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dva_sim.cameras.http import listen, serve
+from dva_sim.cameras.port_listener import fitting_places
 from dva_sim.console.web.access import Entrance, Role, Tokens, rules
 from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
@@ -17,8 +19,7 @@ from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import ConsoleCameras
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.phones import NoCertificate
-from dva_sim.console.web.port_listener import fitting_places
-from dva_sim.console.web.server import listen, make_server, serve
+from dva_sim.console.web.server import make_server
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.kernel.errors import DvaSimError

@@ -20,6 +20,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from dva_sim.cameras.http import place_of
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import CameraStreams, headers_of
 from dva_sim.console.web.access import Asked, Entrance, Role
@@ -29,7 +30,6 @@ from dva_sim.console.web.log_requests import LogRequests
 from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePages
 from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
-from dva_sim.console.web.sockets import place_of
 from dva_sim.console.web.static_files import StaticFiles
 
 POLICY = (

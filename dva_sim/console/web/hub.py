@@ -14,12 +14,13 @@ from typing import Any
 from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
+from dva_sim.cameras.http import wire_of
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import SILENT, Bucket, asked_of, check_role, id_of, read
 from dva_sim.console.web.checks import BadMessage, robots
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
-from dva_sim.console.web.sockets import heard, say, wire_of
+from dva_sim.console.web.sockets import heard, say
 from dva_sim.console.web.state import body_of, encode
 
 LOOKS_RATE, LOOKS_BURST = 20.0, 60  # messages of a page that looks [1/s]

@@ -2,15 +2,13 @@
 
 Anybody can open a connection, so one on which no token was shown never keeps out another: it is cut
 after a few seconds, and at once if all places are taken. Connections with a token yield to those
-with a token of a higher role. Pure: without a clock and without sockets.
+with a token of a higher rank. Pure: without a clock and without sockets.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-
-from dva_sim.console.web.access import Role
 
 MOST = 512  # connections of a port
 MOST_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
@@ -25,31 +23,31 @@ class PortConnection:
     Attributes:
         places: The connections that it is one of.
         since: When it was made, or its newest request began or ended [s].
-        role: The role that its newest request showed.
+        rank: Of the role that its newest request showed; 0: no token.
         busy: Whether it is being set up, a request is in progress, or a WebSocket is open.
         drop: Cuts the connection.
     """
 
     places: PortConnections = field(repr=False)
     since: float
-    role: Role = Role.NOBODY
+    rank: int = 0
     busy: bool = False
     drop: Callable[[], object] = field(default=lambda: None, repr=False)
 
     @property
     def is_served(self) -> bool:
         """Whether a request with a token is in progress."""
-        return self.busy and self.role > Role.NOBODY
+        return self.busy and self.rank > 0
 
-    def begin(self, role: Role, now: float, *, is_limited: bool = True) -> bool:
+    def begin(self, rank: int, now: float, *, is_limited: bool = True) -> bool:
         """Note a request: False if it has to be refused, as too many are in progress.
 
         Args:
-            role: Shown with the request.
+            rank: Of the role that the request shows; 0: no token.
             now: Time [s].
             is_limited: Whether the limit applies to it.
         """
-        self.role, self.busy, self.since = role, True, now
+        self.rank, self.busy, self.since = rank, True, now
         return not (is_limited and self.is_served) or self.places.bear(self)
 
     def end(self, now: float) -> None:
@@ -76,7 +74,7 @@ class PortConnections:
     def __init__(self, most: int = MOST, most_served: int = MOST_SERVED) -> None:
         self._most, self._most_served = most, most_served
         self.taken: dict[PortConnection, None] = {}
-        self.dropped = {"silent": 0, "for a newcomer": 0, "for a higher role": 0}
+        self.dropped = {"silent": 0, "for a newcomer": 0, "for a higher rank": 0}
 
     def enter(self, now: float) -> PortConnection:
         """Return the place of a new connection; if all are taken, another connection is cut."""
@@ -88,20 +86,20 @@ class PortConnections:
         return place
 
     def bear(self, place: PortConnection) -> bool:
-        """Return whether a request may be served; a lower role's connection may be cut for it."""
+        """Return whether a request may be served; a lower rank's connection may be cut for it."""
         served = [each for each in self.taken if each.is_served]
         if len(served) <= self._most_served:
             return True
         least = min(served, key=_importance)
-        if least.role >= place.role:
+        if least.rank >= place.rank:
             return False
-        self._drop(least, "for a higher role")
+        self._drop(least, "for a higher rank")
         return True
 
     def sweep(self, now: float) -> None:
         """Cut the connections that have been silent for too long."""
         for place in list(self.taken):
-            if not place.is_served and now - place.since > (IDLE if place.role else SILENT):
+            if not place.is_served and now - place.since > (IDLE if place.rank else SILENT):
                 self._drop(place, "silent")
 
     def _drop(self, place: PortConnection, why: str) -> None:
@@ -110,5 +108,5 @@ class PortConnections:
         place.drop()
 
 
-def _importance(place: PortConnection) -> tuple[Role, bool, float]:
-    return place.role, place.busy, place.since
+def _importance(place: PortConnection) -> tuple[int, bool, float]:
+    return place.rank, place.busy, place.since

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from dva_sim.console.web.port_connections import (
+from dva_sim.cameras.port_connections import (
     MOST,
     MOST_SERVED,
     SILENT,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dva_sim.cameras.port_connections import IDLE, SILENT, PortConnections
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.port_connections import IDLE, SILENT, PortConnections
 
 
 def entered(places, now, cut, name):

@@ -1,0 +1,195 @@
+"""The process that draws and serves the pictures of a run: `python -m dva_sim.cameras --fd N ...`.
+
+It ends when its socket to the run does. Drawing has a thread; serving has the main one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from dva_sim.cameras.frames import MOST_PICTURE
+from dva_sim.cameras.http import HttpProtocol, Server, place_of, serve
+from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
+from dva_sim.cameras.port_listener import fitting_places
+from dva_sim.cameras.streaming import PictureStream
+from dva_sim.cameras.streams import MOST_VIEWERS, CameraStreams, headers_of
+
+ANYBODY = 1  # rank of all viewers: nobody shows a token here
+MOST_REQUEST = 16 * 1024  # of which a path and headers consist [B]
+REPEATED = 1.0  # so often is said again who is watched [s]
+NOT_KEPT = {"Cache-Control": "no-store"}
+
+
+class CameraPages:
+    """What can be asked for.
+
+    Args:
+        streams: The pictures.
+        labels: Of the robots, in the order of their numbers.
+    """
+
+    def __init__(self, streams: CameraStreams, labels: Sequence[str]) -> None:
+        self._streams = streams
+        self._numbers = {label: number for number, label in enumerate(labels)}
+
+    async def stream(self, request: Request) -> Response:
+        """`GET /camera/LABEL.mjpg`."""
+        robot = self._robot(request)
+        if request.method == "HEAD":
+            return Response(headers=NOT_KEPT, media_type=PictureStream.media_type)
+        viewer = self._streams.admit(robot, ANYBODY)
+        if viewer is None:
+            raise HTTPException(503, f"{MOST_VIEWERS} viewers are looking already")
+        return PictureStream(self._streams, viewer)
+
+    async def still(self, request: Request) -> Response:
+        """`GET /camera/LABEL.jpg`."""
+        robot = self._robot(request)
+        viewer = self._streams.admit(robot, ANYBODY)
+        picture = None if viewer is None else await self._streams.one(viewer)
+        if picture is None:
+            raise HTTPException(503, "no picture")
+        headers = headers_of(picture) | NOT_KEPT
+        return Response(picture.jpeg, headers=headers, media_type="image/jpeg")
+
+    def _robot(self, request: Request) -> int:
+        number = self._numbers.get(request.path_params["label"])
+        if number is None:
+            raise HTTPException(
+                404, f"there is no such robot; there are: {', '.join(self._numbers)}"
+            )
+        return number
+
+
+async def _refused(_: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    headers = dict(error.headers or {}) | NOT_KEPT
+    return PlainTextResponse(f"{error.detail}\n", error.status_code, headers=headers)
+
+
+class _Watch:
+    """Says to the run, and to who draws, which robots are watched; neither is waited for."""
+
+    def __init__(self, *ends: socket.socket) -> None:
+        self._ends = ends
+
+    def __call__(self, robots: list[int], is_new: bool) -> None:
+        line = json.dumps({"watch": robots}).encode() + b"\n"
+        for end in self._ends:
+            with suppress(OSError):
+                end.send(line, socket.MSG_DONTWAIT)
+
+
+async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> None:
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    painter, ours = socket.socketpair()
+    ours.setblocking(False)
+    to_world = socket.socket(fileno=os.dup(world))
+    streams = CameraStreams(_Watch(to_world, ours))
+    streams.begin()
+
+    def draw() -> None:
+        try:
+            run(PaintersEnd(world), PaintersEnd(painter.detach()))
+        finally:
+            loop.call_soon_threadsafe(ended.set)
+
+    async def take() -> None:
+        while data := await loop.sock_recv(ours, MOST_PICTURE):
+            streams.take(data)
+
+    async def say_again() -> None:
+        while True:
+            streams.tell(again=True)
+            await asyncio.sleep(REPEATED)
+
+    threading.Thread(target=draw, daemon=True).start()
+    tasks = [asyncio.ensure_future(take()), asyncio.ensure_future(say_again())]
+    pages = CameraPages(streams, labels)
+    routes = [
+        Route("/camera/{label:path}.mjpg", pages.stream),
+        Route("/camera/{label:path}.jpg", pages.still),
+    ]
+    app = Starlette(routes=routes, exception_handlers={HTTPException: _refused})
+    closing = asyncio.ensure_future(_close_when(ended, streams))
+    await serve(Server(_config(_counted(app))), listener, fitting_places(1), ended)
+    for task in (*tasks, closing):
+        task.cancel()
+    ours.close()
+
+
+def _counted(app: ASGIApp) -> ASGIApp:
+    """An application whose connections count as served while a request is in progress."""
+
+    async def counted(scope: Scope, receive: Receive, send: Send) -> None:
+        place = place_of(scope)
+        served = place.begin(ANYBODY, time.monotonic())
+        answer = app if served else PlainTextResponse("too many connections are in use\n", 503)
+        try:
+            await answer(scope, receive, send)
+        finally:
+            place.end(time.monotonic())
+
+    return counted
+
+
+async def _close_when(ended: asyncio.Event, streams: CameraStreams) -> None:
+    await ended.wait()
+    streams.close()
+
+
+def _config(app: ASGIApp) -> uvicorn.Config:
+    logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
+    return uvicorn.Config(
+        app,
+        http=HttpProtocol,
+        ws="none",
+        lifespan="off",
+        loop="asyncio",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,
+        server_header=False,
+        timeout_keep_alive=15,
+        timeout_graceful_shutdown=0,
+        h11_max_incomplete_event_size=MOST_REQUEST,
+    )
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    """Draw and serve until the run has ended."""
+    parser = argparse.ArgumentParser(prog="dva_sim.cameras", description=__doc__)
+    parser.add_argument("--fd", type=int, required=True, help="socket to the run")
+    parser.add_argument("--listen-fd", type=int, required=True, help="listening socket")
+    parser.add_argument("--labels", type=json.loads, required=True, help="of the robots, as JSON")
+    options = parser.parse_args(given)
+    # Ctrl-C reaches all processes of a terminal; the run says when it is over.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(NICENESS)
+    listener = socket.socket(fileno=options.listen_fd)
+    listener.setblocking(False)
+    asyncio.run(_serve(options.fd, listener, options.labels))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

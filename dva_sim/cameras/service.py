@@ -1,0 +1,144 @@
+"""The cameras of a run that goes on in real time, as streams that begin when somebody looks.
+
+The run's process holds the listening socket. What draws and serves is started with the first
+viewer, in a process of its own, so that nobody pays for pictures that nobody sees, and no picture
+delays the run.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.cameras.children import END_WITHIN, Child
+from dva_sim.cameras.http import listen
+from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.realtime import LiveClock
+
+MODULE = "dva_sim.cameras"
+FLUSH = 0.02  # from one try to write what waits to the next [s]
+AGAIN_AFTER = 5.0  # from the end of a process that failed until another one may begin [s]
+
+Line = dict[str, Any]
+
+
+class CameraService:
+    """Serves the pictures of a run's robots.
+
+    Args:
+        host: Address of this machine to listen on.
+        port: Which; if it is taken, or 0, any that is free.
+        clock: Of the run.
+        tell: Takes a line for the story of the run.
+
+    Attributes:
+        base: URL below which the cameras are.
+
+    Raises:
+        ConfigError: the host is not this machine.
+    """
+
+    def __init__(
+        self, host: str, port: int, clock: LiveClock, tell: Callable[[str], object]
+    ) -> None:
+        try:
+            self._listener = listen(host, port)
+        except ConfigError:
+            self._listener = listen(host, 0)
+        self._clock, self._tell = clock, tell
+        shown = f"[{host}]" if ":" in host else host
+        self.base = f"http://{shown}:{self._listener.getsockname()[1]}/"
+        self._run: FilmedRun | None = None
+        self._child: Child | None = None
+        self._numbers = _Numbers()
+        self._contained: set[int] = set()
+
+    def url(self, label: str, _: str) -> str:
+        """Where a robot's pictures are, by its label."""
+        return camera_url(self.base, label)
+
+    def film(self, run: FilmedRun, seed: int) -> None:
+        """Show what the robots of a run see, from now on."""
+        self._run, self._seed = run, seed
+        self._labels = [robot.device.label for robot in run.field.robots.values()]
+        for id_tag in run.field.robots:
+            self._numbers[id_tag]  # robots come first, in the order of their labels
+        self._screens = OwnScreens(run, "", self._numbers, self._show)
+        self._clock.watch(self._listener.fileno(), self._begin)
+        self._clock.every(1.0 / run.scenario.camera.rate_hz, self._look)
+        self._tell(f"shows pictures of the robots at {camera_url(self.base, 'LABEL')}")
+
+    def _begin(self) -> None:
+        """The first viewer has come: start what draws and serves, which accepts it."""
+        assert self._run is not None
+        self._clock.unwatch(self._listener.fileno())
+        words = ["--listen-fd", str(self._listener.fileno()), "--labels", json.dumps(self._labels)]
+        child = self._child = Child("camera process", MODULE, words, [self._listener])
+        self._clock.watch(child.pipe.fileno(), self._hear)
+        scenario = self._run.scenario.model_dump(mode="json")
+        child.pipe.put({"k": "scene", "t": 0, "scenario": scenario, "seed": self._seed})
+        self._contained.clear()
+        self._clock.every(FLUSH, lambda: self._flush(child))
+
+    def _flush(self, child: Child) -> bool:
+        child.pipe.flush()
+        return child is self._child
+
+    def _hear(self) -> None:
+        """Who is watched; or the process has ended, and another one begins with the next viewer."""
+        assert self._child is not None
+        pipe = self._child.pipe
+        for line in pipe.lines():
+            if self._run is not None and "watch" in line:
+                ids = list(self._run.field.robots)
+                self._screens.watch({ids[n] for n in line["watch"] if 0 <= n < len(ids)})
+        if not pipe.is_open:
+            self._clock.unwatch(pipe.fileno())
+            self._screens.watch(set())
+            self._tell(f"shows no pictures for {AGAIN_AFTER:g} s: {self._child.why()}")
+            self._end()
+            self._clock.call_after(AGAIN_AFTER, self._wait_again)
+
+    def _wait_again(self) -> None:
+        self._clock.watch(self._listener.fileno(), self._begin)
+
+    def _look(self) -> None:
+        """Take the pictures that somebody will see."""
+        if self._child is None or not self._screens.watched:
+            return
+        assert self._run is not None
+        for number, when in self._run.field.contained.items():
+            if number not in self._contained:
+                self._contained.add(number)
+                self._child.pipe.put({"k": "contain", "t": round(1000 * when), "n": number})
+        self._screens.look()
+
+    def _show(self, line: Line, robot: int) -> None:
+        if self._child is not None:
+            self._child.pipe.put(line, robot)
+
+    def _end(self) -> None:
+        child, self._child = self._child, None
+        if child is not None:
+            child.end()
+            child.make_sure(time.monotonic() + END_WITHIN)
+
+    def close(self) -> None:
+        """End all streams."""
+        if self._child is not None:
+            self._clock.unwatch(self._child.pipe.fileno())
+        else:
+            self._clock.unwatch(self._listener.fileno())
+        self._end()
+        self._listener.close()
+
+
+class _Numbers(dict[str, int]):
+    """Numbers of everybody who may be in a picture, given as they come."""
+
+    def __missing__(self, name: str) -> int:
+        self[name] = number = len(self)
+        return number
