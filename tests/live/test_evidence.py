@@ -15,6 +15,8 @@ import pytest
 from command_line import call
 
 import dva_sim
+from dva_sim.console.replay.console import ReplayOptions
+from dva_sim.console.replay.player import playing
 from dva_sim.core.dva import Dva
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
@@ -287,6 +289,9 @@ def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path: Path)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "is now in mode Idle" in ended.stdout
     assert "run.mcap.part was cut short: 2 s are there" in ended.stdout
+    with playing(ReplayOptions(file=keeper.path).player()) as player:
+        assert player.run is not None
+        assert player.run.name == "run.mcap.part"
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap.part"]
     assert keeper.path.read_bytes() == left
 
