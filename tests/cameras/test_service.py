@@ -8,7 +8,6 @@ import os
 import re
 import signal
 import socket
-import time
 from collections.abc import Callable, Iterator
 from threading import Thread
 
@@ -18,6 +17,7 @@ from PIL import Image
 
 from dva_sim.agents.observation import Cameras
 from dva_sim.cameras import service as cameras
+from dva_sim.cameras.pipes import MOST_WAITING
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
 from dva_sim.cameras.streams import MOST_VIEWERS
@@ -182,15 +182,19 @@ def test_more_viewers_than_there_is_room_for_are_refused(world: LiveWorld) -> No
         pass
 
 
-def test_the_world_is_not_delayed_by_who_draws(world: LiveWorld) -> None:
-    """While the process is stopped in the middle of its work, the clock goes on as ever."""
+def test_the_world_waits_for_nobody_who_draws(world: LiveWorld) -> None:
+    """While the process is stopped and reads nothing, hundreds of frames are told to it."""
     world.let(lambda: pictures(world.port, "/camera/robot-1.mjpg", 1))
     os.kill(world.process, signal.SIGSTOP)
     try:
+        pipe = world.service._child.pipe  # type: ignore[union-attr]
+        world.service._screens.watch({ROBOT})
+        for _ in range(5000):
+            world.service._look()
+        assert len(pipe.outbox) <= MOST_WAITING
         ticks = list[float]()
-        world.clock.every(0.05, lambda: ticks.append(time.monotonic()))
+        world.clock.every(0.02, lambda: ticks.append(world.clock.now))
         world.until(lambda: len(ticks) > 20)
-        world.clock.lateness = 0.0
     finally:
         os.kill(world.process, signal.SIGCONT)
 
