@@ -164,7 +164,7 @@ BODIES: dict[type, st.SearchStrategy[m.Body]] = {
         st.none() | st.sampled_from(["no", "ask", "force"]),
     ),
     m.HandoverRequest: st.builds(m.HandoverRequest, ids, ids, names),
-    m.GetGrant: st.builds(m.GetGrant, ids),
+    m.GetGrant: st.builds(m.GetGrant, st.none() | ids, st.none() | levels),
     m.PermissionGrant: st.builds(m.PermissionGrant, ids, *granted),
     m.PermissionRevocation: st.builds(m.PermissionRevocation, ids, ids, sessions),
     m.EventReport: st.builds(

@@ -13,7 +13,7 @@ from patience import PATIENCE_S
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator, drill
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.agents.robot.decision_log import DecisionLog
+from dva_sim.agents.robot.decision_log import ASKS, DecisionLog
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
@@ -61,16 +61,25 @@ class Witness:
     decisions: list[Decided] = field(default_factory=list)
 
     def decided(
-        self, message: m.Message, arrived: float, now: float, moving: bool, decision: Decision
+        self,
+        message: m.Message,
+        arrived: float,
+        now: float,
+        moving: bool,
+        decision: Decision,
+        waited: bool = False,
     ) -> None:
+        if self.trace is not None:
+            self.trace.decided(message, arrived, now, moving, decision, waited)
+        if isinstance(message.body, m.Reply) or (decision.waits and not waited):
+            return  # what the DVA confirms, and what waits for that, takes its time
         kind, mode = type(message.body).__name__, self.controller.mode.value
         speed, turn_rate, _ = decision.set_point or (None, None, None)
         self.decisions.append(Decided(kind, decision.code, decision.text, mode, speed, turn_rate))
-        if self.trace is not None:
-            self.trace.decided(message, arrived, now, moving, decision)
 
     def happened(self, what: str, now: float) -> None:
-        self.decisions.append(Decided(what, 0, "", self.controller.mode.value, None, None))
+        if what != ASKS:
+            self.decisions.append(Decided(what, 0, "", self.controller.mode.value, None, None))
         if self.trace is not None:
             self.trace.happened(what, now)
 

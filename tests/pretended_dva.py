@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
+
+from granted import confirmation
 
 from dva_sim.agents.observation import no_smoke
 from dva_sim.agents.operator.operator import OperatorAgent
@@ -190,10 +193,16 @@ class PretendedDva:
 
     def _hear(self, message: m.Message) -> m.Reply:
         body = message.body
-        if not isinstance(body, m.Registration):
+        if not isinstance(body, m.Registration | m.GetGrant):
             self.told.append(Told(self.now, message.source, body))
         if isinstance(body, m.PermissionRequest):
+            held = self.sessions.get(body.device)
+            if held is not None and held.holder != message.source:
+                return m.Reply(message.message_id, m.BUSY, f"held by {held.holder}")
             return m.Reply(message.message_id, m.OK, "", self._permit(message.source, body))
+        if isinstance(body, m.GetGrant):
+            told = confirmation(self.sessions.get(message.source))
+            return replace(told, answers=message.message_id)
         if isinstance(body, m.PermissionRevocation) and self.sessions.pop(body.device, None):
             self.device.ask(body.device, body)
         return m.Reply(message.message_id, m.OK, "")
@@ -201,7 +210,7 @@ class PretendedDva:
     def _permit(self, holder: str, body: m.PermissionRequest) -> m.Permission:
         """As the real one: who asks again for what it holds gets the same session."""
         held = self.sessions.get(body.device)
-        if held is None or held.holder != holder:
+        if held is None:
             self._last_session += 1
             held = m.PermissionGrant(holder, body.level, self._last_session)
             self.sessions[body.device] = held

@@ -174,12 +174,13 @@ class AgentDevice:
     ) -> None:
         """Send a request on the acknowledged channel; replies come in the order of requests.
 
-        An emergency has a socket of its own, so that it never waits behind another request.
+        An emergency has a socket of its own, so that it never waits behind another request; so
+        has a robot's question who may act on it.
         """
         if self.silent:
             self.clock.call_after(self.attempts * self.timeout, on_failure)
             return
-        requester = self._requester(peer, isinstance(body, m.Emergency))
+        requester = self._requester(peer, isinstance(body, m.Emergency | m.GetGrant))
         message = self.outbox.message(peer, body, self.clock.now, session)
 
         def answered(data: bytes) -> None:
@@ -303,14 +304,19 @@ class AgentDevice:
             request.answer(self.reply(message, refusal))
 
     def conclude(
-        self, request: Request, message: m.Message, handler: Handler, *, at_once: bool = False
+        self,
+        request: Request,
+        message: m.Message,
+        handler: Callable[[m.Message], m.Reply | None],
+        *,
+        at_once: bool = False,
     ) -> None:
         """Let `handler` take a message that was admitted, once, and answer it.
 
         Args:
             request: What it came by.
             message: What it says.
-            handler: What answers.
+            handler: What answers; None: the message waits, and is concluded later.
             at_once: It is refused as it arrives: who sends such, is listened to less and less.
         """
         note = self._nuisances.bad if at_once else self._nuisances.good
@@ -319,6 +325,8 @@ class AgentDevice:
         reply = self._replies.get(key)
         if reply is None:
             body = handler(message)
+            if body is None:
+                return
             if body.code != m.OK:
                 self.recorder.counters[f"refused: {m.CODE_NAMES[body.code]}"] += 1
             reply = self.reply(message, body)

@@ -412,11 +412,12 @@ class Dva:
         return self._ok(message, [])
 
     def _grant_of(self, message: m.Message, asker: DeviceEntry, body: m.GetGrant) -> Reaction:
-        """What a robot is told when it asks whether it was granted to a device."""
-        grant = self.sessions.permissions.grants.get(message.source)
-        if asker.device.device_type != ROBOT or grant is None or grant.holder != body.holder:
-            return self._refuse(message, m.NOT_PERMITTED, f"{body.holder} holds no such robot")
-        told = m.Permission(body.holder, grant.level, grant.session, grant.address, grant.sensors)
+        """Tell a robot who may act on it: its holder, or what another device may read."""
+        grant = self.sessions.held(message.source, body.holder, body.level == "sensors")
+        if asker.device.device_type != ROBOT or grant is None:
+            text = f"{body.holder or 'nobody'} holds no such robot"
+            return self._refuse(message, m.NOT_PERMITTED, text)
+        told = m.Permission(grant.holder, grant.level, grant.session, grant.address, grant.sensors)
         return self._ok(message, [], told)
 
     def check_access(self, now: float) -> None:

@@ -72,6 +72,19 @@ class Sessions:
         held = grant is not None and grant.holder != self.permissions.own
         return held or robot in self.reserved
 
+    def held(self, robot: str, holder: str | None, to_read: bool) -> Grant | None:
+        """Return the permission of a device, or of the holder whoever that is, if there is one.
+
+        Args:
+            robot: Id of the robot.
+            holder: Id of the device; None: the holder.
+            to_read: Whether one that is only for sensors will do.
+        """
+        known = self.permissions
+        reads = known.observers.get((robot, holder or "")) if to_read else None
+        drives = known.grants.get(robot)
+        return reads or (drives if drives is not None and holder in (None, drives.holder) else None)
+
     def observe(self, robot: str, sensors: tuple[str, ...]) -> Send:
         """The DVA reads sensors of a robot itself: what to tell the robot."""
         own = self.permissions.own

@@ -455,10 +455,7 @@ class SocketNetwork:
             self.watcher(node, payload, sent)
 
     def send(self, socket: Socket, frames: list[bytes], look: bool = True) -> None:
-        """Send without waiting; what does not fit is dropped and counted.
-
-        It need not `look` where a socket has nothing to read that its file would not tell.
-        """
+        """Send without waiting, or drop and count it; `look` unless the file tells all to read."""
         try:
             for frame in frames[:-1]:
                 send(socket, frame, MORE)

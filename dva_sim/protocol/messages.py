@@ -240,9 +240,15 @@ class HandoverRequest:
 
 @dataclass(frozen=True, slots=True)
 class GetGrant:
-    """A robot asks the DVA for the grant of a device that it does not know as its holder."""
+    """A robot asks the DVA who may act on it: it takes nobody else's word for that.
 
-    holder: str
+    Attributes:
+        holder: Only whether that device may; None: whoever may.
+        level: `sensors`: what the holder may read; None: who may drive it, or send it somewhere.
+    """
+
+    holder: str | None = None
+    level: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

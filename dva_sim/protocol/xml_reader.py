@@ -104,6 +104,11 @@ def _read_permission_request(element: _Element) -> m.PermissionRequest:
     return m.PermissionRequest(_str(device), _str(level), tuple(map(_str, rest)), takeover)
 
 
+def _read_get_grant(element: _Element) -> m.GetGrant:
+    said = {field.tag: _str(field) for field in _children(element)}
+    return m.GetGrant(said.get("HolderID"), said.get("Level"))
+
+
 def _read_permission_grant(element: _Element) -> m.PermissionGrant:
     return m.PermissionGrant(*_granted(element))
 
@@ -226,7 +231,7 @@ _COMMAND_READERS: Final[dict[str, Callable[[_Element], m.Body]]] = {
     "PermissionGrant": _read_permission_grant,
     "PermissionRevocation": _read_permission_revocation,
     "HandoverRequest": lambda element: m.HandoverRequest(*map(_str, element)),
-    "GetGrant": lambda element: m.GetGrant(_str(element[0])),
+    "GetGrant": _read_get_grant,
     "EventReport": _read_event_report,
     "Order": _read_order,
     "OrderProgress": _read_order_progress,

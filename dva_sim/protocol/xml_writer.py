@@ -170,8 +170,9 @@ def _write_handover_request(body: m.HandoverRequest) -> str:
 
 
 def _write_get_grant(body: m.GetGrant) -> str:
-    holder = v.device_id(body.holder)
-    return f"<Access><GetGrant><HolderID>{holder}</HolderID></GetGrant></Access>"
+    holder = v.optional("HolderID", v.device_id, body.holder)
+    level = v.optional("Level", v.level, body.level)
+    return f"<Access><GetGrant>{holder}{level}</GetGrant></Access>"
 
 
 def _write_event_report(body: m.EventReport) -> str:

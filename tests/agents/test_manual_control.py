@@ -5,9 +5,17 @@ from __future__ import annotations
 import math
 
 import pytest
+from granted import confirmation, give
 
-from dva_sim.agents.robot.controller import LEASE_S, STAND, Limits, Mode, RobotController
-from dva_sim.agents.robot.decision_log import LET_GO, TAKEN_BY_HAND, DecisionLog, replay
+from dva_sim.agents.robot.controller import (
+    LEASE_S,
+    PATIENCE,
+    STAND,
+    Limits,
+    Mode,
+    RobotController,
+)
+from dva_sim.agents.robot.decision_log import ASKS, LET_GO, TAKEN_BY_HAND, DecisionLog, replay
 from dva_sim.protocol import messages as m
 
 DVA, ROBOT, ANA = (f"02:00:00:00:00:0{i}" for i in range(1, 4))
@@ -26,6 +34,8 @@ def in_hand(robot: RobotController) -> RobotController:
 
 
 def say(robot: RobotController, source: str, body: m.Body, now: float, number: int = 1):
+    if isinstance(body, m.PermissionGrant):
+        return give(robot, body, now)
     message = m.Message(ROBOT, number, source, "12:00:00", 7, body)
     return robot.handle(message, now, now, moving=False)
 
@@ -59,7 +69,9 @@ def test_a_robot_that_somebody_holds_says_who_and_goes_into_no_hand(robot) -> No
     decision = robot.take_by_hand(HERE, 1.0, moving=False)
     assert (decision.code, decision.text) == (m.BUSY, f"held by {ANA}")
     say(robot, DVA, m.PermissionRevocation(ROBOT, ANA, 7), 2.0, 2)
-    assert robot.take_by_hand(HERE, 3.0, moving=False).code == m.OK
+    assert robot.inquiry.next(2.0) is not None
+    assert robot.take_by_hand(HERE, 2.5, moving=False).code == m.BUSY  # the DVA is being asked
+    assert robot.take_by_hand(HERE, 2.0 + PATIENCE, moving=False).code == m.OK
 
 
 @pytest.mark.invariant("S2")
@@ -102,8 +114,12 @@ def test_a_trace_of_a_robot_that_was_in_a_hand_is_replayed_to_the_same_decisions
     log = DecisionLog(tmp_path / "robot.trace.jsonl", robot)
 
     def told(source: str, body: m.Body, now: float, number: int) -> None:
-        message = m.Message(ROBOT, number, source, "12:00:00", 7, body)
+        message = m.Message(ROBOT, number, source, "12:00:00", 8, body)
         log.decided(message, now, now, False, robot.handle(message, now, now, False))
+        if isinstance(body, m.PermissionGrant | m.PermissionRevocation):
+            log.happened(ASKS, now)
+            robot.inquiry.next(now)
+            told(DVA, confirmation(body if isinstance(body, m.PermissionGrant) else None), now, 1)
 
     told(DVA, m.PermissionGrant(ANA, "both", 7), 1.0, 1)
     told(DVA, m.PermissionRevocation(ROBOT, ANA, 7), 2.0, 2)
@@ -117,5 +133,6 @@ def test_a_trace_of_a_robot_that_was_in_a_hand_is_replayed_to_the_same_decisions
     log.close()
 
     asked = list(replay(tmp_path / "robot.trace.jsonl"))
-    assert len(asked) == 5
+    assert [then.code for _, then, _ in asked][-2:] == [m.BUSY, m.OK]
+    assert len(asked) == 5 + 3
     assert all(then == now for _, then, now in asked)

@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import zmq
+from granted import give
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.recorder import Recorder
@@ -28,7 +29,7 @@ from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import Outbox
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.physical_world import Field
-from dva_sim.simulation.full.stage import DVA, Stage, id_of
+from dva_sim.simulation.full.stage import Stage, id_of
 
 ROBOT, OPERATOR = id_of("robot", 1), id_of("operator", 1)
 SESSION = 1425
@@ -55,8 +56,7 @@ def be_a_robot() -> None:
     robot = field.robots[ROBOT]
     robot.controller.clock_offset = TICK / 1000  # so that the command's tick is never to come
     grant = m.PermissionGrant(OPERATOR, "teleoperation", SESSION)
-    message = m.Message(ROBOT, 1, DVA, "12:00:00", SESSION, grant)
-    assert robot.controller.handle(message, 0.0, 0.0, False).code == m.OK
+    assert give(robot.controller, grant).code == m.OK
     network.clock.watch(sys.stdin.fileno(), network.clock.stop)
     print(network.address(ROBOT), flush=True)
     network.clock.run()

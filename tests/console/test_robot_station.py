@@ -1,8 +1,10 @@
 """A robot that runs alone, over sockets: off, registered, listening, and off again."""
 
 import time
+from dataclasses import replace
 
 import pytest
+from granted import confirmation
 from patience import PATIENCE_S
 
 from dva_sim.console.robot_desk import RobotDesk
@@ -34,15 +36,19 @@ class Bench:
         self.dva = SocketNetwork(self.world.clock)
         self.address = self.dva.join(DVA)
         self.dva.serve(DVA, self.answer)
+        self.grant = None
 
     def answer(self, request):
         message = decode(request.data)
         self.heard.append(message.body)
         reply = m.Reply(message.message_id, self.code, "as a test wants it")
+        if isinstance(message.body, m.GetGrant):
+            reply = replace(confirmation(self.grant), answers=message.message_id)
         request.answer(encode(m.Message(message.source, 1, DVA, "12:00:00", 0, reply)))
 
     def say(self, body, session=0):
         """The DVA, or Ana in its place, sends the robot a request: the reply, or None."""
+        self.grant = body if isinstance(body, m.PermissionGrant) else self.grant
         robot, got = self.world.robot.device, []
         self.dva.introduce(robot.id_tag, robot.address)
         self.count += 1

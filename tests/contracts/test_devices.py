@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 import pytest
+from granted import give
 from transports import (
     BRIEF,
     DVA,
@@ -203,9 +204,8 @@ class DrivenRobot:
 
     def _start(self) -> None:
         codes: list[int] = []
-        dva, grant = small_device(self.world, DVA), m.PermissionGrant(PHONE, "both", SESSION)
-        dva.ask(ROBOT, grant, lambda reply: codes.append(reply.code))
-        self.world.run_until(lambda: codes)
+        now, grant = self.world.clock.now, m.PermissionGrant(PHONE, "both", SESSION)
+        codes.append(give(self.controller, grant, now).code)
         self.phone.ask(
             ROBOT, m.StartTeleOp(), lambda reply: codes.append(reply.code), session=SESSION
         )

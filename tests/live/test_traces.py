@@ -10,10 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from granted import confirmation, enter
 from one_session import ROBOT, over_sockets, pipelined
 
 from dva_sim.agents.robot.controller import LEASE_S, Limits, RobotController
-from dva_sim.agents.robot.decision_log import LEASE_ENDS, MISSION_ENDS, DecisionLog, replay
+from dva_sim.agents.robot.decision_log import (
+    ASKS,
+    LEASE_ENDS,
+    MISSION_ENDS,
+    DecisionLog,
+    replay,
+)
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
@@ -44,6 +51,12 @@ def traced(path: Path, **changes: object) -> Iterator[Run]:
     robot.trace.close()
 
 
+def say(run: Run, body: m.Body, session: int) -> None:
+    """Let the DVA say something to the robot, which its book says, too."""
+    enter(run.dva.desk, ROBOT, body)
+    run.dva.device.ask(ROBOT, body, session=session)
+
+
 def lines(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text().splitlines()]
 
@@ -57,12 +70,13 @@ def change(path: Path, number: int, how: Callable[[dict[str, Any]], object]) -> 
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
-    """A short trace: a grant, a start, three commands, an emergency, a refused command."""
+    """A short trace: a grant, confirmed; a start, three commands, an emergency, one refused."""
     path = tmp_path / "robot-1.trace.jsonl"
     controller = RobotController(ROBOT, DVA, Limits(watchdog=1.0, max_age=2.0))
     trace = DecisionLog(path, controller)
     told: list[tuple[str, m.Body]] = [
-        (DVA, m.PermissionGrant(PHONE, "teleoperation", 7)),
+        (DVA, grant := m.PermissionGrant(PHONE, "teleoperation", 7)),
+        (DVA, confirmation(grant)),
         (PHONE, m.StartTeleOp()),
         (PHONE, m.SetTeleOp(0.1, 0.0, 1000)),
         (PHONE, m.SetTeleOp(0.2, 0.1, 1100)),
@@ -73,6 +87,9 @@ def drive(tmp_path: Path) -> Path:
     for number, (source, body) in enumerate(told, 1):
         message = m.Message(ROBOT, number, source, "12:00:00", 7, body)
         now = 1.0 + number / 10
+        if isinstance(body, m.Reply):
+            trace.happened(ASKS, now)
+            controller.inquiry.next(now)
         trace.decided(message, now, now, False, controller.handle(message, now, now, False))
     trace.close()
     return path
@@ -85,7 +102,8 @@ def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path: Path) ->
     path = tmp_path / "robot-1.trace.jsonl"
     decisions = over_sockets(pipelined, trace=path)
     replayed = list(replay(path))
-    assert [(d.code, d.text) for d in decisions] == [(now.code, now.text) for _, _, now in replayed]
+    told = [now for message, _, now in replayed if not isinstance(message.body, m.Reply)]
+    assert [(d.code, d.text) for d in decisions] == [(now.code, now.text) for now in told]
     assert kinds(path)["SetTeleOp"] == 200 + 1 + 10
     assert differences(path) == 0
 
@@ -109,7 +127,7 @@ def test_missions_emergencies_and_leases_that_end_are_decided_the_same_again(
     with traced(path, **LATER) as run:
         _mission_lease_and_emergency(run)
     happened = [entry["happened"] for entry in lines(path) if "happened" in entry]
-    assert happened == [MISSION_ENDS, LEASE_ENDS]
+    assert [what for what in happened if what != ASKS] == [MISSION_ENDS, LEASE_ENDS]
     codes = {then.code for _, then, _ in replay(path)}
     assert {m.OK, m.BUSY, m.BAD_SESSION, m.WRONG_MODE} <= codes
     assert differences(path) == 0
@@ -117,7 +135,7 @@ def test_missions_emergencies_and_leases_that_end_are_decided_the_same_again(
 
 def _mission_lease_and_emergency(run: Run) -> None:
     def send(time: float, body: m.Body, session: int = 5) -> None:
-        run.clock.call_at(time, lambda: run.dva.device.ask(ROBOT, body, session=session))
+        run.clock.call_at(time, say, run, body, session)
 
     place = m.Position(*run.stage.site.frame.to_latlon(12.0, 12.0))
     send(10.0, m.PermissionGrant(DVA, "both", 5))
@@ -141,10 +159,10 @@ def test_reply_contents_are_not_kept_but_what_leads_to_them_is(tmp_path: Path) -
     told = ((10.0, grant), (11.0, m.GetSensorInfo()), (12.0, m.DevSub("heat_flux", 1)))
     with traced(path, **LATER) as run:
         for time, body in told:
-            run.clock.call_at(time, lambda b=body: run.dva.device.ask(ROBOT, b, session=5))
+            run.clock.call_at(time, say, run, body, 5)
         run.clock.run(20.0)
-    assert kinds(path) == {"PermissionGrant": 1, "GetSensorInfo": 1, "DevSub": 1}
-    assert [then.code for _, then, _ in replay(path)] == [m.OK, m.OK, m.OK]
+    assert kinds(path) == {"PermissionGrant": 1, "Reply": 1, "GetSensorInfo": 1, "DevSub": 1}
+    assert {then.code for _, then, _ in replay(path)} == {m.OK}
     assert differences(path) == 0
 
 
@@ -163,21 +181,21 @@ def test_what_was_decided_is_on_disk_at_once(drive: Path) -> None:
 
 
 def test_the_trace_as_it_was_taken_shows_no_difference(drive: Path) -> None:
-    assert sum(kinds(drive).values()) == 7
+    assert sum(kinds(drive).values()) == 8
     assert differences(drive) == 0
 
 
 @pytest.mark.parametrize(
     ("number", "how", "found"),
     [
-        (3, lambda e: e.update(code=m.STALE), 1),
-        (3, lambda e: e.update(text="faster"), 1),
-        (3, lambda e: e["set_point"].__setitem__(0, 0.5), 1),
-        (3, lambda e: e["set_point"].__setitem__(2, 9.0), 1),
-        (7, lambda e: e.update(code=m.OK, text="", set_point=[0.4, 0.0, 3.0]), 1),
-        (4, lambda e: e.update(message=e["message"].replace("0.2<", "0.25<")), 1),
-        (4, lambda e: e.update(arrived=1.2), 1),
-        (2, lambda e: e.update(moving=True), 4),  # no start, so three commands are refused, too
+        (5, lambda e: e.update(code=m.STALE), 1),
+        (5, lambda e: e.update(text="faster"), 1),
+        (5, lambda e: e["set_point"].__setitem__(0, 0.5), 1),
+        (5, lambda e: e["set_point"].__setitem__(2, 9.0), 1),
+        (9, lambda e: e.update(code=m.OK, text="", set_point=[0.4, 0.0, 3.0]), 1),
+        (6, lambda e: e.update(message=e["message"].replace("0.2<", "0.25<")), 1),
+        (6, lambda e: e.update(arrived=1.2), 1),
+        (4, lambda e: e.update(moving=True), 4),  # no start, so three commands are refused, too
         (0, lambda e: e["limits"].update(watchdog=0.5), 3),
     ],
 )
@@ -190,7 +208,7 @@ def test_a_trace_changed_by_hand_is_found_out(
 
 def test_a_line_taken_out_is_found_out(drive: Path) -> None:
     whole = drive.read_text().splitlines(keepends=True)
-    drive.write_text("".join(whole[:2] + whole[3:]))  # without the start
+    drive.write_text("".join(whole[:4] + whole[5:]))  # without the start
     assert differences(drive) == 3
 
 

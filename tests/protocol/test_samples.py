@@ -45,15 +45,21 @@ NEW = {
         *("reply-event-status", "reply-proposal", "reply-proposal-nobody", "revoke"),
         *("set-dispatch", "take-off"),
     },
+    "1.6": {"get-grant-of-a-reader", "get-grant-of-the-holder"},
 }
 OLD = {
     version: etree.XMLSchema(file=str(Path(__file__).parents[1] / "data" / f"dva-{version}.xsd"))
-    for version in ("1.3", "1.4")
+    for version in ("1.3", "1.4", "1.5")
 }
 
 
 @pytest.mark.parametrize(
-    ("version", "added"), [("1.3", NEW["1.4"] | NEW["1.5"]), ("1.4", NEW["1.5"])]
+    ("version", "added"),
+    [
+        ("1.3", NEW["1.4"] | NEW["1.5"] | NEW["1.6"]),
+        ("1.4", NEW["1.5"] | NEW["1.6"]),
+        ("1.5", NEW["1.6"]),
+    ],
 )
 def test_an_older_peer_understands_all_samples_but_those_of_what_was_added_since(version, added):
     refused = {path.stem for path in VALID if not OLD[version].validate(etree.parse(path))}

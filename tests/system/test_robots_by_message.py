@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 
 import pymunk
 import pytest
+from granted import enter
 
-from dva_sim.agents.device import command_topic
+from dva_sim.agents.device import command_topic, do_nothing
 from dva_sim.agents.robot.command_queue import EACH
 from dva_sim.agents.robot.robot import FRAME, MISSION, RobotAgent
 from dva_sim.agents.robot.sensors import sensor_topic
@@ -39,10 +41,20 @@ def staged(**changes: object) -> Run:
 def send(run: Run, time: float, body: m.Body, session: int = 5) -> list[m.Reply]:
     """Let the DVA send a request at a time [s]; replies come into the list."""
     replies: list[m.Reply] = []
-    run.clock.call_at(
-        time, lambda: run.dva.device.ask(ROBOT, body, replies.append, session=session)
-    )
+    run.clock.call_at(time, say, run, ROBOT, body, replies.append, session)
     return replies
+
+
+def say(
+    run: Run,
+    robot: str,
+    body: m.Body,
+    then: Callable[[m.Reply], object] = do_nothing,
+    session: int = 5,
+) -> None:
+    """Let the DVA send a robot something, which its book says, too."""
+    enter(run.dva.desk, robot, body)
+    run.dva.device.ask(robot, body, then, session=session)
 
 
 def place(run: Run, x: float, y: float) -> m.Position:
@@ -89,12 +101,11 @@ def test_two_robots_that_meet_head_on_get_past_each_other_without_touching() -> 
     run = staged(**{"robot.count": 2, "operator.count": 2})
     one, two = (run.field.robots[id_of("robot", n)] for n in (1, 2))
     ways = ((ROBOT, (14.5, 7.4)), (id_of("robot", 2), (9.5, 7.4)))
-    device = run.dva.device
     for robot, goal in ways:
         grant = m.PermissionGrant(DVA, "missions", 5)
-        run.clock.call_at(10.0, lambda r=robot, g=grant: device.ask(r, g, session=5))
+        run.clock.call_at(10.0, say, run, robot, grant)
         there = m.GoTo((place(run, *goal),))
-        run.clock.call_at(12.0, lambda r=robot, g=there: device.ask(r, g, session=5))
+        run.clock.call_at(12.0, say, run, robot, there)
     gaps: list[float] = []
 
     def measure() -> None:

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from dva_sim.agents.robot.inquiry import Inquiry
 from dva_sim.kernel.makers import maker
 from dva_sim.protocol import messages as m
-from dva_sim.protocol.exchange import is_absurd
 
 LEASE_S = 30.0  # teleoperation without a valid command ends by itself after this
 ENDS = "done", "failed"  # how a mission ends
 MOST_OBSERVERS = 64  # devices that may subscribe to sensors without holding the robot
-ASK_AGAIN = 1.0  # the DVA is asked about one device at a time, and not more often than this [s]
+PATIENCE = 3.0  # so long an order waits for what the DVA says of its sender, or longer [s]
 
 
 class Mode(StrEnum):
@@ -56,12 +56,15 @@ class Decision(NamedTuple):
         text: Why, for people.
         set_point: The new set point, or None to leave it.
         content: Content of the reply.
+        waits: Whether that is so only as long as the DVA has not said otherwise: it has to be
+            asked, and the message decided on again then.
     """
 
     code: int
     text: str = ""
     set_point: TimedSetPoint | None = None
-    content: m.SensorInfo | m.MissionStatus | m.SessionFloor | None = None
+    content: m.SensorInfo | m.MissionStatus | None = None
+    waits: bool = False
 
 
 _make_decision = maker(Decision)
@@ -81,66 +84,6 @@ class Limits:
 
 
 @dataclass
-class Doubts:
-    """Whose word a robot doubts: anybody can claim to be the DVA where there are no keys.
-
-    The DVA's own answer, over a connection that the robot has opened, is another matter. It is
-    asked about who takes the robot from its driver, about a holder whose session is above that of
-    a new grant, and about a stranger who asks twice: at first, a grant may be on its way.
-
-    Attributes:
-        unasked: Who the DVA has to be asked about now, if anybody.
-        asked: Who it was asked about last.
-        word: How much had been said in the DVA's name by then.
-        dva_knows: Whether it has understood the question, so that it knows 1.4; None: not asked.
-    """
-
-    unasked: str | None = None
-    asked: str = ""
-    word: int = 0
-    dva_knows: bool | None = None
-    _since: float = -math.inf
-    _stranger: str = ""
-
-    def note(
-        self,
-        message: m.Message,
-        decision: Decision,
-        now: float,
-        *,
-        holder: str | None,
-        stopped: str | None,
-        word: int,
-    ) -> None:
-        """A message was decided on.
-
-        Args:
-            message: What it was.
-            decision: What was decided.
-            now: Time [s].
-            holder: Who holds the robot by now.
-            stopped: Who was driving until then, and does not any longer.
-            word: How much was said in the DVA's name so far.
-        """
-        if isinstance(message.body, m.SetTeleOp):
-            self.unasked = None
-            return
-        who, before = None, self._stranger
-        match message.body:
-            case m.PermissionGrant() if decision.code == m.BAD_SESSION or stopped:
-                who = holder or message.body.holder
-            case m.StartTeleOp() | m.GoTo() | m.Patrol() | m.Inspect() | m.ReturnToBase():
-                refused = decision.code in (m.NOT_PERMITTED, m.BAD_SESSION)
-                self._stranger = message.source if refused else ""
-                who = before if before == self._stranger else None
-        recently = now < self._since + ASK_AGAIN
-        usual = not who or recently or self.dva_knows is False
-        self.unasked = None if usual else who
-        if self.unasked is not None:
-            self.asked, self.word, self._since = self.unasked, word, now
-
-
-@dataclass
 class RobotController:
     """The decider of one robot.
 
@@ -154,8 +97,9 @@ class RobotController:
             clock agrees with it.
         without_tick: Commands without `SeenTick` so far.
         future_ticks: Commands with one that the robot's clock has not reached.
-        absurd_sessions: What came in the DVA's name with a session that no DVA has come to.
-        doubts: Who the DVA has to be asked about.
+        grant: The permission of its holder, as the DVA has confirmed it.
+        observers: Those to read its sensors, by device, likewise.
+        inquiry: What the DVA has to be asked.
         by_hand: Who drives it by hand, at the robot itself; None: nobody does.
     """
 
@@ -168,7 +112,6 @@ class RobotController:
     mode: Mode = IDLE
     owner: str | None = None
     grant: m.PermissionGrant | None = None
-    highest_session: int = 0
     observers: dict[str, m.PermissionGrant] = field(default_factory=dict)
     mission: Mission | None = None
     mission_status: m.MissionStatus = NO_MISSION
@@ -178,17 +121,17 @@ class RobotController:
     emergency_at: float = -1.0
     without_tick: int = 0
     future_ticks: int = 0
-    absurd_sessions: int = 0
-    doubts: Doubts = field(default_factory=lambda: Doubts())
+    inquiry: Inquiry = field(default_factory=Inquiry)
     by_hand: str | None = None
-    _before: int = 0  # the highest session before the grant that holds
-    _word: int = 0  # how much the DVA, or who claims to be it, has said
+    _numbered: int = 0  # the session that `last_order_id` and `last_set_id` are of
 
     def tick(self, now: float) -> int:
         """The robot's own clock [ms]."""
         return round((now + self.clock_offset) * 1000)
 
-    def handle(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
+    def handle(
+        self, message: m.Message, arrived: float, now: float, moving: bool, waited: bool = False
+    ) -> Decision:
         """Decide on a message.
 
         Args:
@@ -196,13 +139,19 @@ class RobotController:
             arrived: When it reached the robot [s]; it may have waited since.
             now: Time [s].
             moving: Whether the robot's wheels still turn.
+            waited: Whether it has waited for the DVA: this decision is the last.
         """
-        driver = self.owner
         decision = self._handle(message, arrived, now, moving)
-        holder = self.grant.holder if self.grant is not None else None
-        driver = None if driver in (self.dva, self.owner) else driver
-        self.doubts.note(message, decision, now, holder=holder, stopped=driver, word=self._word)
+        if decision.waits and not waited:
+            self._ask_about(message)
         return decision
+
+    def _ask_about(self, message: m.Message) -> None:
+        """A sender has no permission that is known here: it may have been given one since."""
+        if isinstance(message.body, m.DevSub):
+            self.inquiry.about_reader(message.source)
+        elif not isinstance(message.body, m.Reply):
+            self.inquiry.about_holder(message.source)
 
     def _handle(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
         body = message.body
@@ -276,6 +225,8 @@ class RobotController:
             return Decision(m.OK, "is in hand already")
         if self.grant is not None:
             return Decision(m.BUSY, f"held by {self.grant.holder}")
+        if self.inquiry.is_open and now < self.inquiry.asked_at + PATIENCE:
+            return Decision(m.BUSY, "the DVA is being asked who holds it")
         refusal = self._begin(math.inf, moving)
         if refusal is not None:
             return refusal
@@ -340,84 +291,68 @@ class RobotController:
         return Decision(m.OK, "stopped", STAND)
 
     def _granted(self, message: m.Message, body: m.PermissionGrant) -> Decision:
+        """A grant is a reason to ask the DVA: it takes effect when that has confirmed it (S2)."""
         if message.source != self.dva:
             return Decision(m.NOT_PERMITTED, "only the DVA grants permissions")
         if body.level == "sensors":
-            return self._observer(body)
-        held = self.grant
-        if held is not None and (held.holder, held.session) == (body.holder, body.session):
-            self.grant = body  # the same session, told again: the holder may have moved
+            return self._full(body.holder) or Decision(m.OK, "confirmed when it subscribes")
+        if body == self.grant:
             return Decision(m.OK)
-        if body.session <= self.highest_session:
-            return self._bad_session("that session is over")
-        if self._is_absurd(body.session):
-            return self._bad_session("no session is so far ahead")
-        self._before, self.highest_session = self.highest_session, body.session
-        return self._is_held(body)
+        self.inquiry.about_holder(body.holder)
+        return Decision(m.OK, "takes effect when the DVA has confirmed it")
+
+    def _revoked(self, message: m.Message, body: m.PermissionRevocation) -> Decision:
+        """A session is over, or is said to be: it ends at once, and the DVA may restore it.
+
+        Whoever forges this stops a drive, as an emergency would, and takes the robot from nobody.
+        """
+        if message.source != self.dva:
+            return Decision(m.NOT_PERMITTED, "only the DVA revokes permissions")
+        self.inquiry.is_over(body.session)
+        observer = self.observers.get(body.holder)
+        if observer is not None and observer.session == body.session:
+            del self.observers[body.holder]
+        if self.grant is None or self.grant.session != body.session:
+            return Decision(m.OK)
+        self.inquiry.about_holder(self.grant.holder)
+        return self._is_held(None)
+
+    def _told_by_dva(self, body: m.Reply) -> Decision:
+        """What the DVA has answered when it was asked: this alone gives anybody the robot.
+
+        That nobody holds it ends no drive: a DVA that has lost its memory may say so.
+        """
+        asked, told = self.inquiry.answered(body), body.content
+        if asked is None:
+            return Decision(m.OK, waits=True)
+        if body.code != m.OK or not isinstance(told, m.Permission):
+            if asked.level is not None and asked.holder is not None:
+                self.observers.pop(asked.holder, None)
+            return Decision(m.OK)
+        grant = m.PermissionGrant(told.device, told.level, told.session, told.address, told.sensors)
+        if grant.level != "sensors":
+            return self._is_held(grant)
+        if self._full(grant.holder) is None:
+            self.observers[grant.holder] = grant
+        return Decision(m.OK)
 
     def _is_held(self, grant: m.PermissionGrant | None) -> Decision:
-        """Somebody else may act from now on, or nobody: who drives is stopped."""
-        self.grant = grant
-        self.last_order_id = self.last_set_id = 0
-        self._word += 1
+        """Somebody else may act from now on, or nobody: whoever drives is stopped."""
+        held, self.grant = self.grant, grant
+        if grant is not None and held is not None and grant.session == held.session:
+            return Decision(m.OK)  # the holder may have moved
+        if grant is not None and grant.session != self._numbered:
+            self.last_order_id, self.last_set_id, self._numbered = 0, 0, grant.session
         if self.owner is None:  # also where it is in somebody's hand, who goes on
             return Decision(m.OK)
         self._idle("revoked")
         return Decision(m.OK, set_point=STAND)
 
-    def _is_absurd(self, session: int) -> bool:
-        absurd = is_absurd(session, self.highest_session)
-        self.absurd_sessions += absurd
-        return absurd
-
-    def _bad_session(self, why: str) -> Decision:
-        """With the highest session that is known, if the DVA understands that."""
-        known = self.doubts.dva_knows and self.highest_session
-        floor = m.SessionFloor(self.highest_session) if known else None
-        return Decision(m.BAD_SESSION, why, content=floor)
-
-    def _told_by_dva(self, body: m.Reply) -> Decision:
-        """What the DVA has answered when it was asked who holds the robot."""
-        who, held = self.doubts.asked, self.grant
-        knows = self.doubts.dva_knows = body.code not in (m.BAD_MESSAGE, m.NOT_SUPPORTED)
-        mine = held is not None and held.holder == who
-        if not knows or self.doubts.word != self._word:
-            return Decision(m.OK)  # something was said meanwhile
-        if isinstance(told := body.content, m.Permission) and told.level != "sensors":
-            if mine and held is not None and held.session == told.session:
-                return Decision(m.OK)
-            self.highest_session = told.session
-            return self._is_held(
-                m.PermissionGrant(who, told.level, told.session, told.address, told.sensors)
-            )
-        if not (mine and body.code == m.NOT_PERMITTED):
-            return Decision(m.OK)
-        self.highest_session = self._before  # the DVA never said what put it up
-        return self._is_held(None)
-
-    def _observer(self, body: m.PermissionGrant) -> Decision:
-        """Somebody may subscribe to sensors; the one who drives goes on driving."""
-        if body.holder not in self.observers and len(self.observers) >= MOST_OBSERVERS:
-            return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")
-        self.observers[body.holder] = body
-        return Decision(m.OK)
-
-    def _revoked(self, message: m.Message, body: m.PermissionRevocation) -> Decision:
-        """A session is over; one that is over already is so all the more."""
-        if message.source != self.dva:
-            return Decision(m.NOT_PERMITTED, "only the DVA revokes permissions")
-        observer = self.observers.get(body.holder)
-        if observer is not None and observer.session == body.session:
-            del self.observers[body.holder]
-            return Decision(m.OK)
-        if self._is_absurd(body.session):
-            return self._bad_session("no session is so far ahead")
-        # Its grant may still be on the way, and must find that it is over.
-        self._word += 1
-        self.highest_session = max(self.highest_session, body.session)
-        if self.grant is None or self.grant.session != body.session:
-            return Decision(m.OK)
-        return self._is_held(None)
+    def _full(self, observer: str) -> Decision | None:
+        """The refusal of one more observer, if there is no room; any driver goes on driving."""
+        if observer in self.observers or len(self.observers) < MOST_OBSERVERS:
+            return None
+        return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")
 
     def _subscription(self, message: m.Message, body: m.DevSub) -> Decision:
         """Whether somebody may subscribe to a sensor: each one is permitted by name (S5)."""
@@ -426,9 +361,11 @@ class RobotController:
         if body.sensor not in {sensor.name for sensor in self.sensors}:
             return Decision(m.UNKNOWN_SENSOR, f"no sensor of that name; {self._what_there_is()}")
         if not any(body.sensor in grant.sensors for grant in held):
-            return Decision(m.NOT_PERMITTED, f"{message.source} may not subscribe to {body.sensor}")
+            text = f"{message.source} may not subscribe to {body.sensor}"
+            return self._full(message.source) or Decision(m.NOT_PERMITTED, text, waits=True)
         if message.session not in {g.session for g in held if body.sensor in g.sensors}:
-            return Decision(m.BAD_SESSION, f"session {message.session} is not the current one")
+            text = f"session {message.session} is not the current one"
+            return Decision(m.BAD_SESSION, text, waits=True)
         return Decision(m.OK)
 
     @property
@@ -494,7 +431,7 @@ class RobotController:
     def _start(self, message: m.Message, arrived: float, now: float, moving: bool) -> Decision:
         refusal = self._refusal(message, "teleoperation")
         if refusal is not None:
-            return refusal
+            return refusal._replace(waits=not self.knows(message))
         again = self.mode is TELEOPERATION and self.owner == message.source
         refusal = None if again else self._begin(arrived, moving)
         refusal = refusal or self._order(message)
@@ -530,7 +467,7 @@ class RobotController:
             return Decision(m.STALE, "too old to obey")
         self.last_valid = now
         set_point = _make_set_point(body.speed, body.turn_rate, until)
-        return _make_decision(m.OK, "", set_point, None)
+        return _make_decision(m.OK, "", set_point, None, False)
 
     def _stop(self, message: m.Message) -> Decision:
         refusal = self._refusal(message, "teleoperation") or self._order(message)
@@ -543,7 +480,9 @@ class RobotController:
 
     def _mission(self, message: m.Message, body: Mission, arrived: float, moving: bool) -> Decision:
         refusal = self._refusal(message, "missions")
-        refusal = refusal or self._begin(arrived, moving) or self._order(message)
+        if refusal is not None:
+            return refusal._replace(waits=not self.knows(message))
+        refusal = self._begin(arrived, moving) or self._order(message)
         if refusal is not None:
             return refusal
         self.mode, self.owner, self.mission = MISSION, message.source, body

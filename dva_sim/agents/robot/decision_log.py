@@ -17,6 +17,7 @@ from dva_sim.protocol.errors import ProtocolError
 LEASE_ENDS, MISSION_ENDS = "lease ends", "mission ends"
 TAKEN_BY_HAND, LET_GO, PRESSED = "taken by hand", "let go", "emergency pressed"
 HANGS = "hangs"
+ASKS, NO_ANSWER = "asks the DVA", "no answer of the DVA"
 HAND = "hand"  # whose that was is no matter of a trace
 
 
@@ -46,10 +47,17 @@ class DecisionLog:
         self._write(start)
 
     def decided(
-        self, message: m.Message, arrived: float, now: float, moving: bool, decision: Decision
+        self,
+        message: m.Message,
+        arrived: float,
+        now: float,
+        moving: bool,
+        decision: Decision,
+        waited: bool = False,
     ) -> None:
         """A message was decided on; arguments as of `RobotController.handle`."""
         told = {"arrived": arrived, "now": now, "moving": moving}
+        told |= {"waited": True} if waited else {}
         self._write({"message": encode(message).decode(), **told, **_as_data(decision)})
 
     def happened(self, what: str, now: float) -> None:
@@ -151,6 +159,10 @@ def _again(
         controller.press_emergency(now)
     elif happened == HANGS:
         controller.hang()
+    elif happened == ASKS:
+        controller.inquiry.next(now)
+    elif happened == NO_ANSWER:
+        controller.inquiry.unanswered()
     else:
         raise ValueError(f"{happened!r} does not happen to a robot")
     return None
@@ -164,8 +176,9 @@ def _ask_again(
     code, text = _value(entry, "code", int), _value(entry, "text", str)
     point = _value(entry, "set_point", list, type(None))
     then = Decision(code, text, None if point is None else TimedSetPoint(*point))
-    now = controller.handle(message, arrived, time, _value(entry, "moving", bool))
-    return message, then, now._replace(content=None)
+    moving, waited = _value(entry, "moving", bool), bool(entry.get("waited"))
+    now = controller.handle(message, arrived, time, moving, waited)
+    return message, then, now._replace(content=None, waits=False)
 
 
 def _value(entry: dict[str, Any], name: str, *types: type) -> Any:

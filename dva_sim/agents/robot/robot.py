@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from dva_sim.agents.device import HOLDER, LONGEST_BID, STATUS, AgentDevice, command_topic
 from dva_sim.agents.observation import FRAME, CameraFrame, Observation, make_frame, make_observation
 from dva_sim.agents.robot import command_queue as queue
 from dva_sim.agents.robot.command_queue import LIMIT, CommandQueue, Letter, Standing
+from dva_sim.agents.robot.confirmations import Confirmations
 from dva_sim.agents.robot.controller import (
     ENDS,
     STAND,
@@ -138,6 +140,13 @@ class RobotAgent:
             self._is_driven,
             self._turn_away,
         )
+        self._confirmations = Confirmations(
+            device,
+            controller,
+            self._told_by_dva,
+            partial(self._conclude, waited=True),
+            self._happened,
+        )
         self.sensors = dict(setup.sensors)
         self._sensing = SensorSubscriptions(device, self.sensors, controller.tick)
         controller.sensors = tuple(m.Sensor(n, port.unit) for n, port in setup.sensors.items())
@@ -154,6 +163,7 @@ class RobotAgent:
     def start(self) -> None:
         """Begin to publish frames, status and mode changes."""
         clock = self.device.clock
+        self.device.connect(self.device.dva)  # what it will ask need not wait for that
         clock.every(1.0 / self._setup.frame_rate, self._take_frame)
         clock.every(STATUS_PERIOD, self._publish_status)
 
@@ -208,10 +218,10 @@ class RobotAgent:
         """
         if self.controller.mode is Mode.MISSION:
             self.move(STAND)
-        if self.trace is not None:
-            self.trace.happened(HANGS, self.device.clock.now)
+        self._happened(HANGS)
         before = self.controller.mode
         self.controller.hang()
+        self._confirmations.forget()
         self.device.silent = True
         if self.controller.mode is not before:
             self.mode_changed("")
@@ -235,10 +245,12 @@ class RobotAgent:
             return message
         if self._standing_of(message) is not queue.STRANGER:
             return message
-        unknown, now = not self._is_driven() or self.inbox.hears_the_dva, self.device.clock.now
-        if unknown and isinstance(body, HOLDERS_ONLY):
+        told = self.inbox.hears_the_dva or self.controller.inquiry.is_open
+        if (told or not self._is_driven()) and isinstance(body, HOLDERS_ONLY):
             return message
-        self.device.conclude(request, message, lambda one: self._reply(one, now), at_once=True)
+        letter = Letter(request.data, self.device.clock.now, request, message)
+        answer = partial(self._reply, letter, waited=True)
+        self.device.conclude(request, message, answer, at_once=True)
         return None
 
     def _standing_of(self, message: m.Message) -> Standing:
@@ -278,25 +290,35 @@ class RobotAgent:
             return
         if letter.request is None:
             self._decide(letter.message, letter.arrived)
-            return
-        arrived = letter.arrived
-        self.device.conclude(letter.request, letter.message, lambda one: self._reply(one, arrived))
+        else:
+            self._conclude(letter)
 
-    def _reply(self, message: m.Message, arrived: float) -> m.Reply:
-        decision = self._decide(message, arrived)
+    def _conclude(self, letter: Letter, waited: bool = False) -> None:
+        """Answer a letter, unless it has to wait until the DVA has been asked."""
+        if letter.request is not None and letter.message is not None and not self.device.silent:
+            answer = partial(self._reply, letter, waited=waited)
+            self.device.conclude(letter.request, letter.message, answer)
+
+    def _reply(self, letter: Letter, message: m.Message, *, waited: bool) -> m.Reply | None:
+        decision = self._decide(message, letter.arrived, waited)
+        if decision.waits and not waited:
+            if self._confirmations.keep(letter, message):
+                self._confirmations.ask()
+                return None
+            decision = self._decide(message, letter.arrived, waited=True)
         return m.Reply(message.message_id, decision.code, decision.text, decision.content)
 
-    def _decide(self, message: m.Message, arrived: float) -> Decision:
+    def _decide(self, message: m.Message, arrived: float, waited: bool = False) -> Decision:
         now, moving = self.device.clock.now, self.is_moving
         controller, is_command = self.controller, isinstance(message.body, m.SetTeleOp)
         before, mission = controller.mode, controller.mission_status
-        decision = controller.handle(message, arrived, now, moving)
+        decision = controller.handle(message, arrived, now, moving, waited)
         if is_command and self.refuses is not None:
             decision = Decision(self.refuses, "refuses all commands")
         if self.trace is not None:
-            self.trace.decided(message, arrived, now, moving, decision)
-        if controller.doubts.unasked is not None:
-            self._ask_about(controller.doubts.unasked)
+            self.trace.decided(message, arrived, now, moving, decision, waited)
+        if decision.waits and not waited:
+            return decision
         if decision.set_point is not None:
             self.move(decision.set_point)
         if decision.code == m.OK and not is_command:
@@ -312,7 +334,19 @@ class RobotAgent:
         if controller.mission_status is not mission:
             self._publish_mission()
         self._note_holder(message, decision.code)
+        if not is_command:
+            self._confirmations.ask()
         return decision
+
+    def _told_by_dva(self, reply: m.Reply) -> Decision:
+        """The DVA has answered what it was asked, over a connection of the robot's own."""
+        me, dva = self.device.id_tag, self.device.dva
+        answer = m.Message(me, 1, dva, "00:00:00", 0, reply)
+        return self._decide(answer, self.device.clock.now)
+
+    def _happened(self, what: str) -> None:
+        if self.trace is not None:
+            self.trace.happened(what, self.device.clock.now)
 
     def _note_holder(self, message: m.Message, code: int) -> None:
         """How the holder's commands fare; who listens hears at once when that changes."""
@@ -341,16 +375,6 @@ class RobotAgent:
         if network.ready(me, HOLDER, WHATEVER_WAITS):
             self.device.publish(HOLDER, m.RobotHolder(self._holder, None, held, fares or None))
 
-    def _ask_about(self, device: str) -> None:
-        """Ask the DVA whether it has granted this robot to a device; its answer decides."""
-        me, dva = self.device.id_tag, self.device.dva
-        self.device.recorder.counters["asked the DVA who holds a robot"] += 1
-
-        def answered(reply: m.Reply) -> None:
-            self._decide(m.Message(me, 1, dva, "00:00:00", 0, reply), self.device.clock.now)
-
-        self.device.ask(dva, m.GetGrant(device), answered)
-
     def _follow_up(self, message: m.Message, decision: Decision) -> Decision:
         """What a decision means to others than the motors."""
         match message.body:
@@ -358,8 +382,6 @@ class RobotAgent:
                 return Decision(*self._sensing.subscribe(message.source, wish))
             case m.TaskAnnouncement() as announced if self.controller.free:
                 self.device.clock.call_after(0.0, self._bid, announced)
-            case m.PermissionGrant(holder=holder, address=str(address)):
-                self.device.network.introduce(holder, address)
             case m.PermissionRevocation(holder=holder):
                 if not self.controller.may_read(holder):
                     self._sensing.end(holder)
@@ -443,8 +465,7 @@ class RobotAgent:
         now = self.device.clock.now
         self._world.advance_to(now)
         if self.controller.expire(now):
-            if self.trace is not None:
-                self.trace.happened(LEASE_ENDS, now)
+            self._happened(LEASE_ENDS)
             self.mode_changed("")
         pose = self.body.pose()
         body = m.RobotStatus(
@@ -469,6 +490,5 @@ class RobotAgent:
         if status.mission_state in ENDS:
             why = f": {status.reason}" if status.reason else ""
             self.device.tell(f"mission {status.mission_state}{why}", "mode")
-            if self.trace is not None:
-                self.trace.happened(MISSION_ENDS, self.device.clock.now)
+            self._happened(MISSION_ENDS)
             self.mode_changed("")

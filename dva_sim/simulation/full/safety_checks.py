@@ -9,6 +9,7 @@ is asked for anything else, so that a recording can be judged as the run itself 
 
 from __future__ import annotations
 
+import math
 import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
@@ -49,8 +50,8 @@ CHECKED: Final = {
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
     f"slack: {SLACK - 1:.0%}, and "
     f"{MOVING:g} m/s backwards",
-    "S5": "every command, drive, mission and subscription has a permission that the DVA gave; "
-    "no slack",
+    "S5": "every command, drive, mission and subscription has a permission that the DVA gave, and "
+    "has confirmed to the robot when it asked; no slack",
     "S6": "every report becomes an event, every event is in one state and the counts agree; none "
     "waits, or is in one pair of hands, beyond its limit; nothing is found but by who was sent; "
     f"slack: {PENDING_SLACK:g} s, and how far one sees an event",
@@ -121,7 +122,9 @@ class Witness:
         last_mission: When it was last on a mission that it may be on.
         looked: When it was last looked at.
         heard: When something of its driver, or of a hand, was last obeyed.
-        told: Sessions that it has agreed to.
+        confirmed: Sessions that the DVA has confirmed to it, when it asked.
+        question: Its newest question to the DVA.
+        asked: When it sent that first.
         hand: Who has taken it by hand, and has not let it go since.
     """
 
@@ -141,7 +144,9 @@ class Witness:
     last_mission: float = 0.0
     looked: float = 0.0
     heard: float = 0.0
-    told: set[int] = field(default_factory=set)
+    confirmed: set[int] = field(default_factory=set)
+    question: bytes = b""
+    asked: float = 0.0
     hand: str | None = None
 
     def given(self, session: int, held: Held) -> None:
@@ -150,20 +155,22 @@ class Witness:
         if len(self.sessions) > MOST_KEPT:
             forgotten, _ = self.sessions.popitem(last=False)
             self.over.pop(forgotten, None)
-            self.told.discard(forgotten)
+            self.confirmed.discard(forgotten)
 
     def permits(self, source: str, session: int | None, level: str, now: float) -> Broken | None:
         """Why a device must not act, or None."""
         held = self.sessions.get(session or 0)
         if held is None or held.holder != source or not held.allows(level):
             return "S5", f"obeys {source}, who has no permission for {level}"
+        if session not in self.confirmed:
+            return "S5", f"obeys {source}, whose permission the DVA has not confirmed"
         if now > self.over.get(session or 0, now):
             return "S2", f"obeys {source}, whose session was over"
         return None
 
     def holder(self) -> str | None:
-        """Who holds it by a session that it has agreed to, and whose end it has not heard."""
-        held = (s for s in self.sessions if s in self.told and s not in self.over)
+        """Who holds it by a session that was confirmed to it, and whose end it has not heard."""
+        held = (s for s in self.sessions if s in self.confirmed and s not in self.over)
         return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
 
     def in_hand(self, now: float) -> bool:
@@ -269,7 +276,7 @@ class SafetyAudit:
             return
         if isinstance(message.body, m.Reply):
             if source == self._dva:
-                self._is_told_who_holds(witness, message.body)
+                self._confirms(witness, message.body.content, now)
             return
         key = message.source, message.message_id
         if isinstance(message.body, m.SetTeleOp):
@@ -295,6 +302,8 @@ class SafetyAudit:
             if witness.offset is None:
                 witness.offset = offset_of(payload)
             return
+        if b"<GetGrant" in payload and payload != witness.question:
+            witness.question, witness.asked = payload, now
         if witness.offset is None and b"<RobotStatus>" in payload:
             status = _read(payload)
             if status is not None and isinstance(status.body, m.RobotStatus):
@@ -311,12 +320,23 @@ class SafetyAudit:
             self._report(found, now, source)
 
     @staticmethod
-    def _is_told_who_holds(witness: Witness, reply: m.Reply) -> None:
-        """The DVA has answered a robot that asked who holds it: that permission is good."""
-        if isinstance(content := reply.content, m.Permission):
-            witness.given(content.session, Held(content.device, content.level, content.sensors))
-            witness.over.pop(content.session, None)
-            witness.told.add(content.session)
+    def _confirms(witness: Witness, content: m.Content | None, now: float) -> None:
+        """The DVA has answered a robot that asked who may act on it: nobody else may drive it.
+
+        What it has been told to be over since it asked stays over.
+        """
+        if not isinstance(content, m.Permission):
+            return
+        if witness.over.get(content.session, -math.inf) > witness.asked:
+            return
+        held = Held(content.device, content.level, content.sensors)
+        witness.given(content.session, held)
+        witness.over.pop(content.session, None)
+        witness.confirmed.add(content.session)
+        if held.drives:
+            for session, other in witness.sessions.items():
+                if session != content.session and other.drives:
+                    _end(witness, session, now + witness.obeys_within)
 
     def _answered(
         self,
@@ -334,9 +354,6 @@ class SafetyAudit:
                 witness.stands(now)
             case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
-            case m.PermissionGrant() if asked.source == self._dva and code == m.OK:
-                witness.told.add(body.session)
-                self._replaced(witness, body, now)
         if code != m.OK or witness.obeyed_before(message):
             return
         if isinstance(body, m.StopTeleOp):
@@ -346,7 +363,10 @@ class SafetyAudit:
         elif isinstance(body, m.DevSub):
             held = witness.sessions.get(message.session or 0)
             mine = (
-                held is not None and held.holder == message.source and body.sensor in held.sensors
+                held is not None
+                and message.session in witness.confirmed
+                and held.holder == message.source
+                and body.sensor in held.sensors
             )
             if not mine or now > witness.over.get(message.session or 0, now):
                 yield "S5", f"lets {message.source} read {body.sensor}"
@@ -379,15 +399,6 @@ class SafetyAudit:
         witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
         witness.ends("teleoperation", now)
         witness.does = Doing(message.source, message.session, level)
-
-    @staticmethod
-    def _replaced(witness: Witness, grant: m.PermissionGrant, now: float) -> None:
-        """A robot has a new holder: every other session to act on it is over."""
-        if grant.level == "sensors":
-            return
-        for session, held in witness.sessions.items():
-            if session < grant.session and held.drives:
-                _end(witness, session, now)
 
     # --- what robots accept ----------------------------------------------------------------
 
@@ -487,8 +498,6 @@ class SafetyAudit:
                 pass
             elif isinstance(body, m.PermissionRevocation):
                 _end(witness, body.session, by)
-            elif isinstance(body, m.PermissionGrant):
-                self._replaced(witness, body, by)
 
     def _report(self, found: Iterator[Broken] | list[Broken], now: float, who: str) -> None:
         for rule, what in found:

@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.measures import measures_of, run_row
 from dva_sim.simulation.full.run import Run
@@ -57,63 +56,11 @@ def test_of_a_run_without_disturbance_nothing_is_measured_of_one() -> None:
     assert "driven_on_s" in measures_of(scenarios.build(scenario, {"disturbance.kind": "revoke"}))
 
 
-# --- forged in the DVA's name, where there are no keys -------------------------------------
-
-
-def forged(run: Run, body: m.Body) -> list[int]:
-    """Somebody says something to the robot in the name of the DVA."""
-    (robot,) = run.field.robots.values()
-    forger, codes = run.stage.device("operator", 9), list[int]()
-    forger.outbox.source = run.stage.device("dva", 1).id_tag
-    forger.ask(robot.device.id_tag, body, lambda reply: codes.append(reply.code))
-    run.clock.run(run.clock.now + 2.0)
-    return codes
-
-
 def until(run: Run, condition: Any, limit: float) -> None:
     end = run.clock.now + limit
     while not condition():
         assert run.clock.now < end
         run.clock.run(run.clock.now + 0.5)
-
-
-STRANGER = "02:00:00:03:00:09"
-
-
-@pytest.mark.invariant("S2", "S8")
-@pytest.mark.parametrize(
-    ("session", "code"),
-    [(2**64 - 1, m.OK), (1 << 62, m.OK), (1 << 33, m.OK)],
-)
-def test_a_grant_forged_before_the_first_takes_the_robot_out_for_seconds(
-    session: int, code: int
-) -> None:
-    """The first grant ever that a robot hears: nobody can tell, but the DVA is asked."""
-    run = disturbed("latest-wins", "none")
-    run.clock.run(0.2)
-    code = m.BAD_SESSION if session == 2**64 - 1 else code
-    assert forged(run, m.PermissionGrant(STRANGER, "both", session)) == [code]
-    drives = run.recorder.drives
-    until(run, lambda: drives and drives[0].started is not None, 30.0)
-    until(run, lambda: drives[0].applied, 5.0)
-    (robot,) = run.field.robots.values()
-    assert robot.controller.owner == drives[0].operator
-
-
-@pytest.mark.invariant("S2", "S8")
-@pytest.mark.parametrize("body", ["grant", "revocation"])
-def test_a_robot_forged_away_in_a_drive_is_driven_again_soon(body: str) -> None:
-    run = disturbed("req-rep", "none", horizon_s=300)
-    drives = run.recorder.drives
-    until(run, lambda: drives and drives[0].started is not None, 30.0)
-    (robot,) = run.field.robots.values()
-    higher = robot.controller.highest_session + (5 << 32)
-    said = m.PermissionGrant(STRANGER, "both", higher)
-    over = m.PermissionRevocation(robot.device.id_tag, STRANGER, higher)
-    assert forged(run, said if body == "grant" else over) == [m.OK]
-    until(run, lambda: len(drives) > 1 or body == "revocation", 60.0)
-    until(run, lambda: drives[-1].started is not None and drives[-1].applied, 60.0)
-    assert robot.controller.owner == drives[-1].operator
 
 
 # --- who says OK and does nothing -----------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from granted import enter
 
 from dva_sim.agents.robot.controller import STAND, Decision, RobotController, TimedSetPoint
 from dva_sim.agents.robot.faults import RobotFaults
@@ -47,6 +48,7 @@ class InHand:
     def is_held(self) -> None:
         """The DVA gives the robot to an operator."""
         grant = m.PermissionGrant(OPERATOR, "both", 1 << 33)
+        enter(self.run.dva.desk, ROBOT, grant)
         self.run.dva.device.ask(ROBOT, grant)
         self.let(1.0)
 

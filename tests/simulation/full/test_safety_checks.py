@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from granted import enter
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.drive import Teleoperation
@@ -62,7 +63,13 @@ def staged(**changes: object) -> Run:
 def ask(run: Run, time: float, body: m.Body, session: int = 5, source: str = DVA) -> None:
     """Somebody sends the robot a request at a time [s]; the DVA if nobody else is named."""
     device = run.dva.device if source == DVA else stranger(run)
-    run.clock.call_at(time, lambda: device.ask(ROBOT, body, session=session))
+
+    def said() -> None:
+        if source == DVA:
+            enter(run.dva.desk, ROBOT, body)
+        device.ask(ROBOT, body, session=session)
+
+    run.clock.call_at(time, said)
 
 
 def stranger(run: Run) -> Any:

@@ -1,0 +1,115 @@
+"""What a robot asks the DVA about permissions, and the messages that wait for the answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.robot.command_queue import OTHERS, Letter
+from dva_sim.agents.robot.controller import PATIENCE, Decision, RobotController
+from dva_sim.agents.robot.decision_log import ASKS, NO_ANSWER
+from dva_sim.protocol import messages as m
+
+EACH = 2  # messages of a connection that may wait: a device sends one at a time, perhaps again
+PER_TIMEOUT = 3.0  # a message waits for this part of the time-out of a request, or longer
+
+
+@dataclass(eq=False)
+class Waiting:
+    """A message that waits for the DVA to say what its sender may do.
+
+    Attributes:
+        letter: The message.
+        reader: Its sender, if it wants to read sensors; None: it wants to act.
+        asked: Whether the question under way was asked after it had come.
+    """
+
+    letter: Letter
+    reader: str | None
+    asked: bool = False
+
+
+class Confirmations:
+    """Asks the DVA what the controller of a robot has to know.
+
+    Args:
+        device: The robot's.
+        controller: Its decider.
+        decide: Takes what the DVA has answered.
+        conclude: Takes a message that has waited, for good.
+        happened: Told when a question is asked, and when one has failed.
+    """
+
+    def __init__(
+        self,
+        device: AgentDevice,
+        controller: RobotController,
+        decide: Callable[[m.Reply], Decision],
+        conclude: Callable[[Letter], object],
+        happened: Callable[[str], object],
+    ) -> None:
+        self._device, self._inquiry = device, controller.inquiry
+        self._decide, self._conclude, self._happened = decide, conclude, happened
+        self._waiting: list[Waiting] = []
+        self._will_ask = False
+
+    def ask(self) -> None:
+        """Ask what has to be asked next: now, or as soon as that is allowed."""
+        clock = self._device.clock
+        question = self._inquiry.next(clock.now)
+        if question is not None:
+            self._happened(ASKS)
+            self._device.recorder.counters["asked the DVA who holds a robot"] += 1
+            for one in self._waiting_for(question):
+                one.asked = True
+            self._device.ask(self._device.dva, question, self._answered, self._failed)
+            return
+        due = self._inquiry.due(clock.now)
+        if due < math.inf and not self._will_ask:
+            self._will_ask = True
+            clock.call_at(due, self._ask_again)
+
+    def keep(self, letter: Letter, message: m.Message) -> bool:
+        """Let a message wait until the DVA has been asked; False if there is no room."""
+        of_peer = sum(one.letter.peer == letter.peer for one in self._waiting)
+        if of_peer >= EACH or len(self._waiting) >= OTHERS:
+            return False
+        reader = message.source if isinstance(message.body, m.DevSub) else None
+        waiting = Waiting(letter, reader)
+        self._waiting.append(waiting)
+        patience = max(PATIENCE, self._device.timeout / PER_TIMEOUT)
+        self._device.clock.call_after(patience, self._release, [waiting])
+        return True
+
+    def forget(self) -> None:
+        """Drop all that waits: the computer starts again."""
+        self._waiting.clear()
+
+    def _waiting_for(self, question: m.GetGrant) -> list[Waiting]:
+        reader = question.holder if question.level is not None else None
+        return [one for one in self._waiting if one.reader == reader]
+
+    def _answered(self, reply: m.Reply) -> None:
+        asked = self._inquiry.asked
+        of = self._waiting_for(asked) if asked is not None else []
+        settled = [one for one in of if one.asked]
+        if not self._decide(reply).waits:
+            self._release(settled)
+        self.ask()
+
+    def _failed(self) -> None:
+        self._happened(NO_ANSWER)
+        self._inquiry.unanswered()
+        self.ask()
+
+    def _ask_again(self) -> None:
+        self._will_ask = False
+        self.ask()
+
+    def _release(self, those: list[Waiting]) -> None:
+        for one in those:
+            if one in self._waiting:
+                self._waiting.remove(one)
+                self._conclude(one.letter)

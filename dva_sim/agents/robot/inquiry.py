@@ -1,0 +1,129 @@
+"""Questions of a robot to the DVA about who may act on it: which is next, and when.
+
+Without keys anybody can claim to be the DVA. What is claimed in its name is therefore only a reason
+to ask: the answer comes over a connection that the robot itself has opened, and it alone counts.
+However much is claimed, one question is under way at a time and a few are asked in a second; each
+answer states what holds by then, so that no claim has to wait for those before it. Pure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from dataclasses import dataclass, field
+
+from dva_sim.protocol import messages as m
+
+BURST = 4.0  # questions that may follow each other at once
+RATE = 4.0  # and then so many, whatever is claimed [1/s]
+MOST_READERS = 64  # devices that wait to be asked about
+MOST_OVER = 1000  # sessions said to be over while one question is under way
+LEAST = 1e-5  # of a question: a clock that counts microseconds may come that much too early
+
+
+@dataclass
+class Inquiry:
+    """What a robot wants to know of the DVA.
+
+    Attributes:
+        asked: The question under way.
+        asked_at: When it was asked [s].
+    """
+
+    asked: m.GetGrant | None = None
+    asked_at: float = -math.inf
+    _holder: bool = False  # whether the holder is to be asked about
+    _claimed: str | None = None  # the newest that was claimed to be it
+    _by_name: bool = False  # an older DVA is asked about one device by its id
+    _readers: OrderedDict[str, None] = field(default_factory=OrderedDict)
+    _readers_next: bool = False
+    _over: set[int] = field(default_factory=set)
+    _left: float = BURST
+    _counted_at: float = 0.0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has to be asked who holds the robot, or is being asked."""
+        return self._holder or (self.asked is not None and self.asked.level is None)
+
+    def about_holder(self, claimed: str | None) -> None:
+        """There is a reason to ask who holds the robot.
+
+        Args:
+            claimed: Id of the device that is said to be the holder, or acts as if it were.
+        """
+        self._holder, self._claimed = True, claimed or self._claimed
+
+    def about_reader(self, device: str) -> None:
+        """There is a reason to ask what a device may read."""
+        if len(self._readers) < MOST_READERS:
+            self._readers[device] = None
+
+    def is_over(self, session: int) -> None:
+        """A session is said to be over; an answer that is under way may not know of that."""
+        if self.asked is not None and len(self._over) <= MOST_OVER:
+            self._over.add(session)
+
+    def due(self, now: float) -> float:
+        """Return when the next question may be asked; inf: there is none, or one is under way."""
+        if self.asked is not None or not (self._holder or self._readers):
+            return math.inf
+        lacking = 1.0 - self._allowed(now)
+        return now if lacking <= LEAST else now + lacking / RATE
+
+    def next(self, now: float) -> m.GetGrant | None:
+        """Take the next question, which is then under way, if one may be asked now."""
+        if self.due(now) > now:
+            return None
+        self._left, self._counted_at = self._allowed(now) - 1.0, now
+        if self._readers and (self._readers_next or not self._holder):
+            self.asked = m.GetGrant(self._readers.popitem(last=False)[0], "sensors")
+        else:
+            self.asked = m.GetGrant(self._claimed if self._by_name else None)
+            self._holder = False
+        self._readers_next = not self._readers_next
+        self.asked_at = now
+        self._over.clear()
+        return self.asked
+
+    def answered(self, reply: m.Reply) -> m.GetGrant | None:
+        """Take the answer to the question under way; return that question, if this settles it.
+
+        It does not where the DVA must be asked again: it does not know the robot yet, or only
+        questions about one device (before 1.6), or it may not have known that a session is over.
+        """
+        asked, self.asked = self.asked, None
+        by_name, self._by_name = self._by_name, False
+        if asked is None:
+            return None
+        if reply.code in (m.BAD_MESSAGE, m.NOT_SUPPORTED):
+            self._by_name = not by_name and asked.level is None and self._claimed is not None
+            if self._by_name:
+                self._holder = True
+                return None
+        told = reply.content
+        overtaken = isinstance(told, m.Permission) and self._was_over(told.session)
+        if overtaken or reply.code == m.NOT_REGISTERED:
+            self._again(asked)
+            return None
+        if not self._holder:
+            self._claimed = None
+        return asked
+
+    def unanswered(self) -> None:
+        """The DVA has not answered: it is asked again."""
+        asked, self.asked = self.asked, None
+        if asked is not None:
+            self._again(asked)
+
+    def _was_over(self, session: int) -> bool:
+        return session in self._over or len(self._over) > MOST_OVER
+
+    def _again(self, asked: m.GetGrant) -> None:
+        if asked.level is None:
+            self._holder = True
+        else:
+            self.about_reader(asked.holder or "")
+
+    def _allowed(self, now: float) -> float:
+        return min(BURST, self._left + RATE * (now - self._counted_at))
