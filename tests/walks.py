@@ -40,7 +40,6 @@ DEVICES = {
 ROOMS = [device for device, kind in DEVICES.items() if kind == "ControlRoom"]
 ROLES = dict(zip(ROOMS, (ControlRoomRole.SUPERVISE, ControlRoomRole.DISPATCH), strict=True))
 POLICY_NAMES = sorted(POLICIES.keys() - {"oracle"} | {"chaos"})
-EPOCH = 2.0**20  # with times in eighths of a second no digit is lost
 LOOKS = (State.ASSIGNED, State.ON_SCENE)
 GROUND = SiteKnowledge(
     None,
@@ -100,11 +99,17 @@ class Walk:
         self.now, self.numbers = 0.0, dict.fromkeys(DEVICES, 0)
         self.alive = dict.fromkeys(DEVICES, True)
         self.in_flight: list[Send] = []
-        self.desk, self.memory = self._desk(), Store(self.file, EPOCH)
+        self.desk, self.memory = self._desk(), self._store()
         for device in DEVICES:
             self._register(device)
             self._status(device)
         self._take([])
+
+    def _store(self) -> Store:
+        """The file; the time is written whenever something is, so that no part of it is lost."""
+        store = Store(self.file)
+        store.keeps_time = 0.0
+        return store
 
     def _desk(self) -> Dva:
         sessions = Sessions(Permissions(lambda: self.luck.randrange(2**32)))
@@ -301,7 +306,7 @@ class Walk:
         """The desk is killed, and a new one goes on from the file."""
         before = snapshot(self.desk)
         self.memory.close()
-        self.desk, self.memory = self._desk(), Store(self.file, EPOCH)
+        self.desk, self.memory = self._desk(), self._store()
         self.memory.recall(self.desk, self.now)
         after = snapshot(self.desk)
         assert after == before, {k: (before[k], after[k]) for k in after if after[k] != before[k]}

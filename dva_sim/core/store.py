@@ -5,11 +5,16 @@ by asking around; hence a file. What comes by itself within seconds is not kept:
 modes, signs of life, auctions. Each change is kept before anything is said because of it, so
 that a DVA that was killed never promised what its next life does not know. After the kill of
 the process nothing is lost; after a power failure the last moments may be.
+
+Times are kept on a clock of their own, which goes while a DVA runs and stands while none does: how
+long an event has waited must not hang on the clock on the wall, which may be an hour off by then,
+or on how long the DVA was down, which only that clock could tell.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import sqlite3
 from collections import deque
 from collections.abc import Iterable
@@ -25,8 +30,12 @@ from dva_sim.core.sessions import Grant
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.messages import Device, PermissionRevocation, Position
 
-FORMAT = 1
+FORMAT = 2
+OLDER = 1  # times by the wall clock
+MICROSECONDS = 1e6
 OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
+KEEPS_TIME = 1.0  # how often it is written how late it is while events are open [s]
+IDLE = 10  # and so much more rarely while none is
 WRITE_WITHIN_MS = 50  # and when something is written; the DVA stands still meanwhile
 _TABLES = f"""
 BEGIN IMMEDIATE;
@@ -35,7 +44,7 @@ CREATE TABLE IF NOT EXISTS events (number INTEGER PRIMARY KEY, open INTEGER, dat
 CREATE TABLE IF NOT EXISTS devices (id TEXT PRIMARY KEY, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS grants (session TEXT PRIMARY KEY, data TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS untold (session TEXT PRIMARY KEY, data TEXT NOT NULL);
-INSERT OR IGNORE INTO about VALUES ('format', {FORMAT});
+INSERT OR REPLACE INTO about VALUES ('format', {FORMAT});
 COMMIT;
 """
 _PLAIN: tuple[str, ...] = (
@@ -49,14 +58,18 @@ class Store:
 
     Args:
         file: Made if it does not exist.
-        epoch: Added to the DVA's time, so that times of different lives agree [s].
+
+    Attributes:
+        past: Added to the DVA's time it gives the time that is kept [s].
+        keeps_time: How often that is written while events are open [s].
 
     Raises:
         ConfigError: the file cannot be opened, or is something else.
     """
 
-    def __init__(self, file: Path | str, epoch: float = 0.0) -> None:
-        self.epoch = epoch
+    def __init__(self, file: Path | str) -> None:
+        self.past, self.keeps_time = 0.0, KEEPS_TIME
+        self._time_kept_at = -math.inf  # by the DVA's time
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
         self._session_changes, self._asks = 0, False
         self._events: dict[int, Event] = {}
@@ -77,7 +90,7 @@ class Store:
         """See that it is a memory; a file that is something else stays as it is."""
         try:
             (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            is_ours = not tables or self._about("format") == FORMAT
+            is_ours = not tables or self._about("format") in (OLDER, FORMAT)
         except (sqlite3.OperationalError, ValueError) as error:
             if "no such" not in str(error):
                 raise self._useless(error) from None
@@ -115,9 +128,8 @@ class Store:
         self._events |= {event.number: event for event in changed}
         self._devices |= dva.registry.changes()
         changes, asks = _session_changes(dva), dva.dispatcher.questions.asks
-        if not (
-            self._events or self._devices or changes != self._session_changes or asks != self._asks
-        ):
+        changed_sessions = changes != self._session_changes or asks != self._asks
+        if not (self._events or self._devices or changed_sessions or self._time_is_due(dva, now)):
             return None
         sessions = self._sessions if changes == self._session_changes else _of_sessions(dva)
         lasting = dva.sessions.with_something_open()
@@ -125,7 +137,7 @@ class Store:
         self._devices |= {i: entries[i] for i in lasting ^ self._lasting if i in entries}
         try:
             self._file.execute("BEGIN IMMEDIATE")
-            self._write(dva, sessions, lasting)
+            self._write(dva, sessions, lasting, now)
             self._file.execute("COMMIT")
         except sqlite3.Error as error:
             if self._file.in_transaction:
@@ -133,12 +145,18 @@ class Store:
             return f"cannot keep its memory: {error}"
         self._events, self._devices, self._sessions = {}, {}, sessions
         self._session_changes, self._lasting, self._asks = changes, lasting, asks
+        self._time_kept_at = now
         return None
 
-    def _write(self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str]) -> None:
+    def _time_is_due(self, dva: Dva, now: float) -> bool:
+        return now > self._time_kept_at + self.keeps_time * (1 if dva.book.open else IDLE)
+
+    def _write(
+        self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str], now: float
+    ) -> None:
         put = self._file.executemany
         events = (
-            (e.number, e.open, json.dumps(_of_event(e, dva, self.epoch)))
+            (e.number, e.open, json.dumps(_of_event(e, dva, self.past)))
             for e in self._events.values()
         )
         put("INSERT OR REPLACE INTO events VALUES (?, ?, ?)", events)
@@ -147,16 +165,16 @@ class Store:
         put(_PUT_DEVICE, devices)
         gone = self._devices.keys() - known.keys()
         put("DELETE FROM devices WHERE id = ?", ((i,) for i in gone))
-        for table, now in sessions.items():
+        for table, held in sessions.items():
             before = self._sessions[table]
-            put(
-                f"DELETE FROM {table} WHERE session = ?", ((s,) for s in before.keys() - now.keys())
-            )
-            new = now.items() - before.items()
+            gone = before.keys() - held.keys()
+            put(f"DELETE FROM {table} WHERE session = ?", ((s,) for s in gone))
+            new = held.items() - before.items()
             put(f"INSERT OR REPLACE INTO {table} VALUES (?, ?)", sorted(new))
         count = dva.sessions.permissions.count
         asks = dva.dispatcher.questions.asks
-        put(_PUT_ABOUT, [("sessions", count), ("ask_first", int(asks))])
+        time = int((now + self.past) * MICROSECONDS + 0.5)
+        put(_PUT_ABOUT, [("sessions", count), ("ask_first", int(asks)), ("time", time)])
 
     # --- from the file -----------------------------------------------------------------
 
@@ -164,7 +182,9 @@ class Store:
         """Tell a new DVA what an earlier one knew; whether there was anything.
 
         Devices count as heard just now: each has its time-out to show that it is there. Who was
-        silent, with nothing of it open, is forgotten: it would only hold a place until then.
+        silent, with nothing of it open, is forgotten: it would only hold a place until then. What
+        had waited has waited as long as when the earlier one last wrote, at most a second before
+        it ended; the time since then does not count.
 
         Raises:
             ConfigError: what the file holds makes no sense.
@@ -177,6 +197,7 @@ class Store:
         return found
 
     def _recall(self, dva: Dva, now: float) -> bool:
+        self.past = self._time() - now
         self._file.execute("DELETE FROM devices WHERE json_extract(data, '$.silent')")
         for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
             dva.registry.add(_entry(json.loads(data), now))
@@ -186,7 +207,7 @@ class Store:
         for (data,) in self._file.execute(_RECENT, (KEPT_CLOSED,)):
             found = True
             kept = json.loads(data)
-            event = _event(kept, self.epoch)
+            event = _event(kept, self.past)
             dva.book.restore(event)
             for name in kept["engaged"]:
                 dva.orders.engaged.begin(name, event)
@@ -197,6 +218,16 @@ class Store:
         dva.registry.changes()
         dva.book.changes()
         return found
+
+    def _time(self) -> float:
+        """How late it was when that was written last [s]; older files hold no more than events."""
+        if self._is_about("time"):
+            return self._about("time") / MICROSECONDS
+        times = [0.0]
+        for (data,) in self._file.execute("SELECT data FROM events"):
+            kept = json.loads(data)
+            times += [kept["waiting_since"], *kept["times"].values()]
+        return max(times)
 
     def _counts(self) -> dict[State, int]:
         rows = self._file.execute(
@@ -238,72 +269,72 @@ SELECT data FROM (
 """
 
 
-def _of_event(event: Event, dva: Dva, epoch: float) -> dict[str, Any]:
+def _of_event(event: Event, dva: Dva, past: float) -> dict[str, Any]:
     engaged = dva.orders.engaged
     people = (event.responder, event.operator, event.actor)
     return {name: getattr(event, name) for name in _PLAIN} | {
         "state": event.state.value,
         "position": [event.position.latitude, event.position.longitude],
-        "waiting_since": event.waiting_since + epoch,
-        "times": {step: time + epoch for step, time in event.times.items()},
+        "waiting_since": event.waiting_since + past,
+        "times": {step: time + past for step, time in event.times.items()},
         "failed": sorted(event.failed),
         "sent": sorted(event.sent),
-        "handling": _of_handling(event.handling, epoch),
+        "handling": _of_handling(event.handling, past),
         "engaged": [name for name in people if name and engaged.is_at(name, event)],
     }
 
 
-def _event(kept: dict[str, Any], epoch: float) -> Event:
+def _event(kept: dict[str, Any], past: float) -> Event:
     return Event(
         **{name: kept[name] for name in _PLAIN},
         position=Position(*kept["position"]),
         state=State(kept["state"]),
-        waiting_since=kept["waiting_since"] - epoch,
-        times={step: time - epoch for step, time in kept["times"].items()},
+        waiting_since=kept["waiting_since"] - past,
+        times={step: time - past for step, time in kept["times"].items()},
         failed=set(kept["failed"]),
         sent=set(kept["sent"]),
-        handling=_handling(kept.get("handling"), epoch),
+        handling=_handling(kept.get("handling"), past),
     )
 
 
-def _of_handling(handling: Handling, epoch: float) -> dict[str, Any] | None:
+def _of_handling(handling: Handling, past: float) -> dict[str, Any] | None:
     """What was decided on an event; nothing of one on which nothing was."""
     if handling == Handling():
         return None
     return {
         "decisions": handling.decisions,
-        "last": _of_choice(handling.last, epoch),
-        "acknowledged": _of_choice(handling.acknowledged, epoch),
+        "last": _of_choice(handling.last, past),
+        "acknowledged": _of_choice(handling.acknowledged, past),
         "note": handling.note,
         "taken_off": sorted(handling.taken_off),
-        "expected": {d: (sent + epoch, way) for d, (sent, way) in handling.expected.items()},
+        "expected": {d: (sent + past, way) for d, (sent, way) in handling.expected.items()},
         "advised": handling.advised,
     }
 
 
-def _handling(kept: dict[str, Any] | None, epoch: float) -> Handling:
+def _handling(kept: dict[str, Any] | None, past: float) -> Handling:
     if kept is None:
         return Handling()
     return Handling(
         kept["decisions"],
-        _choice(kept["last"], epoch),
-        _choice(kept["acknowledged"], epoch),
+        _choice(kept["last"], past),
+        _choice(kept["acknowledged"], past),
         kept["note"],
         set(kept["taken_off"]),
-        {d: (sent - epoch, way) for d, (sent, way) in kept["expected"].items()},
+        {d: (sent - past, way) for d, (sent, way) in kept["expected"].items()},
         kept["advised"],
     )
 
 
-def _of_choice(choice: Choice | None, epoch: float) -> list[Any] | None:
-    return None if choice is None else [*choice._replace(time=choice.time + epoch)]
+def _of_choice(choice: Choice | None, past: float) -> list[Any] | None:
+    return None if choice is None else [*choice._replace(time=choice.time + past)]
 
 
-def _choice(kept: list[Any] | None, epoch: float) -> Choice | None:
+def _choice(kept: list[Any] | None, past: float) -> Choice | None:
     if kept is None:
         return None
     choice = Choice(*kept)
-    return choice._replace(time=choice.time - epoch)
+    return choice._replace(time=choice.time - past)
 
 
 def _session_changes(dva: Dva) -> int:

@@ -104,7 +104,7 @@ class DvaPart:
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
         memory = None
         if options.state is not None:
-            memory = Store(options.state, epoch=time.time() - stage.clock.now)
+            memory = Store(options.state)
         self._agent = add_dva(stage, permissions, memory, keep_events=False)
         self._agent.desk.registry.most = _devices_that_fit()
         trace = _trace_of("dva", stage, options)

@@ -63,7 +63,6 @@ class TracedDva:
             "sessions": permissions.count,
             "most_devices": desk.registry.most,
             "memory": kept,
-            "epoch": 0.0 if memory is None else memory.epoch,
         }
         sink(json.dumps(start))
 
@@ -232,7 +231,7 @@ class _Again:
         permissions = Permissions(self._draw, count=start["sessions"])
         self._desk, self._sends = make_desk(stage, permissions), list[Send]()
         self._desk.registry.most = start["most_devices"]
-        self._memory, self._epoch = start["memory"], start["epoch"]
+        self._memory = start["memory"]
 
     def _draw(self) -> int:
         return self._bits.popleft() if self._bits else 0
@@ -282,7 +281,7 @@ class _Again:
         with TemporaryDirectory() as folder:
             file = Path(folder) / "memory.sqlite"
             file.write_bytes(base64.b64decode(self._memory))
-            store = Store(file, self._epoch)
+            store = Store(file)
             store.recall(self._desk, now)
             store.close()
 
