@@ -88,8 +88,10 @@ class AgentDevice:
     dva_watch: DvaWatch = field(default_factory=DvaWatch)
     clock: Clock = field(init=False)
     outbox: Outbox = field(init=False)
+    _refusal: str = ""  # why it was not registered, as was told last
     _life: int = 0  # what repeats itself belongs to one, and ends with it
     _requesters: dict[tuple[str, bool], Requester] = field(default_factory=dict)
+    _addresses: dict[str, str] = field(default_factory=dict)
     _replies: ReplyCache = field(default_factory=ReplyCache)
     _nuisances: Nuisances = field(default_factory=Nuisances)
     _dva_beats: Subscription | None = None
@@ -149,11 +151,14 @@ class AgentDevice:
 
         def answered(reply: m.Reply) -> None:
             if reply.code == m.OK:
+                self._refusal = ""
                 then()
                 self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, life)
-            else:
-                self.tell(f"was not registered: {reply.text}", "link")
-                failed()
+                return
+            if reply.text != self._refusal:  # it asks again and again, and is told the same
+                self.tell(f"is not registered: {reply.text}", "link")
+            self._refusal = reply.text
+            failed()
 
         def failed() -> None:
             self.clock.call_after(REGISTER_AGAIN, self._register, then, life)
@@ -230,6 +235,7 @@ class AgentDevice:
             requester = self._requesters.pop(key, None)
             if requester is not None:
                 requester.give_up()
+        self._addresses.pop(peer, None)
         self.network.forget(peer)
 
     def reply_to(self, message: m.Message, data: bytes) -> m.Reply | None:
@@ -246,7 +252,16 @@ class AgentDevice:
         """The DVA introduces a device to those that it may act on."""
         content = reply.content
         if peer == self.dva and isinstance(content, m.Permission) and content.address is not None:
-            self.network.introduce(content.device, content.address)
+            self.introduce(content.device, content.address)
+
+    def introduce(self, peer: str, address: str) -> None:
+        """Say where a peer is found; what it was asked elsewhere, it is asked there again."""
+        before, self._addresses[peer] = self._addresses.get(peer, address), address
+        self.network.introduce(peer, address)
+        if before != address:
+            for urgent in (True, False):
+                if (requester := self._requesters.get((peer, urgent))) is not None:
+                    requester.renew()
 
     def serve(self, handler: Handler) -> None:
         """Let `handler` take the requests on the acknowledged channel."""

@@ -117,7 +117,9 @@ class Dva:
         entry, body = self.registry.heard(message.source, now), message.body
         if entry is None:
             self.refused += 1
-        elif isinstance(body, m.RobotStatus):
+            return []
+        self.registry.is_there(entry, now)
+        if isinstance(body, m.RobotStatus):
             self.registry.locate(entry, body.position)
             entry.mode = body.mode
             self.orders.moved(message.source, now)
@@ -271,8 +273,17 @@ class Dva:
         if known is not None and known.device.device_type != body.device_type:
             text = f"{message.source} is registered as {known.device.device_type}"
             return self._refuse(message, m.NOT_PERMITTED, text)
+        if known is not None and self.registry.is_elsewhere(message.source, body.address, now):
+            self.counters["registration of an id in use"] += 1
+            text = (
+                f"{known.device.label} is heard at {known.device.address} under this id; one of "
+                f"the two needs another id, or {self.registry.silent_after:g} s without the first"
+            )
+            return self._refuse(message, m.BUSY, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
+        if known is not None and known.device.address != body.address:
+            self.sessions.forget(message.source)  # whoever holds it has to ask where it is
         if known is None and self.registry.is_full:
             sends = self._make_room(now)
         entry = self.registry.register(message.source, body, now)

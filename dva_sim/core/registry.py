@@ -32,6 +32,7 @@ class DeviceEntry:
         registrations: MessageID and timestamp of its last ones.
         free_from: Until then it is given no order, because it declined one [s].
         place: In order of registration, from 0.
+        there_until: Until then it counts as being at its address: it was heard from there [s].
     """
 
     device: Device
@@ -42,6 +43,7 @@ class DeviceEntry:
     registrations: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=8))
     free_from: float = 0.0
     place: int = 0
+    there_until: float = -math.inf
 
     @property
     def kind(self) -> str:
@@ -97,14 +99,29 @@ class Registry:
         entry = self.entries.get(id_tag)
         if entry is None:
             return None if self.is_full else self.add(DeviceEntry(device, now))
+        if entry.device.address != device.address:
+            self.is_there(entry, now)
+        elif entry.kind == DETECTOR:  # which publishes nothing: it renews its registration
+            self.is_there(entry, now + self.silent_after / 2)
         if entry.device != device:
             entry.device = device
             self._note(id_tag, entry)
         self.heard(id_tag, now)
         return entry
 
+    def is_there(self, entry: DeviceEntry, now: float) -> None:
+        """Note that a device is at its address: what it publishes there has come, or it is new."""
+        entry.there_until = max(entry.there_until, now + self.silent_after)
+
+    def is_elsewhere(self, id_tag: str, address: str, now: float) -> bool:
+        """Whether a device is at another address than the one that somebody registers it at."""
+        entry = self.entries.get(id_tag)
+        moved = entry is not None and entry.device.address != address
+        return moved and entry is not None and now < entry.there_until
+
     def add(self, entry: DeviceEntry) -> DeviceEntry:
         """Enter a device that was not known."""
+        self.is_there(entry, entry.last_heard)
         device, entry.place = entry.device, self._places
         self._places += 1
         self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry

@@ -99,8 +99,9 @@ class DvaPart:
 
     def __init__(self, stage: Stage, options: LiveOptions) -> None:
         # Sessions that no one can guess, and higher than in any earlier life of the DVA, as
-        # long as that handed out no more than so many a second and the clock was not set back.
-        count = int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND)
+        # long as that handed out no more than so many a second and the clock was not set back: then
+        # robots take the lower ones, too, as they ask. A clock may know no date at all.
+        count = max(1, int((time.time() - SESSION_EPOCH) * SESSIONS_PER_SECOND))
         permissions = Permissions(lambda: secrets.randbits(LOW_BITS), count=count)
         memory = None
         if options.state is not None:

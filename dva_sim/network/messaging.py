@@ -194,6 +194,12 @@ class Requester:
         self._queue.append(_Asked(self._last_tag, data, on_reply, on_failure))
         self._fill()
 
+    def renew(self) -> None:
+        """The peer is somewhere else: what is under way is sent again, over a new connection."""
+        self._disconnect()
+        for asked in list(self._open.values()):
+            self._attempt(asked)
+
     def give_up(self) -> None:
         """The peer is gone for good: whatever waits has failed."""
         waiting = [*self._open.values(), *self._queue]

@@ -89,7 +89,7 @@ def test_a_session_grows_above_and_is_luck_below(office: Office) -> None:
 
 
 def test_a_permission_introduces_holder_and_robot_to_each_other(office: Office) -> None:
-    office.say(ROBOT, m.Registration("robot", "Robot", "192.168.1.20:5600"))
+    office.say(ROBOT, m.Registration("robot", "Robot", "192.168.1.20:5600"), 10.1)
     reply, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "both", ("heat_flux",)))
     content, grant = reply.content, sends[0].body
     assert isinstance(content, m.Permission)
@@ -106,7 +106,7 @@ def test_a_robot_is_told_of_a_permission_once_and_again_when_its_holder_moves(
     first = office.say(OPERATOR, ask)[1]
     assert [type(send.body) for send in first] == [m.PermissionGrant]
     assert office.say(OPERATOR, ask)[1] == []
-    office.say(OPERATOR, m.Registration("operator", "TeleOp", "192.168.1.77"))
+    office.say(OPERATOR, m.Registration("operator", "TeleOp", "192.168.1.77"), 10.1)
     moved = office.say(OPERATOR, ask)[1][0].body
     assert isinstance(moved, m.PermissionGrant)
     assert moved.address == "192.168.1.77"

@@ -109,7 +109,7 @@ def test_who_claims_anothers_identity_as_another_type_ends_nothing_of_it(office:
 
 
 def test_a_changed_address_is_known_from_then_on(office: Office) -> None:
-    office.say(OPERATOR, m.Registration("operator", "TeleOp", "10.0.0.7:6000"))
+    office.say(OPERATOR, m.Registration("operator", "TeleOp", "10.0.0.7:6000"), 10.1)
     assert office.desk.registry.entries[OPERATOR].device.address == "10.0.0.7:6000"
     assert len(office.desk.registry.entries) == 4
 
@@ -152,3 +152,58 @@ def test_a_copy_of_an_old_registration_ends_nothing(office: Office) -> None:
 
 def test_what_is_not_for_the_dva_is_refused(office: Office) -> None:
     assert office.say(OPERATOR, m.StartTeleOp())[0].code == m.NOT_SUPPORTED
+
+
+# --- two under one id -------------------------------------------------------------------------
+
+ELSEWHERE = m.Registration("robot", "Robot", "10.0.0.66:5600")
+
+
+@pytest.mark.invariant("S2")
+def test_who_is_heard_at_its_address_keeps_its_id_whoever_claims_it(office: Office) -> None:
+    session = granted(office)
+    office.number = 0  # as if it had started anew
+    for second in range(0, 60, 2):
+        office.status(ROBOT, 10, now=float(second))
+        office.beat(OPERATOR, now=float(second))
+        office.number = 0
+        reply, sends = office.say(ROBOT, ELSEWHERE, second + 1.0)
+        assert (reply.code, sends) == (m.BUSY, [])
+        assert reply.text.startswith(f"robot is heard at {ADDRESS} under this id;")
+        office.desk.tick(second + 1.5)
+    assert office.desk.registry.entries[ROBOT].device.address == ADDRESS
+    assert office.desk.sessions.permissions.grants[ROBOT].session == session
+    assert office.desk.counters["registration of an id in use"] == 30
+
+
+def test_who_is_back_at_another_address_is_there_after_the_silence_at_the_old_one(
+    office: Office,
+) -> None:
+    """Nobody who speaks in its name over other connections keeps it away for longer."""
+    granted(office)
+    office.status(ROBOT, 10, now=5.0)
+    for now in (6.0, 10.0, 14.9):
+        office.say(ROBOT, m.Registration("robot", "Robot", ADDRESS), now)
+        assert office.say(ROBOT, ELSEWHERE, now)[0].code == m.BUSY
+    reply, sends = office.say(ROBOT, ELSEWHERE, 15.1)
+    assert reply.code == m.OK
+    assert {send.to for send in sends} == {ROBOT, OPERATOR}  # that session is over
+    again = office.say(OPERATOR, m.PermissionRequest(ROBOT, "both"), 16.0)[0].content
+    assert isinstance(again, m.Permission)
+    assert again.address == "10.0.0.66:5600"
+
+
+def test_the_first_of_two_that_start_at_once_has_its_silence_to_be_heard(office: Office) -> None:
+    office.say(STRANGER, m.Registration("robot", "Robot", "10.0.0.1"), 0.0)
+    assert office.say(STRANGER, m.Registration("robot", "Robot", "10.0.0.2"), 0.1)[0].code == m.BUSY
+    office.beat(STRANGER, now=9.0)
+    assert (
+        office.say(STRANGER, m.Registration("robot", "Robot", "10.0.0.2"), 18.9)[0].code == m.BUSY
+    )
+
+
+def test_a_detector_that_publishes_nothing_keeps_its_id_by_registering(office: Office) -> None:
+    other = m.Registration("detector", "Sensor", "10.0.0.2")
+    for second in range(0, 50, 10):
+        office.say(DETECTOR, m.Registration("detector", "Sensor", ADDRESS), float(second))
+        assert office.say(DETECTOR, other, second + 9.9)[0].code == m.BUSY

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterable
 from functools import partial
 
@@ -26,6 +26,7 @@ from dva_sim.protocol import messages as m
 
 MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said twice
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
+MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
 TICK = 1.0  # how often the desk looks at deadlines [s]
 
 
@@ -57,6 +58,7 @@ class DvaAgent:
         self._policy_failures = 0
         self.leave_after = device.timeout
         self._problem: str | None = None
+        self._turned_away: OrderedDict[tuple[str, str], None] = OrderedDict()
         self.beats: Counter[str] = Counter()
         self._heard: dict[str, tuple[str, list[Subscription]]] = {}  # address, at which heard
         self._attended = 0
@@ -111,9 +113,20 @@ class DvaAgent:
 
     def _on_request(self, message: m.Message) -> m.Reply:
         reply, sends = self.desk.handle(message, self.device.clock.now)
+        if isinstance(message.body, m.Registration) and reply.code != m.OK:
+            self._tell_refused(message.source, message.body, reply.text)
         self._attend()
         self._carry_out(sends)
         return reply
+
+    def _tell_refused(self, source: str, wish: m.Registration, why: str) -> None:
+        """Tell once of each device that is not registered: it asks again and again."""
+        key = source, wish.address
+        if key not in self._turned_away:
+            self._turned_away[key] = None
+            self.device.tell(f"does not register {source} at {wish.address}: {why}", "link")
+        if len(self._turned_away) > MOST_TURNED_AWAY:
+            self._turned_away.popitem(last=False)
 
     def _attend(self) -> None:
         """Listen to who is there, not to who is silent, and know nothing of who is forgotten."""
@@ -147,7 +160,7 @@ class DvaAgent:
         Detectors only speak when they have something to report.
         """
         source, network = device.id_tag, self.device.network
-        network.introduce(source, device.address)
+        self.device.introduce(source, device.address)
         if self._heard.get(source, ("", []))[0] == device.address:
             return
         self._leave(source)
