@@ -11,6 +11,7 @@ import re
 import stat
 import struct
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import zmq
@@ -27,8 +28,8 @@ _SECRET_NOTE = "SECRET key of a device: it stays on the machine that runs the de
 class KeyRing:
     """The keys in a folder: public keys of all devices, secret keys of one's own.
 
-    Public keys are read at once. Secret ones are read when asked for, so that those of others
-    may be missing.
+    Public keys are read at once, and again by `refresh`. Secret ones are read when asked for, so
+    that those of others may be missing.
 
     Args:
         folder: Where `create_keys` has put them.
@@ -45,10 +46,61 @@ class KeyRing:
         self._public: dict[str, bytes] = {}
         self._owners: dict[bytes, str] = {}
         self._pairs: dict[str, tuple[bytes, bytes]] = {}
-        for file in sorted((self.folder / "public").glob("*.key")):
+        self._files: dict[Path, tuple[str, bytes]] = {}  # what each holds
+        self._seen = self._look()
+        for file in sorted(self._seen):
+            self._files[file] = _read_public(file)
             self._add(file)
         if not self._public:
             raise ConfigError("holds no keys: there is no public/*.key", self.folder)
+
+    def refresh(self) -> set[str]:
+        """Read the public keys again if files have changed.
+
+        A file that cannot be read, as it is just being written, counts as before and is tried
+        again; of two that contradict each other the first by name counts. A folder that is not
+        there, or cannot be read, changes nothing: a disk that is away must not lock everybody out.
+
+        Returns:
+            The devices whose key is gone, new or another.
+        """
+        try:
+            seen = self._look()
+        except ConfigError:
+            return set()
+        if seen == self._seen:
+            return set()
+        before, files = self._public, dict[Path, tuple[str, bytes]]()
+        for file in sorted(seen):
+            known = self._files.get(file)
+            if known is None or seen[file] != self._seen.get(file):
+                try:
+                    known = _read_public(file)
+                except ConfigError:
+                    del seen[file]
+            if known is not None:
+                files[file] = known
+        self._files, self._seen, self._public, self._owners = files, seen, {}, {}
+        for file in files:
+            with suppress(ConfigError):
+                self._add(file)
+        devices = before.keys() | self._public.keys()
+        return {d for d in devices if before.get(d) != self._public.get(d)}
+
+    def _look(self) -> dict[Path, tuple[int, int]]:
+        """When each public file was changed, and how long it is."""
+        folder, found = self.folder / "public", dict[Path, tuple[int, int]]()
+        try:
+            for entry in os.scandir(folder):
+                if entry.name.endswith(".key"):
+                    about = entry.stat()
+                    found[folder / entry.name] = about.st_mtime_ns, about.st_size
+        except FileNotFoundError as error:
+            if Path(error.filename or folder) == folder:
+                raise ConfigError("holds no keys: there is no public/*.key", self.folder) from None
+        except OSError as error:
+            raise ConfigError(f"cannot be read: {error.strerror}", folder) from error
+        return found
 
     @property
     def devices(self) -> list[str]:
@@ -93,7 +145,7 @@ class KeyRing:
         return self._owners.get(key)
 
     def _add(self, file: Path) -> None:
-        device, public = _read_public(file)
+        device, public = self._files[file]
         if device in self._public:
             raise ConfigError(f"is a second key of {device}", file)
         if public in self._owners:

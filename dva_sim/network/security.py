@@ -307,6 +307,28 @@ class Security:
             return False
         return True
 
+    def sender(self, frame: zmq.Frame) -> str | None:
+        """Whose key a message came with, by its last frame; None: of a key that is not known.
+
+        The frame must have been received with `copy=False`.
+        """
+        try:
+            key = str(frame.get("User-Id"))
+        except zmq.ZMQError:
+            return None
+        return None if self._ring is None else self._ring.owner(key.encode())
+
+    def aim(self, socket: Socket, device: str, peer: str) -> None:
+        """Give `socket` the key that its peer has by now, for connections from now on.
+
+        Raises:
+            ConfigError: the public key of `peer` is not at hand.
+        """
+        if socket not in self._monitors:
+            self.connect_client(socket, device, peer)
+        elif self._ring is not None:
+            socket.setsockopt(zmq.CURVE_SERVERKEY, self._ring.public(peer))
+
     def trouble(self, device: str, peer: str) -> str | None:
         """What stands between a device and its peer now: for the message after a time-out."""
         for (one, _, _), handshake in self._handshakes.get(peer, {}).items():
@@ -400,7 +422,8 @@ class Security:
         device, key = domain.decode(), b"".join(credentials)
         curve = mechanism == b"CURVE" and len(key) == 32
         owner = self._ring.owner(key) if curve and self._ring is not None else None
-        status = [b"400", b"unknown key", b""] if owner is None else [b"200", b"", owner.encode()]
+        # Whose key it is counts at each message: until then it may have been taken away.
+        status = [b"400", b"unknown key", b""] if owner is None else [b"200", b"", z85.encode(key)]
         assert self._zap is not None
         self._zap.send_multipart([version, request, *status, b""])
         if owner is None:
@@ -495,11 +518,3 @@ class Security:
         del self._greetings[socket]
         self._poller.unregister(socket)
         socket.close()
-
-
-def user_of(frame: zmq.Frame) -> str | None:
-    """Whose key a message came with, as told by its last frame, received with `copy=False`."""
-    try:
-        return str(frame.get("User-Id")) or None
-    except zmq.ZMQError:
-        return None

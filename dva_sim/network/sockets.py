@@ -10,6 +10,7 @@ import ctypes
 from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Any, Final
 
 import zmq
@@ -18,18 +19,20 @@ from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.messaging import OnReply, RequestTap, Service, make_request
-from dva_sim.network.realtime import LiveClock, Poller, has_more
-from dva_sim.network.security import Refusal, Security, Socket, user_of
+from dva_sim.network.realtime import LiveClock, Poller
+from dva_sim.network.security import Refusal, Security, Socket
+from dva_sim.network.socket_io import (
+    MORE,
+    NOBLOCK,
+    PublisherSocket,
+    next_of,
+    receive,
+    receive_parts,
+    recv,
+    send,
+)
 
 DRAIN: Final = 64  # messages read from one socket before others have their turn
-
-# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
-NOBLOCK: Final = int(zmq.NOBLOCK)
-MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
-
-# Without what pyzmq adds to each call for other kinds of sockets.
-recv: Final = zmq.backend.Socket.recv
-send: Final = zmq.backend.Socket.send
 
 
 def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
@@ -41,57 +44,6 @@ def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
         zmq.RCVBUF: zeromq.receive_buffer_bytes,
     }
     return {int(option): value for option, value in options.items() if value is not None}
-
-
-def next_of(socket: Socket) -> list[bytes] | None:
-    """The next message; None if all are read, or the last one has led to closing the socket."""
-    return None if socket.closed or not has_more(socket) else receive(socket)
-
-
-def receive(socket: Socket) -> list[bytes] | None:
-    """A message, if there is one: what a REQ socket had may be the copy of a reply."""
-    try:
-        return receive_parts(socket)[0]
-    except zmq.Again:
-        return None
-
-
-def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
-    """What is left of a message: its parts, and the last frame, which says whose key it came with.
-
-    A frame says whether it is the last one at half the price of asking the socket, as
-    `recv_multipart` does. Raises `zmq.Again` if there is none.
-    """
-    frame = recv(socket, NOBLOCK, False)
-    parts = [frame.bytes]
-    while frame.more:
-        frame = recv(socket, NOBLOCK, False)
-        parts.append(frame.bytes)
-    return parts, frame
-
-
-class PublisherSocket:
-    """An XPUB socket, and what its subscribers want."""
-
-    def __init__(self, socket: Socket) -> None:
-        self.socket = socket
-        self._topics: set[str] = set()
-
-    def wanted(self, topic: str) -> bool:
-        """Whether anybody has subscribed to a topic."""
-        self.hear()
-        return any(topic.startswith(known) for known in self._topics)
-
-    def hear(self) -> None:
-        """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
-        with suppress(zmq.Again):
-            while has_more(self.socket):
-                said = self.socket.recv(NOBLOCK)
-                topic = said[1:].decode(errors="replace")
-                if said[:1] == b"\x01" and len(self._topics) < 10_000:
-                    self._topics.add(topic)
-                elif said[:1] == b"\x00":
-                    self._topics.discard(topic)
 
 
 class SocketWire:
@@ -230,11 +182,11 @@ LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
 CLOSED_AT_ONCE: Final = 10  # sockets, at each such look
 GIVE_BACK: Final = 10.0  # between looks whether memory is worth giving back, which takes 5 ms [s]
 WORTH_IT: Final = 50  # sockets closed since
+READ_KEYS: Final = 1.0  # between looks whether keys have come or gone [s]
+BIND_AGAIN: Final = 0.05  # while a port is not free yet that was just closed [s]
 RETRY: Final = 5.0  # after ZeroMQ gave up to connect [s]
 PORT_TRIES: Final = 50
 MOST_SOCKETS: Final = 60_000
-
-NOBODY: Final = "nobody"  # whose key it is where keys are on and there is none
 
 
 def give_back_memory() -> None:
@@ -290,6 +242,8 @@ class SocketNetwork:
         self._security = Security(self._context, self._aside, ring, self._refused)
         clock.every(LOOK_ASIDE, self._look_aside)
         clock.every(GIVE_BACK, self._give_back)
+        if ring is not None:
+            clock.every(READ_KEYS, partial(self._read_keys, ring))
         self.counters: Counter[str] = Counter()
         self.watcher: Callable[[str, Any, bool], object] | None = None
         self.taps: dict[str, RequestTap] = {}
@@ -419,8 +373,11 @@ class SocketNetwork:
         for _ in range(DRAIN):
             peer = recv(router, NOBLOCK)
             parts, last = receive_parts(router)
-            sender = None if self._ring is None else user_of(last) or NOBODY
-            self._request(node, router, peer, parts, sender)
+            sender = None if self._ring is None else self._security.sender(last)
+            if sender is not None or self._ring is None:
+                self._request(node, router, peer, parts, sender)
+            else:
+                self.counters["refused: of a key that is no longer known"] += 1
             if not self.clock.has_more(router):
                 return
 
@@ -536,11 +493,51 @@ class SocketNetwork:
         endpoint = self.endpoint(peer, published)
         if endpoint is None or not self._has_key(peer):
             return
-        last = _text(socket.last_endpoint).rstrip("\0")
-        if last:
-            socket.disconnect(last)
+        self._cut(socket)
         socket.connect(endpoint)
         self.clock.look(socket)
+
+    @staticmethod
+    def _cut(socket: Socket) -> None:
+        """Disconnect from where a socket connects to, if it does."""
+        last = _text(socket.last_endpoint).rstrip("\0")
+        with suppress(zmq.ZMQError):  # it may have been cut before
+            if last:
+                socket.disconnect(last)
+
+    def _read_keys(self, ring: KeyRing) -> bool:
+        """Heed the keys that have come and gone: connections made with others end."""
+        if self._context.closed:
+            return False
+        before, changed = set(ring.devices), ring.refresh()
+        for peer in sorted(changed):
+            known = self._has_key(peer)
+            came = "has changed" if peer in before else "is new"
+            self._tell(f"the key of {peer} {came if known else 'has gone: it is not heard now'}")
+            for socket, node in self._clients.get(peer, {}).items():
+                self._cut(socket)
+                if known:
+                    self._security.aim(socket, node, peer)
+                    self._reach(socket, peer)
+        for node in self._publishers if changed & before else ():
+            self._renew_publisher(node)
+        return True
+
+    def _renew_publisher(self, node: str) -> None:
+        """Open what publishes anew: who subscribes is let in by the keys that there are now."""
+        old = self._publishers[node].socket
+        endpoint, old.linger = _text(old.last_endpoint).rstrip("\0"), 0
+        self._discard(old)
+        self._publishers[node] = PublisherSocket(self._listener(zmq.XPUB, node))
+        self._bind_again(node, endpoint)
+
+    def _bind_again(self, node: str, endpoint: str) -> None:
+        """Listen where the last socket has listened, as soon as that has gone."""
+        try:
+            self._publishers[node].socket.bind(endpoint)
+        except zmq.ZMQError:
+            if not self._context.closed:
+                self.clock.call_after(BIND_AGAIN, self._bind_again, node, endpoint)
 
     def close_client(self, socket: Socket, peer: str, soon: bool = False) -> None:
         """Close a socket made by `client`.

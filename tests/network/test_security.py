@@ -17,7 +17,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.network import security as module
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.network.realtime import Poller
-from dva_sim.network.security import Reason, Refusal, Security, user_of
+from dva_sim.network.security import Reason, Refusal, Security
 
 ROBOT, OPERATOR = "02:00:00:01:00:01", "02:00:00:03:00:01"
 NULL_GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(48)
@@ -211,7 +211,7 @@ def test_requests_and_replies_travel(
     asker.send_multipart([b"stop"] if connects == zmq.REQ else [b"", b"stop"])
     who, _, request = receive(ends, router)
     assert request.bytes == b"stop"
-    assert user_of(request) == (OPERATOR if encrypted else None)
+    assert server.security.sender(request) == (OPERATOR if encrypted else None)
     router.send_multipart([who, b"", b"stopped"])
     assert receive(ends, asker)[-1].bytes == b"stopped"
     assert server.said == client.said == []
@@ -239,7 +239,7 @@ def test_several_devices_in_one_context(ring: KeyRing, make: Make) -> None:
     both.device = OPERATOR
     asker = both.connect(zmq.REQ, ROBOT, endpoint)
     asker.send(b"list")
-    assert user_of(receive([both], router)[-1]) == OPERATOR
+    assert both.security.sender(receive([both], router)[-1]) == OPERATOR
 
 
 def test_a_refused_client_can_be_told_to_try_again(

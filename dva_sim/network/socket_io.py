@@ -1,0 +1,70 @@
+"""Reading from ZeroMQ sockets and sending to them without waiting, as cheaply as pyzmq can."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Final
+
+import zmq
+
+from dva_sim.network.realtime import has_more
+from dva_sim.network.security import Socket
+
+# As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
+NOBLOCK: Final = int(zmq.NOBLOCK)
+MORE: Final = int(zmq.NOBLOCK | zmq.SNDMORE)
+
+# Without what pyzmq adds to each call for other kinds of sockets.
+recv: Final = zmq.backend.Socket.recv
+send: Final = zmq.backend.Socket.send
+
+
+def next_of(socket: Socket) -> list[bytes] | None:
+    """The next message; None if all are read, or the last one has led to closing the socket."""
+    return None if socket.closed or not has_more(socket) else receive(socket)
+
+
+def receive(socket: Socket) -> list[bytes] | None:
+    """A message, if there is one: what a REQ socket had may be the copy of a reply."""
+    try:
+        return receive_parts(socket)[0]
+    except zmq.Again:
+        return None
+
+
+def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
+    """What is left of a message: its parts, and the last frame, which says whose key it came with.
+
+    A frame says whether it is the last one at half the price of asking the socket, as
+    `recv_multipart` does. Raises `zmq.Again` if there is none.
+    """
+    frame = recv(socket, NOBLOCK, False)
+    parts = [frame.bytes]
+    while frame.more:
+        frame = recv(socket, NOBLOCK, False)
+        parts.append(frame.bytes)
+    return parts, frame
+
+
+class PublisherSocket:
+    """An XPUB socket, and what its subscribers want."""
+
+    def __init__(self, socket: Socket) -> None:
+        self.socket = socket
+        self._topics: set[str] = set()
+
+    def wanted(self, topic: str) -> bool:
+        """Whether anybody has subscribed to a topic."""
+        self.hear()
+        return any(topic.startswith(known) for known in self._topics)
+
+    def hear(self) -> None:
+        """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
+        with suppress(zmq.Again):
+            while has_more(self.socket):
+                said = self.socket.recv(NOBLOCK)
+                topic = said[1:].decode(errors="replace")
+                if said[:1] == b"\x01" and len(self._topics) < 10_000:
+                    self._topics.add(topic)
+                elif said[:1] == b"\x00":
+                    self._topics.discard(topic)
