@@ -93,6 +93,9 @@ def replay(
 
 def _show_replay(**asked: Any) -> None:
     """Play recordings on a page in the browser, until Ctrl-C."""
+    from dva_sim.cli import exposure  # late: start-up
+
+    exposure.warn_of_pages([asked["host"]], has_token=asked["token"], can=exposure.WATCHERS)
     from dva_sim.console.replay.console import ReplayOptions, show_replay  # late: start-up
 
     show_replay(ReplayOptions(**asked), _say_at_once)
@@ -157,7 +160,7 @@ def live(
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
-    from dva_sim.cli import live_screen  # late: start-up
+    from dva_sim.cli import exposure, live_screen  # late: start-up
     from dva_sim.live.options import LiveOptions  # late: start-up
 
     changes = tuple(set_ or ())
@@ -166,6 +169,10 @@ def live(
         overwrite=overwrite,
         camera_port=camera_port,
     )
+    listens = [dva.rpartition(":")[0]] if dva is not None and only in (None, "dva") else []
+    if only != "dva" or (dva is None and port):
+        listens.append(host)
+    exposure.warn_of_devices(listens, has_keys=keys is not None, close_by="--keys FOLDER closes it")
     with loudness(quiet, verbose):
         if only is None:
             live_screen.run_all(options)
@@ -246,6 +253,7 @@ def console(
         with loudness(quiet, verbose):
             _show_replay(results=results, **page)
         return
+    from dva_sim.cli import exposure  # late: start-up
     from dva_sim.console.attached.options import AttachOptions, refuse_with_dva  # late: start-up
     from dva_sim.console.attached.supervisor import attach  # late: start-up
     from dva_sim.console.options import DEFAULT, ConsoleOptions  # late: start-up
@@ -266,6 +274,11 @@ def console(
             port=port,
             token=not no_token,
             open=not no_open,
+        )
+        where.check()
+        exposure.warn_of_pages([host], has_token=where.token)
+        exposure.warn_of_devices(
+            [where.listen], has_keys=keys is not None, close_by="--keys FOLDER closes it"
         )
         attach(where, _say_at_once)
         return
@@ -289,6 +302,11 @@ def console(
         results=out,
         keep_motion=keep_motion,
         overwrite=overwrite,
+    )
+    pages = [host, *([phones_host] if phones else [])]
+    exposure.warn_of_pages(pages, has_token=options.token)
+    exposure.warn_of_devices(
+        [host] if links == "real" else [], has_keys=False, close_by="--host 127.0.0.1 closes it"
     )
     with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), seed):
         ConsoleSupervisor(options, _say_at_once).run()
@@ -333,6 +351,7 @@ def robot(
         dva-sim robot pibot --dva 192.168.1.10:5600  # the model car, at a DVA elsewhere
         dva-sim robot --number 2 --port 0  # another one beside it: robot-2
     """
+    from dva_sim.cli import exposure  # late: start-up
     from dva_sim.console.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
 
     options = RobotOptions(
@@ -348,6 +367,8 @@ def robot(
         seed=seed,
         changes=tuple(set_ or ()),
     )
+    exposure.warn_of_pages([host], has_token=options.token)
+    exposure.warn_of_devices([host], has_keys=keys is not None, close_by="--keys FOLDER closes it")
     with loudness(quiet, verbose):
         RobotSimulator(options, _say_at_once).run()
 

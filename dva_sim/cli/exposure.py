@@ -1,0 +1,69 @@
+"""What a command opens to a network without keys or tokens, in a line before it begins."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from collections.abc import Iterable
+
+import typer
+
+EVERYWHERE = "0.0.0.0", "::"  # every address of this machine
+FORGERS = (
+    "anybody who reaches it can register, read and forge messages, and stop or drive the robots"
+)
+DRIVERS = "anybody who reaches it can do all that the page offers"
+WATCHERS = "anybody who reaches it can watch the recordings"
+
+
+def warn_of_devices(hosts: Iterable[str], *, has_keys: bool, close_by: str) -> None:
+    """Say that devices listen beyond this machine without keys.
+
+    Args:
+        hosts: Addresses to listen on.
+        has_keys: Whether keys are on: then nothing is said.
+        close_by: What would close it.
+    """
+    open_to = [] if has_keys else _beyond(hosts)
+    if open_to:
+        _say(f"devices listen on {_named(open_to)} without keys: {FORGERS}; {close_by}")
+
+
+def warn_of_pages(hosts: Iterable[str], *, has_token: bool, can: str = DRIVERS) -> None:
+    """Say that pages are open beyond this machine without a token.
+
+    Args:
+        hosts: Addresses to listen on.
+        has_token: Whether one is asked for: then nothing is said.
+        can: What anybody can do there.
+    """
+    open_to = [] if has_token else _beyond(hosts)
+    if open_to:
+        _say(f"the page is on {_named(open_to)} without a token: {can}; leave out --no-token")
+
+
+def is_local(host: str) -> bool:
+    """Whether nobody but this machine reaches an address, or a name."""
+    host = host.strip("[]")
+    try:
+        return ipaddress.ip_address(host.partition("%")[0]).is_loopback
+    except ValueError:
+        pass
+    try:
+        found = [str(entry[4][0]) for entry in socket.getaddrinfo(host, None)]
+    except OSError:
+        return False  # nothing will listen there, and that is told
+    return bool(found) and all(ipaddress.ip_address(a.partition("%")[0]).is_loopback for a in found)
+
+
+def _beyond(hosts: Iterable[str]) -> list[str]:
+    return [host for host in dict.fromkeys(hosts) if not is_local(host)]
+
+
+def _named(hosts: Iterable[str]) -> str:
+    named = (f"{h} (every address of this machine)" if h in EVERYWHERE else h for h in hosts)
+    return " and ".join(named)
+
+
+def _say(what: str) -> None:
+    typer.echo(f"warning: {what}", err=True)

@@ -1,0 +1,116 @@
+"""What a command opens to a network without keys or tokens is said, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_line import call
+
+from dva_sim.cli import exposure, live_screen
+from dva_sim.console.attached import supervisor as attached
+from dva_sim.console.robot_simulator import RobotSimulator
+from dva_sim.console.supervisor import ConsoleSupervisor
+
+FORGERS, TOKEN = "stop or drive the robots", "leave out --no-token"
+LAN = "192.0.2.7"  # nobody has it (RFC 5737), and nothing is opened here
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> object:
+    """Runs a command that would listen; its lines on stderr."""
+
+    def nothing(*_: object, **__: object) -> None:
+        return None
+
+    for owner, name in (
+        (live_screen, "run_all"),
+        (live_screen, "run_one"),
+        (ConsoleSupervisor, "run"),
+        (RobotSimulator, "run"),
+        (attached, "attach"),
+    ):
+        monkeypatch.setattr(owner, name, nothing)
+
+    def run(command: str) -> list[str]:
+        result = call(*command.split())
+        assert result.returncode == 0, result.stderr
+        return [line for line in result.stderr.splitlines() if line.startswith("warning:")]
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("command", "names", "closed_by"),
+    [
+        ("live drive-to-event --host 0.0.0.0", "0.0.0.0 (every address", "--keys FOLDER"),
+        ("live drive-to-event --host ::", ":: (every address", "--keys FOLDER"),
+        (f"live drive-to-event --host {LAN}", LAN, "--keys FOLDER"),
+        (f"live drive-to-event --only dva --dva {LAN}:5600", LAN, "--keys FOLDER"),
+        (f"live drive-to-event --only dva --host {LAN} --port 5600", LAN, "--keys FOLDER"),
+        (f"live drive-to-event --only world --host {LAN}", LAN, "--keys FOLDER"),
+        (f"live drive-to-event --dva {LAN}:5600", LAN, "--keys FOLDER"),
+        (f"console --links real --host {LAN}", LAN, "--host 127.0.0.1"),
+        (f"robot --host {LAN}", LAN, "--keys FOLDER"),
+    ],
+)
+def test_devices_that_listen_beyond_this_machine_without_keys_are_said_in_a_line(
+    said, command: str, names: str, closed_by: str
+) -> None:
+    (line,) = said(command)
+    assert names in line
+    assert FORGERS in line
+    assert closed_by in line
+
+
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        (f"console --no-token --host {LAN}", LAN),
+        ("console --no-token --host 0.0.0.0", "0.0.0.0 (every address"),
+        ("console --no-token --phones", "0.0.0.0 (every address"),
+        (f"robot --no-token --host {LAN} --keys keys", LAN),
+        (f"console --dva 127.0.0.1:5600 --no-token --host {LAN}", LAN),
+    ],
+)
+def test_a_page_beyond_this_machine_without_a_token_is_said_in_a_line(
+    said, command: str, names: str
+) -> None:
+    (line,) = said(command)
+    assert names in line
+    assert TOKEN in line
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "live drive-to-event",
+        "live drive-to-event --host 127.0.0.1",
+        "live drive-to-event --host localhost",
+        "live drive-to-event --host ::1",
+        f"live drive-to-event --host {LAN} --keys keys",
+        "live drive-to-event --only dva",
+        f"live drive-to-event --only world --dva {LAN}:5600",
+        "console",
+        f"console --host {LAN}",
+        "console --no-token",
+        "console --no-token --host 127.0.0.2",
+        "console --links real",
+        "console --phones",
+        "console --dva 127.0.0.1:5600",
+        "robot --no-token",
+        f"robot --host {LAN} --keys keys",
+    ],
+)
+def test_nothing_is_said_on_this_machine_or_with_keys_or_a_token(said, command: str) -> None:
+    assert said(command) == []
+
+
+def test_both_are_said_where_both_are_open(said) -> None:
+    lines = said(f"console --links real --no-token --host {LAN}")
+    assert [TOKEN in lines[0], FORGERS in lines[1]] == [True, True]
+
+
+def test_an_address_of_which_nobody_knows_is_not_taken_for_this_machine(tmp_path: Path) -> None:
+    assert not exposure.is_local("no-such-host.invalid")
+    assert exposure.is_local("[::1]")
