@@ -168,20 +168,25 @@ def reply(time: float, to: str, number: int) -> Sent:
 def test_a_permission_that_nobody_but_its_own_words_says_the_dva_gave_is_none(
     is_forged: bool,
 ) -> None:
-    """Two operators; the robot believes a grant that one of them sends in the DVA's name."""
+    """Two operators; the robot believes what one of them says and answers in the DVA's name."""
     scenario = scenarios.build(scenarios.load("drive-to-event"), {"operator.count": 2})
     grant = said(1.0, DVA, ROBOT, m.PermissionGrant(PHONE, "both", 5), 5, 1)
+    question = said(1.1, ROBOT, DVA, m.GetGrant(), 0, 3)
+    confirmed = m.Reply(3, m.OK, "", m.Permission(PHONE, "both", 5))
+    answer = said(1.2, DVA, ROBOT, confirmed, 0, 4)
     start = said(1.2, PHONE, ROBOT, m.StartTeleOp(), 5, 2)
     facts: list[Any] = [
         Arrived(1.1, DVA, ROBOT, grant.payload),
         reply(1.1, DVA, 1),
+        question,
+        Arrived(1.2, DVA, ROBOT, answer.payload),
         start,
         Arrived(1.3, PHONE, ROBOT, start.payload),
         reply(1.3, PHONE, 2),
         MotionNews(2.0, {ROBOT: RobotMotion("Teleoperation", 0.0, 0.0)}),
     ]
     if not is_forged:
-        facts.insert(0, grant)
+        facts[:0] = [grant, answer]
     judge = LiveJudge(terms_of(scenario))
     judge.joins(0)
     here = [HERE, 0.0, [DVA, ROBOT, PHONE, OTHER]]
