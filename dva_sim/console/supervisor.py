@@ -73,9 +73,9 @@ class ConsoleSupervisor:
         finally:
             if results is not None:
                 self._write(results)
-        found = verdicts(world.recorder)
-        for verdict in found:
-            self._say(str(verdict))
+            found = verdicts(world.recorder)
+            for verdict in found:
+                self._say(str(verdict))
         if self._processes.failed:
             raise ChildFailed(self._processes.failed)
         if options.record is not None:

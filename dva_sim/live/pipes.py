@@ -21,12 +21,12 @@ class Outlet:
     """
 
     def __init__(self, file: int) -> None:
-        self._file, self._rest = file, b""
+        self._file, self._rest, self._is_open = file, b"", True
         os.set_blocking(file, False)
 
     def put(self, line: bytes) -> bool:
-        """Write a whole line, or none of it: whether there was room."""
-        if not self._flush():
+        """Write a whole line, or none of it: whether there was room, and it is not closed."""
+        if not self._is_open or not self._flush():
             return False
         self._rest = line + b"\n"
         self._flush()
@@ -39,8 +39,12 @@ class Outlet:
         return not self._rest
 
     def close(self) -> None:
-        """Say what was begun, if there is room, and nothing more."""
+        """Write what was begun, if there is room; nothing can be written from now on.
+
+        The number of the file may soon be that of another one.
+        """
         self._flush()
+        self._is_open = False
         os.close(self._file)
 
 

@@ -185,6 +185,18 @@ def test_who_records_never_waits_and_counts_what_has_no_room() -> None:
     os.close(writes)
 
 
+def test_nothing_is_written_to_a_file_that_has_the_number_of_a_closed_outlet() -> None:
+    reads, writes = os.pipe()
+    outlet = Outlet(writes)
+    assert outlet.put(b"a line")
+    outlet.close()
+    assert os.read(reads, 100) == b"a line\n"
+    os.dup2(reads, writes)
+    assert not outlet.put(b"another")
+    os.close(reads)
+    os.close(writes)
+
+
 def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording, "BYTES_PER_SECOND", 1000)
     monkeypatch.setattr(recording.time, "monotonic", lambda: 5.0)

@@ -1,6 +1,7 @@
 """The client that the specification prints, run as it stands there against real sockets."""
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -108,8 +109,11 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
     assert told.returncode == 0, told.stderr
     clock = LiveClock()
     network = SocketNetwork(clock, KeyRing(folder))
+    own = folder
     if not is_known:
-        call("keys", folder, me)  # the device has keys that nobody has been given
+        own = tmp_path / "own"  # the device has keys that nobody has been given
+        shutil.copytree(folder, own)
+        call("keys", own, me)
     try:
         stage = Stage(
             scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
@@ -120,7 +124,7 @@ def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_
         live_until(clock, lambda: dva.beats[ROBOT] > 0)
         program = code[0].replace("def ask(", f"{code[-1]}\ndef ask(")
         for name, server in (("dva", "DVA"), ("robot", "it")):
-            locked = f"lock({name}, {str(folder)!r}, {server})\n{name}.connect("
+            locked = f"lock({name}, {str(own)!r}, {server})\n{name}.connect("
             program = program.replace(f"{name}.connect(", locked)
         if not is_known:
             program = program.replace("dva.connect(", "dva.rcvtimeo = 1000; dva.connect(")

@@ -125,7 +125,8 @@ def test_of_a_registration_that_finds_no_room_nothing_is_left(tmp_path, monkeypa
         path.touch()
         return os.fdopen(os.open("/dev/full", os.O_WRONLY), "w")
 
-    monkeypatch.setattr(Path, "open", on_a_full_disk)
-    with pytest.raises(DvaSimError, match="cannot be written: No space left on device"):
-        registration._write(path, "first\n", replaces=False)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", on_a_full_disk)
+        with pytest.raises(DvaSimError, match="cannot be written: No space left on device"):
+            registration._write(path, "first\n", replaces=False)
     assert list(tmp_path.iterdir()) == []
