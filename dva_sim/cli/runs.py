@@ -142,7 +142,7 @@ def live(
             "--for",
             metavar="SECONDS",
             parser=number(),
-            help="How long; default: to the scenario's horizon.",
+            help="How long; default: to the scenario's horizon, or until stopped with --only dva.",
         ),
     ] = None,
     seed: RunSeed = 1,
@@ -221,7 +221,7 @@ def console(
     ] = None,
     record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
     audit: Annotated[
-        Path | None, file("Keep who did what: .sqlite; a log that is there is gone on with.")
+        Path | None, file("Keep who did what: .sqlite; an existing log is appended to.")
     ] = None,
     out: Annotated[
         Path | None,

@@ -400,7 +400,7 @@ def replay(
             tell_outcome(opened.tables, f"simulated by dva-sim {opened.about['version']}", where)
         there = f"{run.duration:.0f} of {opened.lasted:.0f} s are there"
         if is_part(file):
-            there = f"{run.duration:.0f} s are there, unless the run still goes on"
+            there = f"{run.duration:.0f} s are there; the run was interrupted or is still running"
         if is_part(file) or not opened.is_whole:
             where.print(f"[yellow]{file} was cut short: {there}[/yellow]", soft_wrap=True)
         made = [] if mcap is None else [f"Recording: {mcap}"]

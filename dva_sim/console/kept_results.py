@@ -117,7 +117,7 @@ class KeptResults:
         if self._kept.problem != self._problem:
             self._problem = self._kept.problem
             told = f"cannot be written: {self._problem}" if self._problem else "is written again"
-            self._world.note(f"the folder of results {self._out} {told}")
+            self._world.note(f"the results folder {self._out} {told}")
 
     def _look(self) -> None:
         assert self._world is not None

@@ -56,7 +56,7 @@ def record(part: Path, target: Path) -> float:
     """
     told = told_in(part)
     if OWN_CODE in json.dumps(told.start["scenario"]["events"]):
-        raise ConfigError("names a class in a file, which is run for no recording", part)
+        raise ConfigError("names a class in a Python file; a recording never runs code", part)
     return make_recording(told, target)
 
 
@@ -103,7 +103,7 @@ def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
     """
     if not is_part(file):
         if kept is not None:
-            raise ConfigError(f"is a recording already; only of a {SUFFIX}{PART} one is made", file)
+            raise ConfigError(f"is already a recording; --mcap is for a {SUFFIX}{PART} file", file)
         yield file
         return
     if kept is not None:

@@ -340,7 +340,7 @@ class Keeper:
         except (DvaSimError, OSError) as error:
             why, left = self.problem or error, ""
             if self.path.exists():
-                left = f"; {self.path} is left for dva-sim replay"
+                left = f"; {self.path} is left; dva-sim replay reads it"
             return f"{self._target} was not recorded: {why}{left}"
         finally:
             self._file.close()

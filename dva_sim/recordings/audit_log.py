@@ -107,7 +107,7 @@ _LAST = "SELECT number, hash FROM audit ORDER BY number DESC LIMIT 1"
 
 
 class AuditLog:
-    """A file to which rows are added; a log that is there is gone on with.
+    """A file to which rows are added; an existing log is appended to.
 
     Args:
         path: Made if it does not exist.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # late: start-up
     from dva_sim.recordings.reading import Opened
     from dva_sim.simulation.full.verdicts import Verdict
 
-UNFINISHED: Final = "its run was cut off, or still goes on; what is there was checked"
+UNFINISHED: Final = "the run was interrupted or is still running; it was checked as far as it goes"
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 
 

@@ -258,7 +258,7 @@ def test_a_console_whose_robots_break_rules_says_so_at_once_and_at_its_end(
             return answer.read().decode()
 
     wait_until(lambda: "S1 broken: " in story(), "it is told")
-    assert "S4 broken: its motors are asked for 2.00 m/s and 0.00 rad/s" in story()
+    assert "S4 broken: its motors were commanded to 2.00 m/s and 0.00 rad/s" in story()
     console.send(signal.SIGINT)
     assert console.ends() == 1
     assert console.complained == ["error: the run has broken S1, S4"]

@@ -248,5 +248,5 @@ def test_a_class_in_a_file_is_run_for_no_results(monkeypatch, tmp_path):
     with sqlite3.connect(tmp_path / "out" / KEPT_RUN) as journal:
         journal.execute("UPDATE run SET scenario = replace(scenario, '\"fire\"', '\"x.py:X\"')")
     journal.close()
-    with pytest.raises(ConfigError, match="names a class in a file, which is run for no results"):
+    with pytest.raises(ConfigError, match="names a class in a Python file; results never run code"):
         load_so_far(tmp_path / "out")

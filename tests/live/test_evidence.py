@@ -323,7 +323,7 @@ def test_a_recording_is_made_of_lines_that_were_left_where_one_is_asked_for(
     assert f"{made} would be replaced; give another name" in again.stderr
     already = call("replay", str(made), "--mcap", str(tmp_path / "other.mcap"))
     assert already.returncode == 2
-    assert "is a recording already" in already.stderr
+    assert "is already a recording" in already.stderr
 
 
 def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path: Path) -> None:

@@ -139,7 +139,8 @@ def test_the_robots_go_on_when_the_disk_becomes_full(programs: Programs, tmp_pat
     assert "The run ended (the script is done)" in run.said
     (complaint,) = run.complained
     assert complaint == (
-        "error: run.mcap was not recorded: File too large; run.mcap.part is left for dva-sim replay"
+        "error: run.mcap was not recorded: File too large; run.mcap.part is left; "
+        "dva-sim replay reads it"
     )
     assert call("replay", tmp_path / "run.mcap.part").returncode == 0
 

@@ -66,7 +66,7 @@ class Hub:
         key, page = (ws.query_params.get(name, "")[:64] for name in ("key", "page"))
         client = self.clients.join(role, key, page)
         if client.ws is not None:  # the page has lost that one, and we did not know
-            wire_of(client.ws.scope).drop(STUCK, "the page has come again")
+            wire_of(client.ws.scope).drop(STUCK, "this page was opened again")
         client.ws = ws
         you = {"client": client.name, "key": client.key, "role": role.name.lower()}
         client.feed.put({"k": "you", **you})
@@ -90,7 +90,7 @@ class Hub:
         if least is None or least.ws is None:
             return False
         least.is_here = False
-        wire_of(least.ws.scope).drop(STUCK, "somebody with a higher role needed this place")
+        wire_of(least.ws.scope).drop(STUCK, "somebody with a higher role took this place")
         return True
 
     def _hear_looker(self, client: Client, text: str) -> None:

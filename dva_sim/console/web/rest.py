@@ -168,7 +168,7 @@ class Rest:
                 known.asked = time.monotonic()
             return known.name
         if "client" in said:
-            raise NotAllowed("client: a name opens no seat; the key of that page or program does")
+            raise NotAllowed("client: a name opens no seat; send the key of that page or program")
         return _program(role)
 
     async def _do_in_new_seat(self, asked: Answer, key: str, role: Role) -> Response:

@@ -152,7 +152,7 @@ class Simulation:
             return
         full = waiting is not None or (len(self._pending) >= MOST_PENDING and not is_urgent)
         if full or not self._pipe.send(asked | {"id": key}):
-            answered({"k": "done", "ok": False, "text": "too much is asked at once"})
+            answered({"k": "done", "ok": False, "text": "too many requests at once; try again"})
             return
         self._pending[key] = [answered]
         patience = LONG if asked["do"] in OVER_THE_LINK else PATIENCE

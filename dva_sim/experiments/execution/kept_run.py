@@ -229,7 +229,7 @@ def _read(
         ) from None
     told = json.loads(scenario)
     if not own_code and OWN_CODE in json.dumps(told["events"]):
-        raise ConfigError("names a class in a file, which is run for no results", path)
+        raise ConfigError("names a class in a Python file; results never run code", path)
     told, every = Scenario.model_validate(told), [*lines, *(("", line) for (line,) in grown)]
     return json.loads(manifest), told, seed, every
 

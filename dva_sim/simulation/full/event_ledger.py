@@ -217,7 +217,7 @@ class EventLedger:
         yield from self._unheard(page.rights, now, page.works)
         for report in self._taken:
             if not self._is_booked(report):
-                yield "S6", f"a {report.kind} was reported, and is in no book"
+                yield "S6", f"a {report.kind} was reported, but the DVA does not list it"
         self._taken.clear()
         if sum(book.counts.values()) != book.total:
             yield "S6", f"{book.total} events, but {sum(book.counts.values())} in some state"
@@ -231,7 +231,7 @@ class EventLedger:
         for number in book.open.keys() & book.closed.keys():
             yield "S6", f"event {number} is open and closed"
         for number in self._open.difference(book.open, book.closed):
-            yield "S6", f"event {number} was open, and is in no book"
+            yield "S6", f"event {number} was open, but the DVA does not list it"
         self._open = set(book.open)
         every = (*book.open.values(), *book.closed.values())
         seen, self._seen = self._seen, {}

@@ -395,7 +395,10 @@ class SafetyAudit:
             yield "S2", f"obeys {message.source} while it is driven by hand"
         another = witness.owner not in (None, message.source)
         if another and abs(motion.speed) > MOVING and not _pushed(motion, limits, now):
-            yield "S2", f"goes over to {message.source} at {motion.speed:.2f} m/s"
+            yield (
+                "S2",
+                f"changed its driver to {message.source} while moving at {motion.speed:.2f} m/s",
+            )
         witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
         witness.ends("teleoperation", now)
         witness.does = Doing(message.source, message.session, level)
@@ -480,7 +483,7 @@ class SafetyAudit:
         witness.does = None  # whatever it obeys now needs a new order
         if motion.mode == Mode.TELEOPERATION and motion.powered:
             who = self._name_of(does.source)
-            yield "S2", f"is kept by {who}, of whom it has heard nothing valid for {silent:.0f} s"
+            yield "S2", f"is still driven by {who}, who has sent nothing valid for {silent:.0f} s"
 
     def _overdue(self, witness: Witness, motion: RobotMotion, now: float) -> None:
         """What a robot has not answered in time counts as obeyed by then."""
@@ -520,10 +523,13 @@ def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterato
     if is_sent:
         witness.last_mission = now
     if witness.stopped > witness.ordered and until > now > witness.stopped + PHYSICS_TICK:
-        yield "S3", f"is still asked to move, {now - witness.stopped:.1f} s after an emergency"
+        yield (
+            "S3",
+            f"is still commanded to move {now - witness.stopped:.1f} s after an emergency stop",
+        )
     elif not is_sent and until > max(witness.allowed + PHYSICS_TICK + ROUNDED, witness.looked):
         late = until - max(witness.allowed, witness.last_mission)
-        longer = f"for {late:.2f} s longer than it may" if late < ENDLESS else "without end"
+        longer = f"for {late:.2f} s longer than allowed" if late < ENDLESS else "with no time limit"
         yield "S1", f"is asked to move {longer}"
 
 
@@ -548,7 +554,7 @@ def broken_by_moving(
         found.clear()
     if not _is_within(motion.asked_speed, motion.asked_turn_rate, limits):
         asked = f"{motion.asked_speed:.2f} m/s and {motion.asked_turn_rate:.2f} rad/s"
-        found.append(("S4", f"its motors are asked for {asked}"))
+        found.append(("S4", f"its motors were commanded to {asked}"))
     return found
 
 
@@ -564,9 +570,9 @@ def _taken_by_hand(
     """Whether a robot may be taken by hand now: only one that stands, and that nobody holds."""
     holder = witness.holder()
     if holder is not None:
-        yield "S2", f"goes into a hand while {holder} holds it"
+        yield "S2", f"was taken by hand while {holder} held it"
     if abs(motion.speed) > MOVING and not _pushed(motion, limits, now):
-        yield "S2", f"goes into a hand at {motion.speed:.2f} m/s"
+        yield "S2", f"was taken by hand while moving at {motion.speed:.2f} m/s"
 
 
 def _stopping(motion: RobotMotion, limits: MotorLimits) -> float:

@@ -4,7 +4,7 @@ import { giveUp, unconfirmed } from '../net/emergency.js';
 
 export function UnconfirmedStop() {
   return unconfirmed.value
-    ? html`<p class="warning unconfirmed-stop">${unconfirmed.value} The robot stops by itself when it hears no
-        commands. <button type="button" class="plain" onClick=${giveUp}>Stop asking</button></p>`
+    ? html`<p class="warning unconfirmed-stop">${unconfirmed.value} A driven robot stops by its watchdog; a robot
+        on a mission may go on. <button type="button" class="plain" onClick=${giveUp}>Stop asking</button></p>`
     : null;
 }
