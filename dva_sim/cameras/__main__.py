@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import logging
 import os
 import signal
 import socket
@@ -26,6 +25,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from dva_sim.cameras.complaints import limit_complaints
 from dva_sim.cameras.frames import MOST_PICTURE
 from dva_sim.cameras.http import HttpProtocol, Server, place_of, serve
 from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
@@ -158,7 +158,7 @@ async def _close_when(ended: asyncio.Event, streams: CameraStreams) -> None:
 
 
 def _config(app: ASGIApp) -> uvicorn.Config:
-    logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
+    limit_complaints()
     return uvicorn.Config(
         app,
         http=HttpProtocol,

@@ -11,6 +11,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+import h11
 import uvicorn
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -66,7 +67,7 @@ class HttpProtocol(H11Protocol):
 
     def __init__(self, place: PortConnection, **given: Any) -> None:
         super().__init__(**given)
-        self._place = place
+        self._place, self._is_lost = place, False
         self.app = extended(self.app, {PLACE: place, WIRE: self})
         kind: Any = self.ws_protocol_class
         if kind is not None:
@@ -75,22 +76,38 @@ class HttpProtocol(H11Protocol):
     @property
     def waiting(self) -> int:
         """Bytes that the client has not taken yet."""
-        return self.transport.get_write_buffer_size()
+        return 0 if self._is_lost else self.transport.get_write_buffer_size()
+
+    def take_one_by_one(self) -> None:
+        """Let each piece of a response be taken by the client before the next one is sent."""
+        if not self._is_lost:
+            self.transport.set_write_buffer_limits(high=1, low=0)  # TLS takes 0 for always full
 
     def cut(self) -> None:
         """End the connection at once, also under a WebSocket; what is on its way is lost."""
+        if self._is_lost:
+            return
         sock = self.transport.get_extra_info("socket")
-        with suppress(OSError):
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGERING)
+        if sock is not None:
+            with suppress(OSError):
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGERING)
         self.transport.abort()
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer what is no HTTP, unless an answer is under way or given: then only end it."""
+        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            super().send_400_response(msg)
+        else:
+            self.transport.close()
 
     def connection_made(self, transport: Any) -> None:
         """Let the connection be cut for others."""
         super().connection_made(transport)
-        self._place.busy, self._place.drop = False, self.cut
+        self._place.drop = self.cut
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Give the place to others."""
+        self._is_lost = True
         super().connection_lost(exc)
         self._place.leave()
 

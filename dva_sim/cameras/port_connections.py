@@ -8,6 +8,7 @@ with a token of a higher rank. Pure: without a clock and without sockets.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 MOST = 512  # connections of a port
@@ -24,7 +25,7 @@ class PortConnection:
         places: The connections that it is one of.
         since: When it was made, or its newest request began or ended [s].
         rank: Of the role that its newest request showed; 0: no token.
-        busy: Whether it is being set up, a request is in progress, or a WebSocket is open.
+        busy: Whether a request is in progress, or a WebSocket is open.
         drop: Cuts the connection.
     """
 
@@ -79,8 +80,10 @@ class PortConnections:
     def enter(self, now: float) -> PortConnection:
         """Return the place of a new connection; if all are taken, another connection is cut."""
         if len(self.taken) >= self._most:
-            free = [place for place in self.taken if not place.is_served]
-            self._drop(min(free or self.taken, key=_importance), "for a newcomer")
+            known = [place for place in self.taken if place.rank > 0]
+            # Newcomers show their token in their first request, so some places are always theirs.
+            full = known if len(known) > self._most_served else ()
+            self._drop(min(full or self.taken, key=_importance), "for a newcomer")
         place = PortConnection(self, now)
         self.taken[place] = None
         return place
@@ -105,8 +108,10 @@ class PortConnections:
     def _drop(self, place: PortConnection, why: str) -> None:
         place.leave()
         self.dropped[why] += 1
-        place.drop()
+        with suppress(Exception):  # one connection that cannot be cut must not keep the others
+            place.drop()
 
 
-def _importance(place: PortConnection) -> tuple[int, bool, float]:
-    return place.rank, place.busy, place.since
+def _importance(place: PortConnection) -> tuple[bool, int, float]:
+    """Requests with a token come first, then the rank; of the others the newest matter most."""
+    return place.is_served, place.rank, place.since

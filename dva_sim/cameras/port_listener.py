@@ -15,7 +15,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from dva_sim.cameras.port_connections import (
     MOST,
@@ -112,12 +112,14 @@ class PortListener:
         if not self._speaking:
             loop.call_soon(self._serve_some)
         self._speaking.append((connection, place))
-        place.busy = True  # until it can be read what it says
 
     def _serve_some(self) -> None:
-        for _ in range(min(self._at_once, len(self._speaking))):
-            connection, place = self._speaking.popleft()
+        served = 0
+        while self._speaking and served < self._at_once:
+            connection, place = self._speaking.pop()  # the newest: older ones may be cut meanwhile
             if place in self._places.taken:
+                served += 1
+                place.since = time.monotonic()
                 task = asyncio.ensure_future(self._connect(connection, place))
                 place.drop = task.cancel
                 self._connecting.add(task)
@@ -132,13 +134,22 @@ class PortListener:
     async def _connect(self, connection: socket.socket, place: PortConnection) -> None:
         """Shake hands, where that is needed; the protocol serves the connection from then on."""
         within = {} if self._context is None else _TLS
+        made: list[Any] = []
+
+        def make() -> asyncio.Protocol:
+            made.append(self._make(place))
+            return made[0]  # type: ignore[no-any-return]
+
         try:
             await asyncio.get_running_loop().connect_accepted_socket(
-                lambda: self._make(place), connection, ssl=self._context, **within
+                make, connection, ssl=self._context, **within
             )
         except (OSError, asyncio.CancelledError):
             place.leave()
-            connection.close()
+            if made and made[0].transport is not None:
+                made[0].transport.abort()  # it closes the file, whose number may be used again
+            else:
+                connection.close()
 
 
 _TLS: Final = {"ssl_handshake_timeout": SILENT, "ssl_shutdown_timeout": SHUTDOWN}

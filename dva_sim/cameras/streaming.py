@@ -32,11 +32,12 @@ class PictureStream(Response):
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send until the viewer leaves, or is cut."""
         wire = wire_of(scope)
-        wire.transport.set_write_buffer_limits(high=0)  # a picture has to be taken before the next
-        start = {"type": "http.response.start", "status": 200, "headers": self.raw_headers}
-        await send(start)
-        tasks = [asyncio.ensure_future(self._send(send)), asyncio.ensure_future(_left(receive))]
+        tasks: list[asyncio.Task[None]] = []
         try:
+            wire.take_one_by_one()
+            await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+            for work in (self._send(send), _left(receive)):
+                tasks.append(asyncio.ensure_future(work))
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for task in tasks:
@@ -53,7 +54,8 @@ class PictureStream(Response):
                     message = {"type": "http.response.body", "body": part, "more_body": True}
                     async with asyncio.timeout(STALLED):
                         await send(message)
-            await send({"type": "http.response.body", "body": b""})
+            async with asyncio.timeout(STALLED):
+                await send({"type": "http.response.body", "body": b""})
 
 
 async def _left(receive: Receive) -> None:

@@ -93,7 +93,12 @@ class Actions:
         elif what == "look":
             self._look(line.get("logs"), line.get("tables"))
         elif isinstance(number := line.get("id"), str):
-            self._answers.once(number, partial(self._do, client, str(what), line), self._tell)
+            self._answers.once(
+                number,
+                partial(self._do, client, str(what), line),
+                self._tell,
+                repeats=what == "emergency",
+            )
 
     def _do(self, client: str, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)
@@ -268,9 +273,10 @@ class Actions:
         self._look_for_old_pictures()
 
     def _look_for_old_pictures(self) -> None:
-        """End the drives of pages that draw no new pictures, before the robot has to."""
+        """End the drives of pages that hold on and draw no new pictures."""
         now, limit = self._world.clock.now, self._world.scenario.robot.max_age_s
-        for client, seat in self._seats.taken.items():
+        holding = [(c, seat) for c, seat in self._seats.taken.items() if seat.holds]
+        for client, seat in holding:
             for held in self._world.person(seat.number).robots.values():
                 if held.is_driven and held.drawn is not None and now - held.drawn > limit:
                     self._stop_one(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -9,6 +10,8 @@ from dva_sim.console.refusal import Refused, Said
 from dva_sim.kernel.errors import DvaSimError
 
 Line = dict[str, Any]
+
+SAME: Final = 1.0  # an emergency stop by two paths is one, if they arrive within this [s]
 
 BYE: Final = "bye-"  # ids of what is asked for in the name of a page that is gone for good begin so
 
@@ -24,9 +27,15 @@ class Answers:
 
     def __init__(self) -> None:
         self.given: dict[str, Line | None] = {}
+        self._at: dict[str, float] = {}  # when, real time [s]
 
     def once(
-        self, number: str, do: Callable[[Said], object], tell: Callable[[Line], object]
+        self,
+        number: str,
+        do: Callable[[Said], object],
+        tell: Callable[[Line], object],
+        *,
+        repeats: bool = False,
     ) -> None:
         """Do an action that is new; one that was said before is answered as it was then.
 
@@ -34,18 +43,25 @@ class Answers:
             number: Its id.
             do: Does it, and tells what came of it, now or later; what it raises is a refusal.
             tell: Takes the answer.
+            repeats: Whether it is done again when it was answered a while ago: an emergency stop
+                has to stop, though its id was used before.
         """
         if number in self.given:
-            if (known := self.given[number]) is not None:
+            known = self.given[number]
+            if known is None:
+                return
+            if not repeats or time.monotonic() - self._at[number] < SAME:
                 tell(known)
-            return
+                return
         self.given[number] = None
         if len(self.given) > self.MOST:
-            del self.given[next(iter(self.given))]
+            oldest = next(iter(self.given))
+            del self.given[oldest]
+            self._at.pop(oldest, None)
 
         def said(ok: bool, text: str, /, **more: Any) -> None:
             answer = {"k": "done", "id": number, "ok": ok, "text": text, **more}
-            self.given[number] = answer
+            self.given[number], self._at[number] = answer, time.monotonic()
             tell(answer)
 
         answering(do, said)

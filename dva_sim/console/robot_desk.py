@@ -73,7 +73,12 @@ class RobotDesk:
             if isinstance(logs, dict):
                 self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
         elif isinstance(number := line.get("id"), str):
-            self._answers.once(number, partial(self._do, client, str(what), line), self._tell)
+            self._answers.once(
+                number,
+                partial(self._do, client, str(what), line),
+                self._tell,
+                repeats=what == "emergency",
+            )
 
     def _do(self, client: str, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)

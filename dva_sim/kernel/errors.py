@@ -29,7 +29,7 @@ class ExitCode(IntEnum):
 
 _MEANINGS: Final = {
     ExitCode.OK: "done",
-    ExitCode.DOES_NOT_HOLD: "what was checked is invalid, or a run in real time broke a safety rule",
+    ExitCode.DOES_NOT_HOLD: "what was checked is invalid, or a live run broke a safety rule",
     ExitCode.MISTAKE: "a mistake in the call or in a file, or what cannot be read or written",
     ExitCode.RUNS_FAILED: "runs failed, which the same command tries again, or a class of yours",
     ExitCode.GATE_FAILED: "a gate failed: `compare --fail-if` holds, or `validate` misses",

@@ -281,10 +281,10 @@ def test_what_phones_cost_and_what_they_lose(tmp_path: Path, many: int) -> None:
 
 
 NOTED = """async () => { window.ages = []; window.waits = [];
-const camera = await import('/static/js/drive/camera.js');
+const drawn = await import('/static/js/drive/drawn.js');
 const draw = CanvasRenderingContext2D.prototype.drawImage;
 CanvasRenderingContext2D.prototype.drawImage = function (...all) {
-  draw.apply(this, all); window.ages.push(camera.pictureAge(0)); };
+  draw.apply(this, all); queueMicrotask(() => window.ages.push(drawn.pictureAge(0))); };
 const send = WebSocket.prototype.send;
 WebSocket.prototype.send = function (text) { const line = JSON.parse(text);
   if (line.do === 'samples') window.waits.push(...line.at.map((at) => performance.now() - at));

@@ -24,13 +24,35 @@ def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
     assert len(places.taken) == 3
 
 
-def test_a_connection_that_is_being_set_up_outlives_one_that_has_said_nothing():
+def test_connections_in_the_middle_of_a_handshake_do_not_outlive_a_newcomer():
     places, cut = PortConnections(most=2, most_served=1), []
-    speaking = entered(places, 0.0, cut, "speaking")
-    speaking.busy = True
-    entered(places, 1.0, cut, "silent")
+    stalled = entered(places, 0.0, cut, "stalled")
+    stalled.since = 1.0  # when its handshake began
     entered(places, 2.0, cut, "newcomer")
+    entered(places, 3.0, cut, "next")
+    assert cut == ["stalled"]
+
+
+def test_idle_connections_with_a_token_leave_places_for_newcomers():
+    places, cut = PortConnections(most=6, most_served=3), []
+    for n in range(6):
+        idle = entered(places, float(n), cut, f"idle {n}")
+        idle.begin(Role.LOOK, float(n))
+        idle.end(float(n))
+    first = entered(places, 10.0, cut, "first newcomer")
+    entered(places, 10.1, cut, "second newcomer")
+    assert cut == ["idle 0", "idle 1"]
+    assert first.begin(Role.DRIVE, 10.2)
+
+
+def test_a_connection_that_cannot_be_cut_keeps_no_other():
+    places, cut = PortConnections(most=9, most_served=1), []
+    broken = places.enter(0.0)
+    broken.drop = lambda: 1 / 0
+    entered(places, 0.0, cut, "silent")
+    places.sweep(SILENT + 1.0)
     assert cut == ["silent"]
+    assert len(places.taken) == 0
 
 
 def test_a_request_with_a_token_is_never_cut_for_a_newcomer():

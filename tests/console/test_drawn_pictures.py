@@ -83,6 +83,25 @@ def test_a_drive_that_is_started_again_over_the_same_picture_ends_at_once(page):
     assert page.robot().body.speed > 0.05
 
 
+def test_a_hand_that_lets_go_ends_no_drive_and_may_take_hold_again(page):
+    """Pictures are reported with what a hand wants: without a hand nothing moves by old ones."""
+    page.wanted = {"speed": 0.0, "turn": 0.0, "held": False}
+    page.let(0.1)
+    page.let_go()
+    page.let(2 * LIMIT)
+    assert page.robot().controller.mode is Mode.TELEOPERATION
+    assert page.seat()["alert"] == ""
+    page.want(0.2)
+    page.let(2.0)
+    assert page.robot().body.speed > 0.05
+    assert page.do("stop")[0]
+    page.let_go()
+    page.let(2 * LIMIT)
+    assert page.do("start")[0]
+    page.let(1.0)
+    assert page.robot().controller.mode is Mode.TELEOPERATION
+
+
 def test_a_page_that_has_drawn_nothing_yet_drives_no_longer_than_the_limit(monkeypatch):
     page = Drawing(monkeypatch)
     page.draws = False

@@ -136,6 +136,22 @@ def test_a_permission_on_its_way_to_the_robot_is_news_only_when_it_takes_long(pa
     assert person.alert == "robot-1 does not start yet: this console holds no permission here"
 
 
+def test_an_emergency_with_an_id_that_was_used_before_stops_all_the_same(driving):
+    line = {"id": "x", "client": "program-drive", "do": "emergency", "robots": "all"}
+    driving.actions.take(line)
+    driving.actions.take(line)  # by another path, at the same time: the same one
+    driving.let(2.0)
+    assert driving.robot().controller.mode is Mode.IDLE
+    answers = [told for told in driving.told("done") if told["id"] == "x"]
+    assert driving.do("start")[0]
+    driving.let(2.0)
+    assert driving.robot().controller.mode is Mode.TELEOPERATION
+    driving.actions.take(line)
+    driving.let(1.0)
+    assert driving.robot().controller.mode is Mode.IDLE
+    assert len([told for told in driving.told("done") if told["id"] == "x"]) == len(answers) + 1
+
+
 def test_an_action_said_twice_is_done_once_and_answered_twice(page):
     line = {"id": "once", "client": "c1", "do": "take", "robots": [0]}
     page.actions.take(line)

@@ -14,7 +14,7 @@ from threading import Thread
 
 import pytest
 from console_served import serving
-from patience import PATIENCE_S
+from patience import PATIENCE_S, becomes
 from websockets.sync.client import connect
 
 FLOODING = Path(__file__).parents[1] / "flooding.py"
@@ -104,3 +104,37 @@ def test_a_body_that_does_not_come_is_not_waited_for_forever(console):
             f"Content-Length: 100\r\nAuthorization: Bearer {console.drive}\r\n\r\n".encode()
         )
         assert raw.recv(100).split()[1] == b"408"
+
+
+def test_requests_that_make_no_sense_after_their_answer_fill_no_pipe_and_stop_nothing(console):
+    """Each of them was a traceback on standard error, which nobody reads until the end."""
+    for _ in range(80):
+        with socket.create_connection(("127.0.0.1", console.port), PATIENCE_S) as raw:
+            raw.sendall(
+                b"POST /api/actions HTTP/1.1\r\nHost: localhost\r\n"
+                b"Transfer-Encoding: chunked\r\n\r\n"
+            )
+            assert raw.recv(4096).split()[1] == b"401"
+            with suppress(OSError):
+                raw.sendall(b"zz\r\n")
+                while raw.recv(4096):
+                    pass
+    assert console.ask("/").status == 401
+
+
+def test_pictures_are_streamed_over_https_and_a_viewer_that_leaves_is_no_mistake(console):
+    port = int(console.serving["phone"].split(":")[2].split("/")[0])
+    console.live()
+    plain = socket.create_connection(("127.0.0.1", port), PATIENCE_S)
+    with ssl._create_unverified_context().wrap_socket(plain) as raw:
+        raw.sendall(
+            f"GET /camera/robot-1.mjpg HTTP/1.1\r\nHost: localhost\r\n"
+            f"Authorization: Bearer {console.drive}\r\n\r\n".encode()
+        )
+        assert raw.recv(4096).split()[1] == b"200"
+        found = b""
+        for number in range(1, 4):
+            console.show(0, number, b"\xff\xd8picture %d\xff\xd9" % number)
+            while b"picture %d" % number not in found:
+                found += raw.recv(4096)
+    assert becomes(lambda: console.next_asked("watch")["robots"] == [])

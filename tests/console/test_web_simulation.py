@@ -103,6 +103,24 @@ def test_an_answer_goes_to_all_who_asked_the_same():
     play(story)
 
 
+def test_an_emergency_asked_for_again_and_again_is_answered_by_the_world_alone():
+    """Nobody is told that too much is asked, as if the stop had been refused."""
+
+    async def story(simulation, clock, end):
+        told = []
+        asked = {"id": "e", "do": "emergency", "robots": "all", "client": "c1"}
+        for _ in range(20):
+            simulation.ask(asked, told.append)
+        assert told == []
+        end.setblocking(False)
+        assert end.recv(1000).count(b"\n") == 1
+        say(end, {"k": "done", "id": "c1/e", "ok": True, "text": "stopped"})
+        await until(lambda: told)
+        assert {line["text"] for line in told} == {"stopped"}
+
+    play(story)
+
+
 def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
     async def story(simulation, clock, end):
         told = []

@@ -49,7 +49,12 @@ class AttachedActions:
             robots = line.get("robots")
             self._pages.sensors.watch(robots if isinstance(robots, list) else [])
         elif isinstance(number, str):
-            self._answers.once(number, partial(self._do, what, line), self._tell)
+            self._answers.once(
+                number,
+                partial(self._do, what, line),
+                self._tell,
+                repeats=what == "emergency",
+            )
 
     def _do(self, what: str, line: Line, said: Said) -> None:
         do = self._doers.get(what)

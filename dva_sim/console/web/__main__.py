@@ -78,7 +78,7 @@ async def run(options: argparse.Namespace) -> None:
     simulation.send(serving(access, options.host, port) | about)
     if options.pictures_fd is not None:
         await cameras.open(options.pictures_fd)
-    telling = asyncio.ensure_future(cameras.keep_telling())
+    telling = asyncio.gather(cameras.keep_telling(), hub.keep_tidy())
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
     app = make_app(access, hub, cameras, files, door, audit, options.report)

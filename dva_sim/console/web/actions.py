@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeGuard
 
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.checks import (
@@ -291,9 +291,14 @@ def id_of(value: Any) -> str:
     Raises:
         BadMessage: it is none.
     """
-    if not isinstance(value, str) or not _ID.fullmatch(value):
+    if not is_id(value):
         raise BadMessage("id should be 1 to 64 letters, digits, dots, colons or hyphens")
-    return value
+    return str(value)
+
+
+def is_id(value: Any) -> TypeGuard[str]:
+    """Whether a value can be the id of a request."""
+    return isinstance(value, str) and _ID.fullmatch(value) is not None
 
 
 class Bucket:

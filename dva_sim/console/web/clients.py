@@ -132,23 +132,32 @@ class Clients:
             return known
         return self._add(Client(self._new_name("c"), role, self._state, page))
 
-    def add_program(self, role: Role, now: float) -> Client | None:
-        """Return a new program, or None if there are too many.
+    def add_program(self, role: Role, now: float) -> tuple[Client | None, Client | None]:
+        """Return a new program and the one of a lower role whose place it takes, if any.
 
         Args:
             role: Shown by its token.
             now: Time [s].
         """
-        if sum(1 for client in self._all.values() if client.asked) >= MOST_PROGRAMS:
-            return None
+        programs = [client for client in self._all.values() if client.asked and not client.is_here]
+        least = None
+        if len(programs) >= MOST_PROGRAMS:
+            least = min(programs, key=lambda each: (each.role, each.asked))
+            if least.role >= role:
+                return None, None
+            self.remove(least)
         program = self._add(Client(self._new_name("p"), role, self._state))
         program.is_here, program.asked = False, now
-        return program
+        return program, least
 
     def silent_programs(self, now: float) -> list[Client]:
         """Return the programs that have made no request for long, and forget them."""
         long_ago = now - PROGRAM_REMEMBERED
-        silent = [client for client in self._all.values() if 0.0 < client.asked < long_ago]
+        silent = [
+            client
+            for client in self._all.values()
+            if 0.0 < client.asked < long_ago and not client.is_here
+        ]
         for client in silent:
             del self._all[client.name]
         return silent

@@ -23,6 +23,8 @@ from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say
 from dva_sim.console.web.state import body_of, encode
 
+TIDY = 10.0  # from one look at silent programs to the next [s]
+WITHOUT_PAGE = ("emergency", "stop", "gone")  # what is done though a page sees nothing
 LOOKS_RATE, LOOKS_BURST = 20.0, 60  # messages of a page that looks [1/s]
 DRIVES_RATE, DRIVES_BURST = 150.0, 300  # of one that drives [1/s]
 REFUSED, STUCK, LEAVING = 1008, 1013, 1001  # why a socket is closed
@@ -58,12 +60,12 @@ class Hub:
 
     async def see(self, ws: WebSocket, role: Role) -> None:
         """Serve a state socket until it closes."""
-        if not self._make_room(role):
+        key, page = (ws.query_params.get(name, "")[:64] for name in ("key", "page"))
+        if self.clients.find(key, role) is None and not self._make_room(role):
             await ws.send_denial_response(PlainTextResponse("64 pages are open already", 503))
             return
         if await self._is_over(ws):
             return
-        key, page = (ws.query_params.get(name, "")[:64] for name in ("key", "page"))
         client = self.clients.join(role, key, page)
         if client.ws is not None:  # the page has lost that one, and we did not know
             wire_of(client.ws.scope).drop(STUCK, "this page was opened again")
@@ -131,6 +133,8 @@ class Hub:
     async def _forget(self, client: Client) -> None:
         await asyncio.sleep(REMEMBERED)
         if self.clients.forget(client) and client.role.acts:
+            self._replace(client)
+            client.driver = None
             self._give_back(client)
 
     def _give_back(self, client: Client) -> None:
@@ -141,12 +145,19 @@ class Hub:
             self.simulation.send({"id": key, "client": client.name, "do": what})
         state.forget_seat(client.name)
 
+    async def keep_tidy(self) -> None:
+        """Give back what programs hold that have asked for nothing in a long time."""
+        while True:
+            await asyncio.sleep(TIDY)
+            for silent in self.clients.silent_programs(time.monotonic()):
+                self._give_back(silent)
+
     def new_program(self, role: Role) -> Client | None:
-        """A seat for a program; None if there are too many."""
-        now = time.monotonic()
-        for silent in self.clients.silent_programs(now):
-            self._give_back(silent)
-        return self.clients.add_program(role, now)
+        """A seat for a program; None if there are too many of its role or above."""
+        program, least = self.clients.add_program(role, time.monotonic())
+        if least is not None:
+            self._give_back(least)
+        return program
 
     def dismiss(self, program: Client) -> None:
         """Take back a seat that a program has not come to use."""
@@ -194,6 +205,8 @@ class Hub:
         said = read(text)
         name, key = said.pop("do", None), said.pop("id", None)
         try:
+            if not client.is_here and name not in WITHOUT_PAGE:
+                raise BadMessage("this page has lost its other connection; it may only stop")
             check_role(client.role, name)
             asked = asked_of(name, said, self.simulation.labels, silent=True)
             asked["client"] = client.name

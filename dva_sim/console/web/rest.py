@@ -12,7 +12,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
 from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import MOST_BYTES, asked_of, check_role, id_of, read
+from dva_sim.console.web.actions import MOST_BYTES, asked_of, check_role, id_of, is_id, read
 from dva_sim.console.web.checks import BadMessage, NotAllowed
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.simulation import Answer
@@ -145,14 +145,27 @@ class Rest:
         """`POST /api/emergency`: all robots, or some; before all else."""
         try:
             said, role = await body_of_request(request), request.scope[ROLE]
-            given = {"robots": said.get("robots", "all")}
-            asked = asked_of("emergency", given, self._simulation.labels)
+            asked = asked_of("emergency", self._robots_of(said), self._simulation.labels)
             known = self._hub.clients.find(said.get("key"), role)  # else anybody's, all the same
             client = known.name if known is not None else _program(role)
-            key = id_of(said.get("id", secrets.token_hex(8)))
+            key = said.get("id")
+            key = key if is_id(key) else secrets.token_hex(8)  # a stop is not refused for its id
             return self._answer(await self._do(asked, key, client, role))
         except BadMessage as error:
             return problem(400, str(error))
+
+    def _robots_of(self, said: dict[str, Any]) -> dict[str, Any]:
+        """The robots to stop: those that are known of a list, and all if none of it is."""
+        named, labels = said.get("robots", "all"), self._simulation.labels
+        if not isinstance(named, list):
+            return {"robots": named}
+        known = [
+            one
+            for one in named
+            if (isinstance(one, str) and one in labels)
+            or (type(one) is int and one in labels.values())
+        ]
+        return {"robots": known or "all"}
 
     def _client(self, said: dict[str, Any], role: Role) -> str:
         """The name of the page or program that asks.

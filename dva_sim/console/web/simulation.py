@@ -25,6 +25,7 @@ OVER_THE_LINK = (
     "take",
     "start",
     "stop",
+    "emergency",
     "confirm",
     "refute",
     "robot_register",
@@ -96,9 +97,10 @@ class Simulation:
             try:
                 self._take_line(json.loads(text))
             except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-                print(
-                    f"dva-sim: a line of the simulation makes no sense: {error!r}", file=sys.stderr
-                )
+                self._complaints += 1
+                if self._complaints <= MOST_COMPLAINTS:
+                    told = "dva-sim: a line of the simulation makes no sense"
+                    print(f"{told}: {error!r}", file=sys.stderr)
 
     def _take_line(self, line: dict[str, Any]) -> None:
         kind = line.get("k")
@@ -147,6 +149,8 @@ class Simulation:
             return
         is_urgent = asked["do"] in URGENT
         waiting = self._pending.get(key)
+        if waiting is not None and is_urgent and len(waiting) >= MOST_WAITING:
+            waiting.pop(0)  # whoever asks again and again hears the answer by the newest question
         if waiting is not None and len(waiting) < MOST_WAITING:
             waiting.append(answered)
             return

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import InvalidState
 
 from dva_sim.cameras.http import PLACE, WIRE, extended, wire_of
 from dva_sim.cameras.port_connections import PortConnection
@@ -42,7 +44,8 @@ class WireProtocol(WebSocketsSansIOProtocol):
         """Say why behind what is on its way, and wait no longer than a moment for all of it."""
         if self.disconnected or self.close_sent:
             return
-        self.conn.send_close(code, reason)
+        with suppress(InvalidState):  # the page is closing it at this moment
+            self.conn.send_close(code, reason)
         self.transport.write(b"".join(self.conn.data_to_send()))
         self.close_sent = True
         self.transport.close()

@@ -118,7 +118,7 @@
  *   order: GuardOrder | null, alert: string}} Guard
  *
  * @typedef {{client: string, key: string, role: string}} You
- * @typedef {{id?: string, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
+ * @typedef {{id?: string, late?: boolean, ok: boolean, text: string, tour?: TourPlan, phone?: {id: string, label: string,
  *   address: string}, devices?: Device[], proposal?: Proposal, event?: number, hand?: number}} Done
  * @typedef {{kind: 'thing' | 'event', key: number} | null} Selection
  */

@@ -10,6 +10,7 @@ const OVER_THE_LINK = [
   'take',
   'start',
   'stop',
+  'emergency',
   'confirm',
   'refute',
   'robot_register',

@@ -1,11 +1,12 @@
 /** The emergency stop: on each path there is, again and again, until it is confirmed. */
 import { signal } from '../../vendor/preact.js';
 import { forget } from '../drive/hold.js';
-import { notice, you } from '../store.js';
+import { notice, robots, you } from '../store.js';
 import { ask, newId } from './actions.js';
 
 const AGAIN_MS = 1000; // from one attempt to the next
-const REQUEST_MS = 10000; // after which a request is given up, so that none piles up
+const REQUEST_MS = 60000; // after which a request is given up, so that none piles up
+const KEPT = 'dva-sim-unconfirmed-stops';
 
 /** Why a stop is not confirmed yet; empty if none is open. */
 export const unconfirmed = signal('');
@@ -25,6 +26,7 @@ export const emergencyStop = () => stopRobots('all');
 export function giveUp() {
   const all = [...open.values()];
   open.clear();
+  remember();
   unconfirmed.value = '';
   for (const each of all) each.again();
 }
@@ -44,49 +46,60 @@ export async function stopRobots(which) {
   }
   const stop = { again: () => {} };
   open.set(key, stop);
+  remember();
+  unconfirmed.value ||= 'Emergency stop not confirmed yet …';
   let id = newId();
+  /** @type {Promise<Outcome>[]} */
+  let asked = [];
   for (let attempt = 1; open.get(key) === stop; attempt += 1) {
     const pause = new Promise((go) => {
       stop.again = () => go(undefined);
       window.setTimeout(go, AGAIN_MS);
     });
-    const { confirmed, refused } = await attemptStop(id, which, pause);
+    asked.push(overSocket(id, which), overRequest(id, which));
+    const done = await Promise.race([decided(asked), pause.then(() => null)]);
     if (open.get(key) !== stop) return;
-    if (confirmed) {
-      open.delete(key);
-      if (open.size === 0) unconfirmed.value = '';
-      notice.value = '';
+    if (done?.ok) {
+      confirmed(key);
       return;
     }
-    if (refused) id = newId(); // the world has done with the first
-    const why = refused || 'no answer';
+    if (done && singles(which).length > 1) {
+      // Some robot has not confirmed: the others need not be stopped again and again for it.
+      for (const one of singles(which)) stopRobots([one]);
+      open.delete(key);
+      remember();
+      return;
+    }
+    if (done) {
+      id = newId(); // the world has done with the first
+      asked = [];
+    }
+    const why = done?.text || 'no answer';
     unconfirmed.value = `Emergency stop not confirmed: ${why}. Attempt ${attempt + 1} …`;
     await pause;
   }
 }
 
+/** @param {Robots} which */
+const singles = (which) => (which === 'all' ? robots.peek().map((robot) => robot.i) : which);
+
+/** @param {string} key */
+function confirmed(key) {
+  open.delete(key);
+  remember();
+  if (open.size === 0) unconfirmed.value = '';
+  notice.value = '';
+}
+
 /**
- * Ask on both paths at once.
- * @param {string} id
- * @param {Robots} which
- * @param {Promise<unknown>} pause how long an answer is waited for before the next attempt
- * @returns {Promise<{confirmed: boolean, refused: string}>}
+ * What the world has answered to some questions by the same id, as soon as it has.
+ * @param {Promise<Outcome>[]} asked
+ * @returns {Promise<Outcome>}
  */
-async function attemptStop(id, which, pause) {
-  let refused = '';
-  const paths = [overSocket(id, which), overRequest(id, which)].map(async (path) => {
-    const done = await path;
-    if (!done.ok) {
-      if (done.isAnswer) refused = done.text;
-      throw new Error(done.text);
-    }
-    return true;
+function decided(asked) {
+  return new Promise((settle) => {
+    for (const each of asked) each.then((done) => done.isAnswer && settle(done));
   });
-  const confirmed = await Promise.race([
-    Promise.any(paths).catch(() => false),
-    pause.then(() => false),
-  ]);
-  return { confirmed, refused };
 }
 
 /** @typedef {{ok: boolean, text: string, isAnswer: boolean}} Outcome */
@@ -94,20 +107,40 @@ async function attemptStop(id, which, pause) {
 /** @param {string} id @param {Robots} which @returns {Promise<Outcome>} */
 async function overSocket(id, which) {
   const done = await ask('emergency', { robots: which }, id);
-  return { ok: done.ok, text: done.text, isAnswer: Boolean(done.id) };
+  return { ok: done.ok, text: done.text, isAnswer: Boolean(done.id) && !done.late };
 }
 
 /** @param {string} id @param {Robots} which @returns {Promise<Outcome>} */
 async function overRequest(id, which) {
   const body = JSON.stringify({ id, robots: which, key: you.peek()?.key });
   const headers = { 'Content-Type': 'application/json' };
-  const about = { method: 'POST', headers, body, signal: AbortSignal.timeout(REQUEST_MS) };
+  const end = new AbortController();
+  window.setTimeout(() => end.abort(), REQUEST_MS);
   try {
+    const about = { method: 'POST', headers, body, signal: end.signal };
     const answer = await fetch('/api/emergency', about);
     const done = await answer.json().catch(() => ({ ok: false, text: '' }));
     const text = done.text || `the server answered ${answer.status}`;
-    return { ok: Boolean(answer.ok && done.ok), text, isAnswer: true };
+    return { ok: Boolean(answer.ok && done.ok), text, isAnswer: answer.status === 200 };
   } catch {
     return { ok: false, text: 'the console cannot be reached', isAnswer: false };
+  }
+}
+
+/** A page that is loaded again goes on with its stops. */
+function remember() {
+  try {
+    sessionStorage.setItem(KEPT, JSON.stringify([...open.keys()]));
+  } catch {
+    // Without storage a reload ends the attempts.
+  }
+}
+
+/** Go on with the stops that were not confirmed when the page was loaded again. */
+export function resumeStops() {
+  try {
+    for (const key of JSON.parse(sessionStorage.getItem(KEPT) ?? '[]')) stopRobots(JSON.parse(key));
+  } catch {
+    // What is kept there is not ours.
   }
 }

@@ -1,7 +1,7 @@
 /** The frame of the five screens: where one is, how the link is, what is wrong, emergency stop. */
 import { html, render, useEffect, useRef } from '../../vendor/preact.js';
 import { connection, notice, scene, seat } from '../store.js';
-import { stopRobots } from '../net/emergency.js';
+import { resumeStops, stopRobots } from '../net/emergency.js';
 import { interrupted } from '../drive/hold.js';
 import { Icon } from '../ui/icon.js';
 import { UnconfirmedStop } from '../ui/unconfirmed_stop.js';
@@ -27,6 +27,7 @@ const BODIES = /** @type {Record<string, any>} */ ({
 export function showPhone(where) {
   where.replaceChildren();
   render(html`<${App} />`, where);
+  resumeStops();
 }
 
 function App() {

@@ -18,6 +18,7 @@ import { RobotsPage } from '../robots/robots_page.js';
 import { Tour, TourButton } from '../tour/tour.js';
 import { Icon } from '../ui/icon.js';
 import { UnconfirmedStop } from '../ui/unconfirmed_stop.js';
+import { resumeStops } from '../net/emergency.js';
 import { Bar } from './bar.js';
 import { PhoneButton, PhoneCode } from './phones.js';
 import { addressOf, page } from './route.js';
@@ -61,6 +62,7 @@ const BODIES = /** @type {Record<string, any>} */ ({
 export function showApp(where) {
   where.replaceChildren();
   render(html`<${App} />`, where);
+  resumeStops();
 }
 
 function App() {
