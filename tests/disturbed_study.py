@@ -91,10 +91,12 @@ class Dies:
             os.kill(os.getpid(), signal.SIGKILL)
 
 
-def killed_at_a_call(out: Path, study: Any, calls: int) -> int:
+def killed_at_a_call(
+    out: Path, study: Any, calls: int, runs: Callable[[Path, Any], None] = run
+) -> int:
     def work() -> None:
         sys.setprofile(Dies(calls))
-        run(out, study)
+        runs(out, study)
 
     return forked(work)
 
@@ -185,7 +187,7 @@ def pairs(folder: Path, study: Any, whole: Any, calls: int, luck: random.Random)
     seen = Counter[str]()
     while seen["pairs killed"] < PAIRS:
         out = folder / f"pair-{seen['pairs']}"
-        killed = killed_at_a_call(out, study, luck.randrange(1, calls))
+        killed = killed_at_a_call(out, study, luck.randrange(1, calls), run_after)
         other = forked(lambda out=out: run_after(out, study))
         assert ended(other)
         seen["pairs"] += 1

@@ -15,7 +15,7 @@ from dva_sim.live.pipes import Outlet
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.reading import read_recording
-from dva_sim.simulation.full.stage import DVA, id_of
+from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.full.verdicts import RULES, verdicts
 from dva_sim.testing.evidence import judged_recording
 
@@ -55,17 +55,18 @@ def test_an_answer_that_is_lost_was_given_all_the_same(
     """The robot obeys an emergency, nobody hears of it, and is driven on by a new order."""
     console = Recorded(monkeypatch, tmp_path / "run.mcap")
     faults = console.world.windows.by_id[ROBOT].faults
-    console.page.let(5.0)
-    console.ask(0.5, m.PermissionGrant(DVA, "both", 1 << 33), session=1 << 33)
-    console.page.let(1.0)
+    page = console.page
+    page.let(5.0)
+    assert page.do("take", robots=[0])[0]
+    page.let(1.0)
     faults.drop_replies(True)
     console.ask(0.1, m.Emergency(), session=0)
-    console.page.let(0.5)
+    page.let(0.5)
     faults.drop_replies(False)
-    console.ask(1.5, m.StartTeleOp(), session=1 << 33)
-    for tenth in range(100):
-        console.ask(2.0 + tenth / 10, m.SetTeleOp(0.1, 0.4), session=1 << 33)
-    console.page.let(13.0)
+    page.let(1.0)
+    assert page.do("start")[0]
+    page.want(0.2, 0.4)
+    page.let(10.0)
     assert console.world.run.field.robots[ROBOT].applied > 50
     assert console.states() == [dict.fromkeys(RULES, "held")] * 2
 

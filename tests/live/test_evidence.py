@@ -296,7 +296,7 @@ def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path: Path)
     left = keeper.path.read_bytes()
     told = call("check", str(keeper.path))
     assert told.returncode == 0, told.stdout
-    assert "its run was cut off, or still goes on" in told.stdout
+    assert "the run was interrupted or is still running" in told.stdout
     ended = call("replay", str(keeper.path))
     assert (ended.returncode, ended.stderr) == (0, "")
     assert "is now in mode Idle" in ended.stdout
