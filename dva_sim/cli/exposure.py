@@ -13,6 +13,7 @@ FORGERS = (
     "anybody who reaches it can register, read and forge messages, and stop or drive the robots"
 )
 DRIVERS = "anybody who reaches it can do all that the page offers"
+VIEWERS = "anybody who reaches it can watch what the robots see"
 WATCHERS = "anybody who reaches it can watch the recordings"
 
 
@@ -40,6 +41,16 @@ def warn_of_pages(hosts: Iterable[str], *, has_token: bool, can: str = DRIVERS) 
     open_to = [] if has_token else _beyond(hosts)
     if open_to:
         _say(f"the page is on {_named(open_to)} without a token: {can}; leave out --no-token")
+
+
+def warn_of_pictures(hosts: Iterable[str]) -> None:
+    """Say that what robots see is open beyond this machine, though devices need keys.
+
+    Args:
+        hosts: Addresses to listen on.
+    """
+    if open_to := _beyond(hosts):
+        _say(f"pictures are on {_named(open_to)} without a key: {VIEWERS}; leave out --camera-port")
 
 
 def is_local(host: str) -> bool:

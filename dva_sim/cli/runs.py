@@ -174,6 +174,8 @@ def live(
     if only != "dva" or (dva is None and port):
         listens.append(host)
     exposure.warn_of_devices(listens, has_keys=keys is not None, close_by="--keys FOLDER closes it")
+    if keys is not None and camera_port is not None and only in (None, "world"):
+        exposure.warn_of_pictures([host])
     with loudness(quiet, verbose):
         if only is None:
             live_screen.run_all(options)

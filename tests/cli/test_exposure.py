@@ -114,3 +114,14 @@ def test_both_are_said_where_both_are_open(said) -> None:
 def test_an_address_of_which_nobody_knows_is_not_taken_for_this_machine(tmp_path: Path) -> None:
     assert not exposure.is_local("no-such-host.invalid")
     assert exposure.is_local("[::1]")
+
+
+@pytest.mark.parametrize(
+    ("more", "is_open"),
+    [("--camera-port 0", True), ("--camera-port 0 --only dva", False), ("", False)],
+)
+def test_pictures_beyond_this_machine_are_said_though_devices_have_keys(
+    said, tmp_path: Path, more: str, is_open: bool
+) -> None:
+    found = said(f"live drive-to-event --host {LAN} --keys {tmp_path} {more}")
+    assert [LAN in line and "leave out --camera-port" in line for line in found] == [True] * is_open
