@@ -14,7 +14,9 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import urlsplit
 
 from patience import PATIENCE_S
 from websockets.sync.client import ClientConnection, connect
@@ -78,6 +80,7 @@ class Served:
         self.port: int = self.serving["port"]
         self.drive, self.look = (_token(self.serving[role]) for role in ("drive", "look"))
         self.phone = _token(self.serving["phone"] or "")
+        self.phones_port = urlsplit(self.serving["phone"] or "").port or 0
         if begins:
             self.say(scene())
 
@@ -235,6 +238,14 @@ def serving(*words: str, begins: bool = True) -> Iterator[Served]:
     finally:
         complaints = served.stop()
     assert complaints == ""
+
+
+@contextmanager
+def serving_phones(folder: Path) -> Iterator[Served]:
+    """A web process with a port for phones, whose certificates are kept in a folder."""
+    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(folder))
+    with serving(*words) as served:
+        yield served
 
 
 def _token(address: str) -> str:

@@ -155,7 +155,7 @@ class AgentDevice:
                 then()
                 self.clock.call_after(RENEW_PERIOD, self._register, do_nothing, life)
                 return
-            if reply.text != self._refusal:  # it asks again and again, and is told the same
+            if reply.text != self._refusal:  # report a repeated refusal once
                 self.tell(f"is not registered: {reply.text}", "link")
             self._refusal = reply.text
             failed()
@@ -443,7 +443,7 @@ class AgentDevice:
 
     @property
     def dva_alert(self) -> str:
-        """What a person has to know of a DVA that is silent; empty while it is there."""
+        """The alert for a person while the DVA is silent; empty while it is there."""
         watch = self.dva_watch
         silence = f"{watch.silence(self.clock.now):.0f} s"
         return f"the DVA is silent for {silence}" if watch.silent else ""

@@ -13,16 +13,16 @@ SILENT_AFTER = 10.0  # without a word, as the DVA waits for a device [s]
 
 @dataclass(slots=True)
 class DvaWatch:
-    """What a device knows of whether the DVA is there.
+    """Record of the words of the DVA at a device.
 
     A DVA whose heartbeats never came (of an older make, or over a link that has not connected yet)
     is judged by requests alone.
 
     Attributes:
         heard: When its newest word came [s]; None: never.
-        beats: Whether a heartbeat of it has ever come.
-        unanswered: Whether the newest request has failed.
-        silent: Whether it is taken to be silent, as of the last look.
+        beats: True once a heartbeat of it has come.
+        unanswered: True while the newest request has failed.
+        silent: True if it was silent at the last look.
     """
 
     heard: float | None = None
@@ -31,23 +31,23 @@ class DvaWatch:
     silent: bool = False
 
     def beat(self, now: float) -> None:
-        """A heartbeat has come."""
+        """Note a heartbeat."""
         self.heard, self.beats = now, True
 
     def answered(self, now: float) -> None:
-        """It has answered a request."""
+        """Note an answer to a request."""
         self.heard, self.unanswered = now, False
 
     def failed(self) -> None:
-        """A request was not answered, however often it was sent."""
+        """Note that a request was not answered after all attempts."""
         self.unanswered = True
 
     def look(self, now: float) -> bool:
-        """Judge anew; whether that has changed."""
+        """Update `silent`; return True if it has changed."""
         before, late = self.silent, self.beats and self.silence(now) > SILENT_AFTER
         self.silent = late or self.unanswered
         return self.silent != before
 
     def silence(self, now: float) -> float:
-        """For how long nothing has come [s]; from the start on if nothing ever has."""
+        """Return the time since the newest word [s]; since the start if none has come."""
         return now - (self.heard or 0.0)

@@ -17,7 +17,6 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 
-import uvicorn
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -25,13 +24,13 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from dva_sim.cameras.complaints import limit_complaints
 from dva_sim.cameras.frames import MOST_PICTURE
-from dva_sim.cameras.http import HttpProtocol, Server, place_of, serve
 from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
-from dva_sim.cameras.port_listener import fitting_places
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import MOST_VIEWERS, CameraStreams, headers_of
+from dva_sim.serving.connection import place_of
+from dva_sim.serving.port_listener import fitting_places
+from dva_sim.serving.server import Server, serve
 
 ANYBODY = 1  # rank of all viewers: nobody shows a token here
 MOST_REQUEST = 16 * 1024  # of which a path and headers consist [B]
@@ -40,7 +39,7 @@ NOT_KEPT = {"Cache-Control": "no-store"}
 
 
 class CameraPages:
-    """What can be asked for.
+    """The addresses that are served.
 
     Args:
         streams: The pictures.
@@ -131,7 +130,8 @@ async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> 
     ]
     app = Starlette(routes=routes, exception_handlers={HTTPException: _refused})
     closing = asyncio.ensure_future(_close_when(ended, streams))
-    await serve(Server(_config(_counted(app))), listener, fitting_places(1), ended)
+    server = Server.of(_counted(app), MOST_REQUEST, ws="none")
+    await serve(server, listener, fitting_places(1), ended)
     for task in (*tasks, closing):
         task.cancel()
     ours.close()
@@ -155,24 +155,6 @@ def _counted(app: ASGIApp) -> ASGIApp:
 async def _close_when(ended: asyncio.Event, streams: CameraStreams) -> None:
     await ended.wait()
     streams.close()
-
-
-def _config(app: ASGIApp) -> uvicorn.Config:
-    limit_complaints()
-    return uvicorn.Config(
-        app,
-        http=HttpProtocol,
-        ws="none",
-        lifespan="off",
-        loop="asyncio",
-        log_config=None,
-        access_log=False,
-        proxy_headers=False,
-        server_header=False,
-        timeout_keep_alive=15,
-        timeout_graceful_shutdown=0,
-        h11_max_incomplete_event_size=MOST_REQUEST,
-    )
 
 
 def main(given: Sequence[str] | None = None) -> int:

@@ -40,11 +40,11 @@ class PaintersEnd:
         self._rest, self._unsent, self.is_open = b"", b"", True
 
     def fileno(self) -> int:
-        """Of the socket."""
+        """Return the file descriptor of the socket."""
         return self._socket.fileno()
 
     def lines(self) -> list[Line]:
-        """What has come since."""
+        """Return the lines that have arrived since the last call."""
         try:
             data = self._socket.recv(AT_ONCE)
         except BlockingIOError:
@@ -93,11 +93,11 @@ class Painter:
 
     @property
     def is_ready(self) -> bool:
-        """Whether the site is built, which takes seconds."""
+        """True once the site is built, which takes seconds."""
         return self._eyes is not None
 
     def hear(self, line: Line) -> None:
-        """Take a line, whoever says it."""
+        """Take a line from either end."""
         kind = line.get("k")
         if "watch" in line:
             self._watch(frozenset(line["watch"]))
@@ -115,12 +115,12 @@ class Painter:
         self._due = {robot: due for robot, due in self._due.items() if robot in robots}
 
     def wait(self, now: float) -> float:
-        """How long nothing has to be drawn [s]."""
+        """Return the time until a picture is due [s]."""
         due = [self._due.get(robot, now) - now for robot in self._frames]
         return max(0.0, min([*due, IDLE_S]))
 
     def draw(self, now: float) -> Picture | None:
-        """The picture that has waited longest, if one is due at `now` [s]."""
+        """Draw the picture that has waited longest, if one is due at `now` [s]."""
         ready = [robot for robot in self._frames if self._due.get(robot, now) <= now]
         if self._eyes is None or not ready:
             return None

@@ -30,7 +30,7 @@ class FilmedRun(Protocol):
 
     @property
     def scenario(self) -> Scenario:
-        """What it consists of."""
+        """Return the scenario of the run."""
 
     @property
     def clock(self) -> Clock:
@@ -38,7 +38,7 @@ class FilmedRun(Protocol):
 
     @property
     def network(self) -> Transport:
-        """What carries its frames."""
+        """Return the transport of its frames."""
 
     @property
     def field(self) -> Field:

@@ -1,4 +1,4 @@
-"""The cameras of a run that goes on in real time, as streams that begin when somebody looks.
+"""The cameras of a run in real time, as streams that begin with the first viewer.
 
 The run's process holds the listening socket. What draws and serves is started with the first
 viewer, in a process of its own, so that nobody pays for pictures that nobody sees, and no picture
@@ -13,10 +13,10 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.cameras.children import END_WITHIN, Child
-from dva_sim.cameras.http import listen
 from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
+from dva_sim.serving.server import listen
 
 MODULE = "dva_sim.cameras"
 FLUSH = 0.02  # from one try to write what waits to the next [s]
@@ -31,7 +31,7 @@ class CameraService:
     Args:
         host: Address of this machine to listen on.
         port: Which; if it is taken, or 0, any that is free.
-        clock: Of the run.
+        clock: Clock of the run.
         tell: Takes a line for the story of the run.
 
     Attributes:
@@ -57,11 +57,11 @@ class CameraService:
         self._contained: set[int] = set()
 
     def url(self, label: str, _: str) -> str:
-        """Where a robot's pictures are, by its label."""
+        """Return the URL of a robot's pictures, by its label."""
         return camera_url(self.base, label)
 
     def film(self, run: FilmedRun, seed: int) -> None:
-        """Show what the robots of a run see, from now on."""
+        """Serve the cameras of a run from now on."""
         self._run, self._seed = run, seed
         self._labels = [robot.device.label for robot in run.field.robots.values()]
         for id_tag in run.field.robots:
@@ -72,7 +72,7 @@ class CameraService:
         self._tell(f"shows pictures of the robots at {camera_url(self.base, 'LABEL')}")
 
     def _begin(self) -> None:
-        """The first viewer has come: start what draws and serves, which accepts it."""
+        """Start the process that draws and serves; it accepts the first viewer."""
         assert self._run is not None
         self._clock.unwatch(self._listener.fileno())
         words = ["--listen-fd", str(self._listener.fileno()), "--labels", json.dumps(self._labels)]
@@ -88,7 +88,7 @@ class CameraService:
         return child is self._child
 
     def _hear(self) -> None:
-        """Who is watched; or the process has ended, and another one begins with the next viewer."""
+        """Note the watched robots; after the end of the process, wait for another viewer."""
         assert self._child is not None
         pipe = self._child.pipe
         for line in pipe.lines():
@@ -106,7 +106,7 @@ class CameraService:
         self._clock.watch(self._listener.fileno(), self._begin)
 
     def _look(self) -> None:
-        """Take the pictures that somebody will see."""
+        """Take the pictures of the watched robots."""
         if self._child is None or not self._screens.watched:
             return
         assert self._run is not None

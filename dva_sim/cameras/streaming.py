@@ -1,4 +1,4 @@
-"""A response that goes on until its viewer leaves, or is too slow for the pictures."""
+"""A response that ends when its viewer leaves, or is too slow for the pictures."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from contextlib import aclosing, suppress
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from dva_sim.cameras.http import wire_of
 from dva_sim.cameras.streams import BOUNDARY, CameraStreams, Viewer
+from dva_sim.serving.connection import wire_of
 
 STALLED = 5.0  # a viewer that has not taken a picture within this is cut [s]
 
@@ -19,7 +19,7 @@ class PictureStream(Response):
 
     Args:
         cameras: All pictures.
-        viewer: Who looks.
+        viewer: The viewer of this response.
     """
 
     media_type = f"multipart/x-mixed-replace; boundary={BOUNDARY}"

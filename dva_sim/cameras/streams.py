@@ -25,12 +25,12 @@ MOST_VIEWERS = 64
 
 @dataclass(eq=False)
 class Viewer:
-    """Somebody who looks at the pictures of a robot.
+    """A viewer of the pictures of a robot.
 
     Attributes:
-        robot: Which, by its index.
-        rank: Of the viewer's role: one of a higher rank may take the place.
-        is_over: Whether the viewer has to leave, or has left.
+        robot: Index of the robot.
+        rank: Rank of the viewer's role; a viewer of a higher rank may take the place.
+        is_over: True once the viewer has to leave, or has left.
     """
 
     robot: int
@@ -42,8 +42,8 @@ class CameraStreams:
     """The newest picture of each robot that is looked at.
 
     Args:
-        watch: Told which robots are watched, by their numbers, and whether that is new.
-        said: Robots that are watched elsewhere.
+        watch: Called with the numbers of the robots that are watched, and True if they changed.
+        said: Returns the robots that are watched elsewhere.
 
     Attributes:
         skipped: Pictures that viewers were too slow for.
@@ -67,18 +67,18 @@ class CameraStreams:
         self.skipped = 0
 
     def begin(self) -> None:
-        """Somebody draws from now on, and will say so in a while."""
+        """Expect a painter, which will report in a while."""
         self._deadline = time.monotonic() + STARTING
 
     @property
     def draws(self) -> bool:
-        """Whether somebody is there who draws."""
+        """True while a painter reports."""
         return not self._is_over and time.monotonic() < self._deadline
 
     # --- pictures in ---------------------------------------------------------------------
 
     def take(self, data: bytes) -> None:
-        """Take a piece of what whoever draws has written."""
+        """Take bytes that the painter has written."""
         now = time.monotonic()
         self._deadline = max(self._deadline, now + SILENCE)
         for picture in self._unpacker.feed(data):
@@ -98,7 +98,7 @@ class CameraStreams:
     # --- who looks -----------------------------------------------------------------------
 
     def tell(self, again: bool = False) -> None:
-        """Say who is watched, if that is new."""
+        """Report the robots that are watched, if they have changed."""
         looked_at = {viewer.robot for viewer in self._viewers}
         robots = frozenset(looked_at | self._lingering.keys()) | frozenset(self._said())
         new = robots != self._told
@@ -124,7 +124,7 @@ class CameraStreams:
         return viewer
 
     def leave(self, viewer: Viewer) -> None:
-        """A viewer is gone; the robot is drawn a little longer. May be repeated."""
+        """Remove a viewer; the robot is drawn a little longer. May be repeated."""
         if viewer in self._viewers:
             del self._viewers[viewer]
             self._lingering[viewer.robot] += 1

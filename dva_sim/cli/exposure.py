@@ -1,4 +1,4 @@
-"""What a command opens to a network without keys or tokens, in a line before it begins."""
+"""Warnings, a line each, of what a command opens to a network without keys or tokens."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ WATCHERS = "anybody who reaches it can watch the recordings"
 
 
 def warn_of_devices(hosts: Iterable[str], *, has_keys: bool, close_by: str) -> None:
-    """Say that devices listen beyond this machine without keys.
+    """Warn that devices listen beyond this machine without keys.
 
     Args:
         hosts: Addresses to listen on.
-        has_keys: Whether keys are on: then nothing is said.
-        close_by: What would close it.
+        has_keys: True if devices need keys, which needs no warning.
+        close_by: The way to close them.
     """
     open_to = [] if has_keys else _beyond(hosts)
     if open_to:
@@ -31,12 +31,12 @@ def warn_of_devices(hosts: Iterable[str], *, has_keys: bool, close_by: str) -> N
 
 
 def warn_of_pages(hosts: Iterable[str], *, has_token: bool, can: str = DRIVERS) -> None:
-    """Say that pages are open beyond this machine without a token.
+    """Warn that pages are open beyond this machine without a token.
 
     Args:
         hosts: Addresses to listen on.
-        has_token: Whether one is asked for: then nothing is said.
-        can: What anybody can do there.
+        has_token: True if pages need a token, which needs no warning.
+        can: The rights of anybody who reaches them.
     """
     open_to = [] if has_token else _beyond(hosts)
     if open_to:
@@ -44,7 +44,7 @@ def warn_of_pages(hosts: Iterable[str], *, has_token: bool, can: str = DRIVERS) 
 
 
 def warn_of_pictures(hosts: Iterable[str]) -> None:
-    """Say that what robots see is open beyond this machine, though devices need keys.
+    """Warn that pictures are open beyond this machine, though devices need keys.
 
     Args:
         hosts: Addresses to listen on.
@@ -54,7 +54,7 @@ def warn_of_pictures(hosts: Iterable[str]) -> None:
 
 
 def is_local(host: str) -> bool:
-    """Whether nobody but this machine reaches an address, or a name."""
+    """Return True if an address or a name can be reached from this machine alone."""
     host = host.strip("[]")
     try:
         return ipaddress.ip_address(host.partition("%")[0]).is_loopback
@@ -63,7 +63,7 @@ def is_local(host: str) -> bool:
     try:
         found = [str(entry[4][0]) for entry in socket.getaddrinfo(host, None)]
     except OSError:
-        return False  # nothing will listen there, and that is told
+        return False  # the command itself reports an address that does not exist
     return bool(found) and all(ipaddress.ip_address(a.partition("%")[0]).is_loopback for a in found)
 
 

@@ -368,7 +368,7 @@ def _is_share(value: Any, least: float, most: float = 1.0) -> bool:
 
 
 def _is_drawn(pair: Any) -> bool:
-    """Whether it is a robot's index with the time of a picture [ms]."""
+    """Return True for a robot's index with the time of a picture [ms]."""
     return (
         isinstance(pair, list)
         and len(pair) == 2

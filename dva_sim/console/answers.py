@@ -43,8 +43,8 @@ class Answers:
             number: Its id.
             do: Does it, and tells what came of it, now or later; what it raises is a refusal.
             tell: Takes the answer.
-            repeats: Whether it is done again when it was answered a while ago: an emergency stop
-                has to stop, though its id was used before.
+            repeats: Do it again if it was answered a while ago: an emergency stop has to stop,
+                though its id was used before.
         """
         if number in self.given:
             known = self.given[number]

@@ -83,7 +83,7 @@ class ConsoleSupervisor:
         refuse_broken(found)
 
     def _write(self, results: KeptResults) -> None:
-        """Write the results, also where something has gone wrong before, which is told as well."""
+        """Write the results even after an earlier error, and report both errors."""
         before = sys.exc_info()[1]
         try:
             results.write()

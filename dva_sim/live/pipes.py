@@ -14,7 +14,7 @@ PIPE_BYTES = 1024 * 1024  # that may wait to be taken
 
 
 class Outlet:
-    """Writes lines into a pipe, and never waits for whoever reads them.
+    """Writes lines into a pipe, and never waits for its reader.
 
     Args:
         file: Number of the open file; it is closed by `close`.
@@ -63,7 +63,7 @@ class Inlets:
         self._threads: list[threading.Thread] = []
 
     def inlet(self) -> int:
-        """A new pipe: where a part writes; whoever gets it closes it."""
+        """Return the writing end of a new pipe; the caller closes it."""
         reads, writes = os.pipe()
         with suppress(OSError):
             fcntl.fcntl(writes, fcntl.F_SETPIPE_SZ, PIPE_BYTES)

@@ -44,7 +44,7 @@ Line = list[Any]
 
 
 def record(part: Path, target: Path) -> float:
-    """Make a recording of the lines that a run left, which stay; how long it lasts [s].
+    """Make a recording of the lines that a run left, which stay; return its duration [s].
 
     Args:
         part: The lines. Their run may still go on.
@@ -74,7 +74,7 @@ def told_in(part: Path) -> ToldRun:
 
 
 def make_recording(told: ToldRun, target: Path) -> float:
-    """Write a recording; how long it lasts [s].
+    """Write a recording; return its duration [s].
 
     Raises:
         DvaSimError: it cannot be written.
@@ -86,13 +86,13 @@ def make_recording(told: ToldRun, target: Path) -> float:
 
 
 def is_part(file: Path) -> bool:
-    """Whether a file holds, by its name, the lines of a run that goes on or was killed."""
+    """Return True if a file is named as the lines of a run, running or killed."""
     return file.suffix == PART
 
 
 @contextmanager
 def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
-    """A recording to read: a file as it is, or made of the lines of a run for the moment.
+    """Yield a recording to read: the file itself, or one made of its lines for the moment.
 
     Args:
         file: A recording, or the lines of a run.
@@ -118,7 +118,7 @@ def readable(file: Path, kept: Path | None = None) -> Iterator[Path]:
 
 
 def _all_of(file: IO[bytes]) -> bytes:
-    """What an unbuffered file holds, which may give less at once than is asked for."""
+    """Return the content of an unbuffered file, which may return less than is asked for."""
     pieces = list[bytes]()
     while piece := file.read(1 << 24):
         pieces.append(piece)
@@ -162,7 +162,7 @@ class ToldRun:
             raise ConfigError(f"holds no lines of a live run: {error}", part) from error
 
     def playback(self) -> Playback:
-        """What can be told and shown of the run."""
+        """Return the run for telling and drawing."""
         scenario, seed = Scenario.model_validate(self.start["scenario"]), self.start["seed"]
         site, recorder = site_of(scenario, seed), self.recorder
         incidents = draw_incidents(scenario.events, site, Streams(seed))

@@ -33,7 +33,7 @@ def receive(socket: Socket) -> list[bytes] | None:
 
 
 def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
-    """What is left of a message: its parts, and the last frame, which says whose key it came with.
+    """A received message: its parts, and the last frame, which names the sender's key.
 
     A frame says whether it is the last one at half the price of asking the socket, as
     `recv_multipart` does. Raises `zmq.Again` if there is none.
@@ -47,19 +47,19 @@ def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
 
 
 class PublisherSocket:
-    """An XPUB socket, and what its subscribers want."""
+    """An XPUB socket and the topics of its subscribers."""
 
     def __init__(self, socket: Socket) -> None:
         self.socket = socket
         self._topics: set[str] = set()
 
     def wanted(self, topic: str) -> bool:
-        """Whether anybody has subscribed to a topic."""
+        """Return True if a topic has a subscriber."""
         self.hear()
         return any(topic.startswith(known) for known in self._topics)
 
     def hear(self) -> None:
-        """Who came or went: XPUB tells of the first subscriber and of the last for a topic."""
+        """Note subscriptions: XPUB reports the first and the last subscriber of a topic."""
         with suppress(zmq.Again):
             while has_more(self.socket):
                 said = self.socket.recv(NOBLOCK)

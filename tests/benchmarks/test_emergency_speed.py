@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.goals import goal
-from console_served import Served, serving
+from console_served import Served, serving_phones
 from patience import PATIENCE_S
 from websockets.sync.client import connect
 
@@ -116,9 +116,8 @@ def measure(what: str, press: Callable[[str], object]) -> list[float]:
 
 @pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
 def test_an_emergency_stop_under_a_flood_of_connections(tmp_path: Path, tls: bool) -> None:
-    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(tmp_path))
-    with serving(*words) as served, ExitStack() as stack:
-        port = int(served.serving["phone"].split(":")[2].split("/")[0]) if tls else served.port
+    with serving_phones(tmp_path) as served, ExitStack() as stack:
+        port = served.phones_port if tls else served.port
         page = Supervisor(served, port, tls, stack)
         Thread(target=_simulate, args=(served,), daemon=True).start()
         for path, press in (("socket", page.over_socket), ("request", page.by_request)):

@@ -13,7 +13,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from console_served import serving
+from console_served import serving_phones
 from patience import PATIENCE_S, becomes
 from websockets.sync.client import connect
 
@@ -23,9 +23,7 @@ COUNT = 700  # more than there are places
 
 @pytest.fixture(scope="module")
 def console(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("certificates")
-    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(folder))
-    with serving(*words) as served:
+    with serving_phones(tmp_path_factory.mktemp("certificates")) as served:
         yield served
 
 
@@ -66,7 +64,7 @@ def stop(served, port, tls):
 
 @pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
 def test_under_a_flood_of_connections_a_stop_and_a_page_get_through(console, tls):
-    port = int(console.serving["phone"].split(":")[2].split("/")[0]) if tls else console.port
+    port = console.phones_port if tls else console.port
     more = {"ssl": ssl._create_unverified_context()} if tls else {}
     scheme = "wss" if tls else "ws"
     headers = {"Authorization": f"Bearer {console.drive}"}
@@ -123,7 +121,7 @@ def test_requests_that_make_no_sense_after_their_answer_fill_no_pipe_and_stop_no
 
 
 def test_pictures_are_streamed_over_https_and_a_viewer_that_leaves_is_no_mistake(console):
-    port = int(console.serving["phone"].split(":")[2].split("/")[0])
+    port = console.phones_port
     console.live()
     plain = socket.create_connection(("127.0.0.1", port), PATIENCE_S)
     with ssl._create_unverified_context().wrap_socket(plain) as raw:

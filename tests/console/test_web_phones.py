@@ -10,7 +10,7 @@ from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from console_served import Answer, Served, serving
+from console_served import Answer, Served, serving, serving_phones
 from patience import PATIENCE_S
 from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
 from websockets.sync.client import connect
@@ -24,14 +24,8 @@ REGISTER = {"server": "127.0.0.1", "port": 5600, "label": "my phone", "type": "T
 
 @pytest.fixture(scope="module")
 def console(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("certificates")
-    words = ("--phones-host", "127.0.0.1", "--phones-port", "0", "--certificates", str(folder))
-    with serving(*words) as served:
+    with serving_phones(tmp_path_factory.mktemp("certificates")) as served:
         yield served
-
-
-def port_of(served: Served) -> int:
-    return int(served.serving["phone"].split(":")[2].split("/")[0])
 
 
 def trusting(served: Served) -> ssl.SSLContext:
@@ -44,7 +38,7 @@ def trusting(served: Served) -> ssl.SSLContext:
 
 def ask(served, path, method="GET", body=None, token=None, host=None, **headers) -> Answer:
     """A request of a phone, by https."""
-    port = port_of(served)
+    port = served.phones_port
     connection = http.client.HTTPSConnection(
         "127.0.0.1", port, timeout=PATIENCE_S, context=trusting(served)
     )
@@ -68,7 +62,7 @@ def wss(served, path, token, origin=None):
     About one of 3,000 requests of this client is never sent over TLS, while its other thread begins
     to read; the server cuts such a silent connection, and another attempt is made.
     """
-    port = port_of(served)
+    port = served.phones_port
     for _ in range(3):
         with suppress(InvalidMessage):
             return connect(
@@ -100,13 +94,13 @@ def test_a_phone_that_trusts_the_authority_gets_in_by_https(console):
 
 
 def test_a_phone_that_does_not_trust_it_gets_nothing(console):
-    connection = http.client.HTTPSConnection("127.0.0.1", port_of(console), timeout=PATIENCE_S)
+    connection = http.client.HTTPSConnection("127.0.0.1", console.phones_port, timeout=PATIENCE_S)
     with pytest.raises(ssl.SSLCertVerificationError):
         connection.request("GET", "/trust")
 
 
 def test_what_is_no_https_is_closed_and_said_nothing_of(console):
-    connection = http.client.HTTPConnection("127.0.0.1", port_of(console), timeout=PATIENCE_S)
+    connection = http.client.HTTPConnection("127.0.0.1", console.phones_port, timeout=PATIENCE_S)
     connection.request("GET", "/")
     with pytest.raises((http.client.HTTPException, OSError)):
         connection.getresponse()
@@ -148,7 +142,7 @@ def test_under_a_foreign_name_phones_are_not_answered(console, host):
 
 @pytest.mark.parametrize("origin", ["https://evil.example", "http://127.0.0.1:{port}", "null"])
 def test_a_foreign_page_reaches_nothing_by_a_phones_cookie(console, origin):
-    origin = origin.format(port=port_of(console))
+    origin = origin.format(port=console.phones_port)
     answer = ask(console, "/api/emergency", "POST", {}, console.phone, Origin=origin)
     assert answer.status == 403
     with pytest.raises(InvalidStatus) as error:

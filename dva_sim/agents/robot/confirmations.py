@@ -1,4 +1,4 @@
-"""What a robot asks the DVA about permissions, and the messages that wait for the answers."""
+"""A robot's questions to the DVA about permissions, and the messages that wait for the answers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Waiting:
     Attributes:
         letter: The message.
         reader: Its sender, if it wants to read sensors; None: it wants to act.
-        asked: Whether the question under way was asked after it had come.
+        asked: True if the question under way was asked after the message had arrived.
     """
 
     letter: Letter
@@ -32,14 +32,14 @@ class Waiting:
 
 
 class Confirmations:
-    """Asks the DVA what the controller of a robot has to know.
+    """Asks the DVA the questions of a robot's controller, and holds messages until it has answered.
 
     Args:
         device: The robot's.
         controller: Its decider.
-        decide: Takes what the DVA has answered.
-        conclude: Takes a message that has waited, for good.
-        happened: Told when a question is asked, and when one has failed.
+        decide: Takes the answer of the DVA.
+        conclude: Takes a message that has waited; it does not wait again.
+        happened: Called when a question is asked, and when one has failed.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Confirmations:
         self._will_ask = False
 
     def ask(self) -> None:
-        """Ask what has to be asked next: now, or as soon as that is allowed."""
+        """Ask the next question now, or as soon as the rate limit allows."""
         clock = self._device.clock
         question = self._inquiry.next(clock.now)
         if question is not None:
@@ -84,7 +84,7 @@ class Confirmations:
         return True
 
     def forget(self) -> None:
-        """Drop all that waits: the computer starts again."""
+        """Drop all waiting messages, since the computer starts again."""
         self._waiting.clear()
 
     def _waiting_for(self, question: m.GetGrant) -> list[Waiting]:

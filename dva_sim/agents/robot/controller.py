@@ -318,7 +318,7 @@ class RobotController:
         return self._is_held(None)
 
     def _told_by_dva(self, body: m.Reply) -> Decision:
-        """What the DVA has answered when it was asked: this alone gives anybody the robot.
+        """Apply an answer of the DVA: nothing else gives anybody the robot.
 
         That nobody holds it ends no drive: a DVA that has lost its memory may say so.
         """
@@ -337,7 +337,7 @@ class RobotController:
         return Decision(m.OK)
 
     def _is_held(self, grant: m.PermissionGrant | None) -> Decision:
-        """Somebody else may act from now on, or nobody: whoever drives is stopped."""
+        """Replace the holder, or leave the robot without one; the current driver is stopped."""
         held, self.grant = self.grant, grant
         if grant is not None and held is not None and grant.session == held.session:
             return Decision(m.OK)  # the holder may have moved
@@ -349,7 +349,7 @@ class RobotController:
         return Decision(m.OK, set_point=STAND)
 
     def _full(self, observer: str) -> Decision | None:
-        """The refusal of one more observer, if there is no room; any driver goes on driving."""
+        """Refuse one more observer if there is no room; the driver drives on."""
         if observer in self.observers or len(self.observers) < MOST_OBSERVERS:
             return None
         return Decision(m.BUSY, f"{MOST_OBSERVERS} observers are all that this robot serves")

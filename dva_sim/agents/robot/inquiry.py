@@ -23,7 +23,7 @@ LEAST = 1e-5  # of a question: a clock that counts microseconds may come that mu
 
 @dataclass
 class Inquiry:
-    """What a robot wants to know of the DVA.
+    """The open questions of a robot to the DVA.
 
     Attributes:
         asked: The question under way.
@@ -43,11 +43,11 @@ class Inquiry:
 
     @property
     def is_open(self) -> bool:
-        """Whether it has to be asked who holds the robot, or is being asked."""
+        """True while the question who holds the robot is open or under way."""
         return self._holder or (self.asked is not None and self.asked.level is None)
 
     def about_holder(self, claimed: str | None) -> None:
-        """There is a reason to ask who holds the robot.
+        """Open the question who holds the robot.
 
         Args:
             claimed: Id of the device that is said to be the holder, or acts as if it were.
@@ -55,12 +55,12 @@ class Inquiry:
         self._holder, self._claimed = True, claimed or self._claimed
 
     def about_reader(self, device: str) -> None:
-        """There is a reason to ask what a device may read."""
+        """Open the question which sensors a device may read."""
         if len(self._readers) < MOST_READERS:
             self._readers[device] = None
 
     def is_over(self, session: int) -> None:
-        """A session is said to be over; an answer that is under way may not know of that."""
+        """Note that a session is said to be over: an answer under way may be older than that."""
         if self.asked is not None and len(self._over) <= MOST_OVER:
             self._over.add(session)
 
@@ -111,7 +111,7 @@ class Inquiry:
         return asked
 
     def unanswered(self) -> None:
-        """The DVA has not answered: it is asked again."""
+        """Open the question under way again, since the DVA has not answered."""
         asked, self.asked = self.asked, None
         if asked is not None:
             self._again(asked)

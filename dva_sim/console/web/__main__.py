@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dva_sim.cameras.http import listen, serve
-from dva_sim.cameras.port_listener import fitting_places
 from dva_sim.console.web.access import Entrance, Role, Tokens, rules
 from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
@@ -23,6 +21,8 @@ from dva_sim.console.web.server import make_server
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.serving.port_listener import fitting_places
+from dva_sim.serving.server import listen, serve
 
 if TYPE_CHECKING:
     from dva_sim.console.web.phone_listener import PhoneListener

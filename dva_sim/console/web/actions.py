@@ -297,7 +297,7 @@ def id_of(value: Any) -> str:
 
 
 def is_id(value: Any) -> TypeGuard[str]:
-    """Whether a value can be the id of a request."""
+    """Return True if a value can be the id of a request."""
     return isinstance(value, str) and _ID.fullmatch(value) is not None
 
 

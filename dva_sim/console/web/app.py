@@ -20,7 +20,6 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from dva_sim.cameras.http import place_of
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import CameraStreams, headers_of
 from dva_sim.console.web.access import Asked, Entrance, Role
@@ -31,6 +30,7 @@ from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePag
 from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
+from dva_sim.serving.connection import place_of
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "

@@ -1,4 +1,4 @@
-"""Robots' cameras for viewers of a console: the world is told which of them are watched."""
+"""Robots' cameras for viewers of a console; the world learns which of them are watched."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ConsoleCameras(CameraStreams):
 
     @property
     def draws(self) -> bool:
-        """Whether somebody is there who draws."""
+        """True while a painter reports."""
         return self._pipe.is_open and super().draws
 
     def _say_watched(self, robots: list[int], is_new: bool) -> None:

@@ -71,7 +71,7 @@ class Client:
         watches: Robots whose pictures it says it looks at.
         driver: Its driving socket, if it has one.
         is_here: Whether its state socket is open.
-        page: What the page calls itself until it is loaded again; empty: nothing.
+        page: Name that the page gives itself until it is loaded again; empty: none.
         ws: Its state socket, while that is open.
         asked: When a program made its newest request [s].
     """
@@ -110,7 +110,7 @@ class Clients:
         return min(lesser, key=lambda each: (each.role, each.driver is not None), default=None)
 
     def is_full(self) -> bool:
-        """Whether no place for a page is free."""
+        """Return True if no place for a page is free."""
         return len(self.here()) >= MOST_CLIENTS
 
     def join(self, role: Role, key: str = "", page: str = "") -> Client:
@@ -122,8 +122,8 @@ class Clients:
 
         Args:
             role: Shown by its token.
-            key: Of the page that it was; empty: none.
-            page: What it calls itself.
+            key: Key of the page that it was; empty: none.
+            page: Name that it gives itself.
         """
         known = self._by_key(key)
         if known is not None and known.role is role and _may_come_again(known, page):

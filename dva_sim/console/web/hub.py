@@ -14,7 +14,6 @@ from typing import Any
 from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
-from dva_sim.cameras.http import wire_of
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import SILENT, Bucket, asked_of, check_role, id_of, read
 from dva_sim.console.web.checks import BadMessage, robots
@@ -22,6 +21,7 @@ from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say
 from dva_sim.console.web.state import body_of, encode
+from dva_sim.serving.connection import wire_of
 
 TIDY = 10.0  # from one look at silent programs to the next [s]
 WITHOUT_PAGE = ("emergency", "stop", "gone")  # what is done though a page sees nothing
@@ -85,7 +85,7 @@ class Hub:
                 self._leave(client)
 
     def _make_room(self, role: Role) -> bool:
-        """Whether another page of a role may come in; one of a lower role may have to leave."""
+        """Return True if a page of a role may come in; one of a lower role may have to leave."""
         if not self.clients.is_full():
             return True
         least = self.clients.yielding(role)
@@ -138,7 +138,7 @@ class Hub:
             self._give_back(client)
 
     def _give_back(self, client: Client) -> None:
-        """What a page or program held that is gone for good, others may have."""
+        """Release the robots and guard of a page or program that does not come back."""
         state = self.simulation.state
         for what in ("release", "guard_leave")[: 1 + (client.name in state.guards)]:
             key = f"bye-{what}-{client.name}"

@@ -134,7 +134,7 @@ class Simulation:
         return self._pipe.send(asked)
 
     def ask(self, asked: Asked, told: Told) -> None:
-        """Ask for something; `told` gets the answer: there may be no room, or nobody there.
+        """Ask for something; `told` takes the answer, which may be that there is no room.
 
         Ids are those of the client that asks: the same id of another one is another question.
         """
@@ -150,7 +150,7 @@ class Simulation:
         is_urgent = asked["do"] in URGENT
         waiting = self._pending.get(key)
         if waiting is not None and is_urgent and len(waiting) >= MOST_WAITING:
-            waiting.pop(0)  # whoever asks again and again hears the answer by the newest question
+            waiting.pop(0)  # repeated questions: the newest ones get the answer
         if waiting is not None and len(waiting) < MOST_WAITING:
             waiting.append(answered)
             return

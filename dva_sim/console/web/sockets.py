@@ -10,8 +10,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
 
-from dva_sim.cameras.http import PLACE, WIRE, extended, wire_of
-from dva_sim.cameras.port_connections import PortConnection
+from dva_sim.serving.connection import PLACE, WIRE, extended, wire_of
+from dva_sim.serving.port_connections import PortConnection
 
 STALLED = 5.0  # without a byte taken, a page is dropped [s]
 FAREWELL = 10.0  # for what is on its way to a page that was dropped [s]
@@ -21,7 +21,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
     """A WebSocket that the application can drop.
 
     Args:
-        place: Of its connection.
+        place: Place of its connection.
         given: See `WebSocketsSansIOProtocol`.
     """
 

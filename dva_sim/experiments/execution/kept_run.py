@@ -1,4 +1,4 @@
-"""One run that people took part in, as a results folder: kept while it goes on, then as tables.
+"""One run that people took part in, as a results folder: a journal while it runs, then tables.
 
 While the run goes on its lines go into a journal (SQLite in WAL mode) by a thread of its own, so
 that the run waits for no disk. At its end the tables are made of the journal, which is removed.
@@ -47,13 +47,13 @@ INSERT INTO state (key, line) VALUES (?, ?) ON CONFLICT (key) DO UPDATE SET line
 
 
 class KeptRun:
-    """The journal of a run in its results folder, which nobody else writes into meanwhile.
+    """The journal of a run in its results folder, which no other process may write into.
 
     Args:
         folder: The results folder; the lock on it is held by the caller.
-        manifest: What is run, without its tables.
-        scenario: What is run.
-        seed: Of the run.
+        manifest: Manifest of the run, without its tables.
+        scenario: Scenario of the run.
+        seed: Seed of the run.
 
     Attributes:
         problem: Why nothing can be written now; empty if all is well.
@@ -115,7 +115,7 @@ class KeptRun:
         self._db.close()
 
     def _next(self, is_behind: bool) -> tuple[list[JournalLine], bool]:
-        """What has come, and whether that was all; what waits for the disk is tried again."""
+        """Return the new lines, and True if these were the last; lines that failed are retried."""
         found: list[JournalLine] = []
         with suppress(queue.Empty):
             batch = self._waiting.get(timeout=AGAIN if is_behind else None)
@@ -161,7 +161,7 @@ def _connected(folder: Path, mode: str = "rwc") -> sqlite3.Connection:
 
 
 def is_left(folder: Path) -> bool:
-    """Whether a results folder holds the journal of a run that goes on or was killed."""
+    """Return True if a results folder holds the journal of a run, running or killed."""
     return (folder / KEPT_RUN).is_file()
 
 
@@ -180,7 +180,7 @@ def complete(folder: Path) -> None:
 
 
 def tables_so_far(folder: Path) -> tuple[dict[str, Any], Tables]:
-    """The manifest and the tables of a run that still goes on; its folder is only read.
+    """Return the manifest and the tables of a run that still runs; its folder is only read.
 
     Raises:
         ConfigError: the journal is damaged, or made by a later version.
@@ -191,7 +191,7 @@ def tables_so_far(folder: Path) -> tuple[dict[str, Any], Tables]:
 
 
 def _finish(folder: Path, own_code: bool = False) -> None:
-    """From the journal to tables; the journal is removed last."""
+    """Make tables of the journal, which is removed last."""
     manifest, scenario, seed, lines = _read(folder, own_code)
     tables, lasted = _tables(folder, scenario, seed, lines)
     jobs = runs_in(manifest)
@@ -206,7 +206,7 @@ def _finish(folder: Path, own_code: bool = False) -> None:
 def _read(
     folder: Path, own_code: bool = False
 ) -> tuple[dict[str, Any], Scenario, int, list[JournalLine]]:
-    """What was run, with its manifest and seed, and the lines of its journal.
+    """Return the manifest, scenario, seed and journal lines of a run.
 
     Args:
         folder: The results folder.
@@ -237,7 +237,7 @@ def _read(
 def _tables(
     folder: Path, scenario: Scenario, seed: int, lines: Sequence[JournalLine]
 ) -> tuple[Tables, float]:
-    """What was measured, and how long the run lasted [s]; nothing of a run that never began."""
+    """Return the tables and duration [s] of a run; no rows of one that never began."""
     if not lines:
         return {}, 0.0
     try:

@@ -47,10 +47,10 @@ class PersonLog(NamedTuple):
 
 
 class RobotLog(NamedTuple):
-    """What became of a robot.
+    """Measures of a robot.
 
     Attributes:
-        powered: Whether its battery still moves it.
+        powered: True while its battery moves it.
         distance: Length of its path [m].
         contacts: Contacts with walls and others.
         impulse: Impulse of all contacts [N s].
@@ -73,7 +73,7 @@ class RobotLog(NamedTuple):
 
 
 def log_of(robot: RobotAgent) -> RobotLog:
-    """What has become of a robot by now."""
+    """Return the measures of a robot by now."""
     body, inbox = robot.body, robot.inbox
     return RobotLog(
         powered=body.powered,
@@ -152,7 +152,7 @@ class Recording(Playback):
     """All that is left of one run, to be measured.
 
     Attributes:
-        robots: What became of the robots, by id.
+        robots: Measures of the robots, by id.
         links: Modelled links to each robot and back, by its id.
         people: What became of the people on foot.
         depth: How the network was modelled: `message`, `segment` (where any connection was), or

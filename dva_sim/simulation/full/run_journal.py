@@ -1,8 +1,8 @@
-"""A run as lines of JSON while it goes on, and what is measured of it found again from them.
+"""A run as lines of JSON while it runs, and its measures computed from these lines.
 
-What grows (commands, pictures, tracks) is told once and may be forgotten afterwards; what changes
-is told again, and the newest counts. So the memory of a run that is journaled stays bounded, and a
-run that is killed has lost no more than what happened since the last lines.
+Lists that grow (commands, pictures, tracks) are written once and may be forgotten afterwards.
+Values that change are written again, and the newest counts. So the memory of a journaled run stays
+bounded, and a run that is killed loses only what happened since its last lines.
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ _EVENT: Final = TypeAdapter(Event)
 
 
 class RunJournal:
-    """Says what is new of a run.
+    """Writes the changes of a run as lines.
 
     Args:
         run: The run, which samples tracks and keeps its events.
-        label_of: What a device is called in the journal, by its id.
+        label_of: Returns the name of a device in the journal, by its id.
     """
 
     def __init__(self, run: Run, label_of: Callable[[str], str]) -> None:
@@ -76,7 +76,7 @@ class RunJournal:
         self._facts = 0
 
     def lines(self) -> list[JournalLine]:
-        """What is new since the last time."""
+        """Return the lines for all changes since the last call."""
         grown = [*self._of_drives(), *self._of_tracks(), *self._of_facts()]
         lines = [("", json.dumps(line)) for line in grown]
         for key, value in self._states():
@@ -87,7 +87,7 @@ class RunJournal:
         return lines
 
     def forget(self) -> None:
-        """Forget what was told of the tracks; lists of drives may have become shorter."""
+        """Forget the tracks that are written; lists of drives may have become shorter."""
         recorder = self._run.recorder
         for points in recorder.tracks.values():
             points.clear()
@@ -124,7 +124,7 @@ class RunJournal:
         self._facts = len(facts)
 
     def _new(self, about: str, name: str, values: Any) -> list[Any]:
-        """What a list holds beyond what was told."""
+        """Return the entries of a list that are not written yet."""
         told = self._told.get((about, name), 0)
         self._told[about, name] = len(values)
         return list(islice(values, told, None))
@@ -158,7 +158,7 @@ class RunJournal:
             yield f"event {event.number}", self._event(event)
 
     def _event(self, event: Event) -> dict[str, Any]:
-        """An event without what people call themselves, and without what they noted."""
+        """Return an event without the names of people and without their notes."""
         told: dict[str, Any] = _EVENT.dump_python(event, mode="json")
         handling = told["handling"] | {"note": ""}
         for name in ("last", "acknowledged"):
@@ -169,11 +169,11 @@ class RunJournal:
 
 
 def recording_of(scenario: Scenario, seed: int, lines: Iterable[JournalLine]) -> Recording:
-    """What is measured of a run, from its journal.
+    """Compute a recording of a run from its journal.
 
     Args:
-        scenario: What was run.
-        seed: Of the run.
+        scenario: Scenario of the run.
+        seed: Seed of the run.
         lines: In their order.
 
     Raises:
@@ -237,7 +237,7 @@ def _assembled(
 
 
 def _numbered(state: Mapping[str, Any], kind: str) -> Iterable[tuple[str, Any]]:
-    """The states of things of a kind, in the order in which they came."""
+    """Return the states of the things of a kind, in the order of their first lines."""
     for key, value in state.items():
         what, _, which = key.partition(" ")
         if what == kind:

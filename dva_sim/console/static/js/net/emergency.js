@@ -127,7 +127,7 @@ async function overRequest(id, which) {
   }
 }
 
-/** A page that is loaded again goes on with its stops. */
+/** Keep the open stops, so that the page resumes them when it is loaded again. */
 function remember() {
   try {
     sessionStorage.setItem(KEPT, JSON.stringify([...open.keys()]));
@@ -136,7 +136,7 @@ function remember() {
   }
 }
 
-/** Go on with the stops that were not confirmed when the page was loaded again. */
+/** Resume the stops that were not confirmed before the page was loaded again. */
 export function resumeStops() {
   try {
     for (const key of JSON.parse(sessionStorage.getItem(KEPT) ?? '[]')) stopRobots(JSON.parse(key));

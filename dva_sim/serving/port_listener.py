@@ -15,9 +15,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
-from dva_sim.cameras.port_connections import (
+from dva_sim.serving.connection import HttpProtocol
+from dva_sim.serving.port_connections import (
     MOST,
     MOST_SERVED,
     SILENT,
@@ -27,10 +28,8 @@ from dva_sim.cameras.port_connections import (
 
 WAITING: Final = 1024  # connections that are not accepted yet
 AT_ONCE: Final = 32  # connections accepted before the loop serves others again
-SERVED_AT_ONCE, HANDSHAKES_AT_ONCE = (
-    32,
-    4,
-)  # and of those that have said a word, without and with TLS
+SERVED_AT_ONCE: Final = 32  # connections that have said their first word, likewise
+HANDSHAKES_AT_ONCE: Final = 4  # the same with TLS, where each costs a millisecond or two
 SWEEP: Final = 1.0  # from one look at silent connections to the next [s]
 PAUSE: Final = 0.2  # when no file can be opened [s]
 SPARE_FILES: Final = 128  # that are no connections: pipes, pages' files, the audit log
@@ -56,13 +55,13 @@ class PortListener:
         sock: A listening socket that does not block.
         make: Makes the protocol of a connection.
         context: For TLS; None: without.
-        places: Of the port's connections.
+        places: The connections of the port.
     """
 
     def __init__(
         self,
         sock: socket.socket,
-        make: Callable[[PortConnection], asyncio.Protocol],
+        make: Callable[[PortConnection], HttpProtocol],
         context: ssl.SSLContext | None,
         places: PortConnections,
     ) -> None:
@@ -134,20 +133,15 @@ class PortListener:
     async def _connect(self, connection: socket.socket, place: PortConnection) -> None:
         """Shake hands, where that is needed; the protocol serves the connection from then on."""
         within = {} if self._context is None else _TLS
-        made: list[Any] = []
-
-        def make() -> asyncio.Protocol:
-            made.append(self._make(place))
-            return made[0]  # type: ignore[no-any-return]
-
+        protocol = self._make(place)
         try:
             await asyncio.get_running_loop().connect_accepted_socket(
-                make, connection, ssl=self._context, **within
+                lambda: protocol, connection, ssl=self._context, **within
             )
         except (OSError, asyncio.CancelledError):
             place.leave()
-            if made and made[0].transport is not None:
-                made[0].transport.abort()  # it closes the file, whose number may be used again
+            if protocol.is_made:
+                protocol.cut()  # its transport closes the file, whose number may be used again
             else:
                 connection.close()
 

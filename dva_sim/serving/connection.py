@@ -1,57 +1,22 @@
-"""A server of HTTP in a process of ours: its socket, its connections, and its end."""
+"""A connection of a port: counted among the others, and cut where its client does not read."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 import socket
 import struct
-from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from typing import Any
 
 import h11
-import uvicorn
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from dva_sim.cameras.port_connections import PortConnection, PortConnections
-from dva_sim.cameras.port_listener import WAITING, PortListener
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.serving.port_connections import PortConnection
 
-SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
 WIRE = "dva_sim.wire"
 PLACE = "dva_sim.place"
 NO_LINGERING = struct.pack("ii", 1, 0)  # a reset: the kernel keeps nothing for a deaf client
-SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """A listening socket, so that its port is known before anything is served.
-
-    Raises:
-        ConfigError: the address is not of this machine, or taken.
-    """
-    try:
-        found = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
-        family, kind, protocol, _, address = found[0]
-        with contextlib.ExitStack() as on_failure:
-            sock = on_failure.enter_context(socket.socket(family, kind, protocol))
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            sock.bind(address)
-            on_failure.pop_all()
-    except OSError as error:
-        raise ConfigError(f"cannot listen on {host} port {port}: {error.strerror}") from error
-    # Connections inherit these.
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_MS)
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    sock.listen(WAITING)
-    sock.setblocking(False)
-    return sock
 
 
 class HttpProtocol(H11Protocol):
@@ -63,11 +28,14 @@ class HttpProtocol(H11Protocol):
     Args:
         place: Its place.
         given: See `H11Protocol`.
+
+    Attributes:
+        is_made: True once the connection belongs to the protocol, and no longer to the listener.
     """
 
     def __init__(self, place: PortConnection, **given: Any) -> None:
         super().__init__(**given)
-        self._place, self._is_lost = place, False
+        self._place, self.is_made, self._is_lost = place, False, False
         self.app = extended(self.app, {PLACE: place, WIRE: self})
         kind: Any = self.ws_protocol_class
         if kind is not None:
@@ -103,7 +71,7 @@ class HttpProtocol(H11Protocol):
     def connection_made(self, transport: Any) -> None:
         """Let the connection be cut for others."""
         super().connection_made(transport)
-        self._place.drop = self.cut
+        self.is_made, self._place.drop = True, self.cut
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Give the place to others."""
@@ -131,33 +99,3 @@ def place_of(scope: Scope) -> PortConnection:
 def wire_of(scope: Scope) -> Any:
     """The connection under a request: that of the WebSocket, else `HttpProtocol`."""
     return scope["extensions"][WIRE]
-
-
-class Server(uvicorn.Server):
-    """A server that is ended by whoever started it, not by signals of its own."""
-
-    def protocol(self, place: PortConnection) -> HttpProtocol:
-        """Return what serves a connection."""
-        return HttpProtocol(place, config=self.config, server_state=self.server_state, app_state={})
-
-    @contextlib.contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """Leave signals to the process."""
-        yield
-
-
-async def serve(
-    server: Server, sock: socket.socket, places: PortConnections, ended: asyncio.Event
-) -> None:
-    """Serve until the end."""
-    server.config.load()
-    listener = PortListener(sock, server.protocol, server.config.ssl, places)
-    accepting = asyncio.ensure_future(listener.run())
-    serving = asyncio.ensure_future(server.serve(sockets=[]))  # the listener accepts in its place
-    waiting = asyncio.ensure_future(ended.wait())
-    tasks = {accepting, serving, waiting}
-    await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    server.should_exit = True
-    accepting.cancel()
-    waiting.cancel()
-    await serving

@@ -7,10 +7,11 @@ with a token of a higher rank. Pure: without a clock and without sockets.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 
+_LOG = logging.getLogger("uvicorn.error")  # that of the server
 MOST = 512  # connections of a port
 MOST_SERVED = 400  # of them with a token and a request in progress; the others are for newcomers
 SILENT = 5.0  # without a token a connection is cut after this [s]
@@ -24,8 +25,8 @@ class PortConnection:
     Attributes:
         places: The connections that it is one of.
         since: When it was made, or its newest request began or ended [s].
-        rank: Of the role that its newest request showed; 0: no token.
-        busy: Whether a request is in progress, or a WebSocket is open.
+        rank: Rank of the role that its newest request showed; 0: no token.
+        busy: True while a request is in progress or a WebSocket is open.
         drop: Cuts the connection.
     """
 
@@ -37,16 +38,16 @@ class PortConnection:
 
     @property
     def is_served(self) -> bool:
-        """Whether a request with a token is in progress."""
+        """True while a request with a token is in progress."""
         return self.busy and self.rank > 0
 
     def begin(self, rank: int, now: float, *, is_limited: bool = True) -> bool:
         """Note a request: False if it has to be refused, as too many are in progress.
 
         Args:
-            rank: Of the role that the request shows; 0: no token.
+            rank: Rank of the role that the request shows; 0: no token.
             now: Time [s].
-            is_limited: Whether the limit applies to it.
+            is_limited: False for requests outside the limit.
         """
         self.rank, self.busy, self.since = rank, True, now
         return not (is_limited and self.is_served) or self.places.bear(self)
@@ -108,8 +109,10 @@ class PortConnections:
     def _drop(self, place: PortConnection, why: str) -> None:
         place.leave()
         self.dropped[why] += 1
-        with suppress(Exception):  # one connection that cannot be cut must not keep the others
+        try:
             place.drop()
+        except Exception:  # one connection that cannot be cut must not keep the others
+            _LOG.exception("a connection could not be cut")
 
 
 def _importance(place: PortConnection) -> tuple[bool, int, float]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dva_sim.cameras.port_connections import IDLE, SILENT, PortConnections
-from dva_sim.console.web.access import Role
+from dva_sim.serving.port_connections import IDLE, SILENT, PortConnections
+
+NOBODY, LOOK, DRIVE, SUPERVISE = 0, 1, 3, 5  # ranks
 
 
 def entered(places, now, cut, name):
@@ -18,7 +19,7 @@ def test_when_all_places_are_taken_the_oldest_silent_connection_makes_room():
     first = entered(places, 0.0, cut, "first")
     for now in (1.0, 2.0):
         entered(places, now, cut, f"at {now}")
-    assert first.begin(Role.LOOK, 3.0)
+    assert first.begin(LOOK, 3.0)
     entered(places, 4.0, cut, "newcomer")
     assert cut == ["at 1.0"]
     assert len(places.taken) == 3
@@ -37,12 +38,12 @@ def test_idle_connections_with_a_token_leave_places_for_newcomers():
     places, cut = PortConnections(most=6, most_served=3), []
     for n in range(6):
         idle = entered(places, float(n), cut, f"idle {n}")
-        idle.begin(Role.LOOK, float(n))
+        idle.begin(LOOK, float(n))
         idle.end(float(n))
     first = entered(places, 10.0, cut, "first newcomer")
     entered(places, 10.1, cut, "second newcomer")
     assert cut == ["idle 0", "idle 1"]
-    assert first.begin(Role.DRIVE, 10.2)
+    assert first.begin(DRIVE, 10.2)
 
 
 def test_a_connection_that_cannot_be_cut_keeps_no_other():
@@ -58,7 +59,7 @@ def test_a_connection_that_cannot_be_cut_keeps_no_other():
 def test_a_request_with_a_token_is_never_cut_for_a_newcomer():
     places, cut = PortConnections(most=2, most_served=1), []
     page = entered(places, 0.0, cut, "page")
-    assert page.begin(Role.LOOK, 0.0)
+    assert page.begin(LOOK, 0.0)
     for now in range(100):
         entered(places, float(now), cut, "stranger")
     assert set(cut) == {"stranger"}
@@ -69,9 +70,9 @@ def test_silence_is_cut_after_seconds_and_idleness_with_a_token_later():
     places, cut = PortConnections(), []
     entered(places, 0.0, cut, "silent")
     idle = entered(places, 0.0, cut, "idle")
-    idle.begin(Role.DRIVE, 0.0)
+    idle.begin(DRIVE, 0.0)
     slow = entered(places, 0.0, cut, "refused and slow")
-    slow.begin(Role.NOBODY, 0.0)
+    slow.begin(NOBODY, 0.0)
     places.sweep(SILENT)
     assert cut == []
     idle.end(SILENT)
@@ -84,29 +85,29 @@ def test_silence_is_cut_after_seconds_and_idleness_with_a_token_later():
 def test_beyond_the_limit_a_lower_role_yields_and_the_same_role_is_refused():
     places, cut = PortConnections(most=10, most_served=2), []
     lookers = [entered(places, float(n), cut, f"looker {n}") for n in range(3)]
-    assert [place.begin(Role.LOOK, 5.0 + n) for n, place in enumerate(lookers)] == [
+    assert [place.begin(LOOK, 5.0 + n) for n, place in enumerate(lookers)] == [
         True,
         True,
         False,
     ]
     lookers[2].end(9.0)
     supervisor = entered(places, 9.0, cut, "supervisor")
-    assert supervisor.begin(Role.SUPERVISE, 9.0)
+    assert supervisor.begin(SUPERVISE, 9.0)
     assert cut == ["looker 0"]
 
 
 def test_what_is_outside_the_limits_is_served_however_many_are():
     places, cut = PortConnections(most=10, most_served=1), []
-    assert entered(places, 0.0, cut, "page").begin(Role.SUPERVISE, 0.0)
-    assert not entered(places, 0.0, cut, "page").begin(Role.SUPERVISE, 0.0)
-    assert entered(places, 0.0, cut, "stop").begin(Role.DRIVE, 0.0, is_limited=False)
+    assert entered(places, 0.0, cut, "page").begin(SUPERVISE, 0.0)
+    assert not entered(places, 0.0, cut, "page").begin(SUPERVISE, 0.0)
+    assert entered(places, 0.0, cut, "stop").begin(DRIVE, 0.0, is_limited=False)
     assert cut == []
 
 
 def test_more_stops_in_progress_than_there_are_places_let_a_newcomer_in_still():
     places, cut = PortConnections(most=3, most_served=1), []
     for n in range(3):
-        assert entered(places, float(n), cut, n).begin(Role.DRIVE, float(n), is_limited=False)
+        assert entered(places, float(n), cut, n).begin(DRIVE, float(n), is_limited=False)
     entered(places, 9.0, cut, "newcomer")
     assert cut == [0]
 
@@ -114,9 +115,9 @@ def test_more_stops_in_progress_than_there_are_places_let_a_newcomer_in_still():
 def test_a_place_that_is_left_counts_no_more():
     places, cut = PortConnections(most=5, most_served=1), []
     page = entered(places, 0.0, cut, "page")
-    assert page.begin(Role.LOOK, 0.0)
+    assert page.begin(LOOK, 0.0)
     page.leave()
     page.leave()
     page.end(1.0)
-    assert entered(places, 1.0, cut, "next").begin(Role.LOOK, 1.0)
+    assert entered(places, 1.0, cut, "next").begin(LOOK, 1.0)
     assert cut == []

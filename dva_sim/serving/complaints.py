@@ -1,7 +1,7 @@
-"""What a server complains about: mistakes of ours, a few times; never what clients sent.
+"""Limits what a server writes to standard error: a few mistakes of ours, no faults of clients.
 
-Standard error may be a pipe that nobody reads until the end: whoever could fill it from outside
-would hold up the whole process.
+Standard error may be a pipe that nobody reads until the end. A client that could fill it would stop
+the whole process.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ MOST_COMPLAINTS = 5
 
 
 def limit_complaints() -> None:
-    """Let the loggers of the server and of its event loop complain a few times in all."""
+    """Limit the loggers of the server and of its event loop to a few complaints in all."""
     handler = Complaints()
     for name in ("uvicorn.error", "asyncio"):
         logger = logging.getLogger(name)
@@ -22,13 +22,12 @@ def limit_complaints() -> None:
 
 
 class Complaints(logging.StreamHandler):  # type: ignore[type-arg]
-    """A mistake of ours in full, the first times; what clients sent, and how they ended, not."""
+    """Writes the first few records in full, and none about what clients sent or how they left."""
 
     NOISE = ("Invalid", "Cancel", "Unsupported", "No supported", "ASGI callable")
 
-    def __init__(self, level: int = logging.WARNING) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.setLevel(level)
         self._count = 0
 
     def emit(self, record: logging.LogRecord) -> None:

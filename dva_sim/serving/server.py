@@ -1,0 +1,104 @@
+"""A server of HTTP in a process of ours: its listening socket, its settings, and its end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.serving.complaints import limit_complaints
+from dva_sim.serving.connection import HttpProtocol
+from dva_sim.serving.port_connections import PortConnection, PortConnections
+from dva_sim.serving.port_listener import WAITING, PortListener
+
+SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
+SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A listening socket, so that its port is known before anything is served.
+
+    Raises:
+        ConfigError: the address is not of this machine, or taken.
+    """
+    try:
+        found = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
+        family, kind, protocol, _, address = found[0]
+        with contextlib.ExitStack() as on_failure:
+            sock = on_failure.enter_context(socket.socket(family, kind, protocol))
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            sock.bind(address)
+            on_failure.pop_all()
+    except OSError as error:
+        raise ConfigError(f"cannot listen on {host} port {port}: {error.strerror}") from error
+    # Connections inherit these.
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_MS)
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.listen(WAITING)
+    sock.setblocking(False)
+    return sock
+
+
+class Server(uvicorn.Server):
+    """A server that its caller ends; it handles no signals."""
+
+    @classmethod
+    def of(cls, app: ASGIApp, most_bytes: int, **more: Any) -> Server:
+        """Return the server of an application, with bounded complaints and no logs.
+
+        Args:
+            app: The application.
+            most_bytes: Longest head of a request [B].
+            more: More settings of uvicorn, such as a certificate.
+        """
+        limit_complaints()
+        config = uvicorn.Config(
+            app,
+            http=HttpProtocol,
+            lifespan="off",
+            loop="asyncio",
+            log_config=None,
+            access_log=False,
+            proxy_headers=False,
+            server_header=False,
+            timeout_keep_alive=15,
+            timeout_graceful_shutdown=0,
+            h11_max_incomplete_event_size=most_bytes,
+            **more,
+        )
+        return cls(config)
+
+    def protocol(self, place: PortConnection) -> HttpProtocol:
+        """Return what serves a connection."""
+        return HttpProtocol(place, config=self.config, server_state=self.server_state, app_state={})
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave signals to the process."""
+        yield
+
+
+async def serve(
+    server: Server, sock: socket.socket, places: PortConnections, ended: asyncio.Event
+) -> None:
+    """Serve until the end."""
+    server.config.load()
+    listener = PortListener(sock, server.protocol, server.config.ssl, places)
+    accepting = asyncio.ensure_future(listener.run())
+    serving = asyncio.ensure_future(server.serve(sockets=[]))  # the listener accepts in its place
+    waiting = asyncio.ensure_future(ended.wait())
+    tasks = {accepting, serving, waiting}
+    await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    server.should_exit = True
+    accepting.cancel()
+    waiting.cancel()
+    await serving
