@@ -530,7 +530,7 @@ def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterato
     elif not is_sent and until > max(witness.allowed + PHYSICS_TICK + ROUNDED, witness.looked):
         late = until - max(witness.allowed, witness.last_mission)
         longer = f"for {late:.2f} s longer than allowed" if late < ENDLESS else "with no time limit"
-        yield "S1", f"is asked to move {longer}"
+        yield "S1", f"is commanded to move {longer}"
 
 
 def broken_by_moving(
