@@ -40,7 +40,7 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 
 test-all: $(DEV)  ## all tests
 	@echo "Running those in a browser, then all others ..."
-	@$(BIN)/python tests/chromium.py
+	@$(BIN)/python tests/helpers/console/chromium.py
 	@$(BROWSER)
 	@$(PYTEST) -m "not browser"
 
@@ -51,7 +51,7 @@ test-system: $(DEV)  ## programs as users start them, with real processes, socke
 	@$(PYTEST) -m system
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
-	@$(BIN)/python tests/chromium.py
+	@$(BIN)/python tests/helpers/console/chromium.py
 	@$(BROWSER)
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time

@@ -3,8 +3,8 @@
 import signal
 
 from halves import pytest_addoption, pytest_configure
+from helpers.processes.search_settings import search
 from hypothesis import settings
-from searching import search
 from skips import pytest_sessionfinish
 
 __all__ = ["pytest_addoption", "pytest_configure", "pytest_sessionfinish"]

@@ -31,11 +31,13 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
-ROOT = Path(__file__).parents[1]
+from helpers.paths import ROOT
+
 MUTANTS = 60
 SIDE_BY_SIDE = 2
 PATIENCE_S = 900.0
@@ -112,7 +114,8 @@ class Sites(ast.NodeVisitor):
         self.visit(ast.parse(source))
 
     def _at(self, line: int | None, column: int | None) -> int:
-        assert line is not None and column is not None
+        assert line is not None
+        assert column is not None
         return self._starts[line - 1] + column
 
     def _bounds(self, node: ast.expr | ast.stmt) -> tuple[int, int]:
@@ -269,8 +272,8 @@ def nearest_tests(mutant: Mutant, root: Path) -> list[str]:
 
 def copy_of_the_tree(root: Path) -> None:
     """What Git knows of, as it stands in the working tree."""
-    names = subprocess.check_output(["git", "-C", str(ROOT), "ls-files", "-co", "--exclude-standard"])
-    for name in names.decode().splitlines():
+    words = ["git", "-C", str(ROOT), "ls-files", "-co", "--exclude-standard"]
+    for name in subprocess.check_output(words, text=True).splitlines():
         if (ROOT / name).is_file():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, root / name)
@@ -309,10 +312,8 @@ def notice(mutant: Mutant, root: Path) -> str:
 
 def end(program: subprocess.Popen[str]) -> None:
     """With all that it started."""
-    try:
+    with suppress(ProcessLookupError):
         os.killpg(program.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
     program.wait()
 
 
@@ -349,7 +350,8 @@ def main() -> int:
     noticed, whole = Counter[str](), Counter(mutant.room for mutant in mutants)
     for mutant, test, took in tried(mutants):
         noticed[mutant.room] += bool(test)
-        print(f"{'noticed ' if test else 'NOT SEEN'} {mutant.told}  {test} {took:.0f} s", flush=True)
+        verdict = "noticed " if test else "NOT SEEN"
+        print(f"{verdict} {mutant.told}  {test} {took:.0f} s", flush=True)
     for room, number in whole.items():
         print(f"{room:12} {noticed[room]:3} of {number:3}")
     print(f"{noticed.total()} of {whole.total()} faults were noticed")

@@ -18,14 +18,14 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from other_version import end_with_signals, output, version
+from helpers.paths import ROOT
+from helpers.processes.other_version import end_with_signals, output, version
 
 import dva_sim
 from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.study.cell_grid import cells, jobs
 from dva_sim.experiments.study.loading import load_study
 
-ROOT = Path(__file__).parent.parent
 RECORDED = ("drive-to-event", "fire-drill")
 
 

@@ -276,8 +276,9 @@ class Dva:
         if known is not None and self.registry.is_elsewhere(message.source, body.address, now):
             self.counters["registration of an id in use"] += 1
             text = (
-                f"{known.device.label} is heard at {known.device.address} under this id; use another "
-                f"id, or wait until that device has been silent for {self.registry.silent_after:g} s"
+                f"{known.device.label} is heard at {known.device.address} under this id; use "
+                "another id, or wait until that device has been silent for "
+                f"{self.registry.silent_after:g} s"
             )
             return self._refuse(message, m.BUSY, text)
         if known is not None and known.is_new_life(message.message_id, message.timestamp):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from halls import People, hall, two_rooms
+from helpers.worlds.hall_with_people import People, hall, two_rooms
 
 from dva_sim.agents.people import evacuation
 from dva_sim.agents.people.bystander import APART, BystanderAgent, draw_places, nothing_seen

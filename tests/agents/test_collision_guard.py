@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from fleet import EMPTY, Fleet, map_of_caparica
+from helpers.processes.search_settings import search
+from helpers.worlds.robot_fleet import EMPTY, Fleet, map_of_caparica
 from hypothesis import given
 from hypothesis import strategies as st
-from searching import search
 
 from dva_sim.agents.robot.collision_guard import (
     KEEP_WALL,

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
-from granted import confirmation, hear
+from helpers.dva.permissions import confirmation, hear
+from helpers.paths import ROOT
 
 from dva_sim.agents.robot.controller import LEASE_S, STAND, Decision, Limits, Mode, RobotController
 from dva_sim.protocol import messages as m
 
-SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
+SPECIFICATION = ROOT / "protocol" / "README.md"
 DVA, ROBOT, ANA, RUI = (f"02:00:00:00:00:0{i}" for i in range(1, 5))
 
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from pretended_dva import GUARD, POST, WALKER, PretendedDva
+from helpers.dva.scripted_dva import GUARD, POST, WALKER, PretendedDva
 
 from dva_sim.agents.people.guard import STAND_BY_FOR, STAND_OFF, GuardAgent
 from dva_sim.agents.people.guard_protocol import AWARD_WITHIN, MOST_ANNOUNCED, GuardProtocol

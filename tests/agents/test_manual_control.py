@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from granted import confirmation, give
+from helpers.dva.permissions import confirmation, give
 
 from dva_sim.agents.robot.controller import (
     LEASE_S,

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fleet import Fleet, Robot, caparica
+from helpers.worlds.robot_fleet import Fleet, Robot, caparica
 
 from dva_sim.agents.robot.collision_guard import PERSONAL
 from dva_sim.agents.robot.field_of_view import HazardSpot

@@ -11,7 +11,7 @@ import random
 from collections import deque
 
 import pytest
-from granted import confirmation, hear
+from helpers.dva.permissions import confirmation, hear
 
 from dva_sim.agents.robot.controller import Limits, RobotController
 from dva_sim.agents.robot.inquiry import Inquiry

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
 from dva_sim.agents.operator.operator import STANDSTILL, OperatorAgent
 from dva_sim.agents.robot.controller import Mode

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from fleet import EMPTY, Fleet
+from helpers.worlds.robot_fleet import EMPTY, Fleet
 from pydantic import ValidationError
 
 from dva_sim.agents.robot.sensors import (

@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-from elsewhere import told_here_and_elsewhere
-from halls import People, gap, hall, two_rooms
+from helpers.processes.second_process import told_here_and_elsewhere
+from helpers.worlds.hall_with_people import People, gap, hall, two_rooms
 
 from dva_sim.agents.people.pedestrian_avoidance import (
     BERTH,
@@ -410,7 +410,7 @@ def test_two_who_are_sent_to_one_place_both_arrive():
 
 CROWD = """
 import numpy as np
-from halls import People, two_rooms
+from helpers.worlds.hall_with_people import People, two_rooms
 people = People(two_rooms(1.1))
 rng = np.random.default_rng(2)
 for y in np.arange(1.0, 9.5, 0.7):

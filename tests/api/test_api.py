@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import patience
 import pytest
+from helpers.processes import patience
 
 import dva_sim
 from dva_sim.experiments.study.loading import pairs_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small_study import cheap, study_in
+from helpers.studies.small_study import cheap, study_in
 
 import dva_sim
 from dva_sim.experiments.execution.runner import run_study

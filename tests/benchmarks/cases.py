@@ -69,7 +69,7 @@ def new_seed(scenario: str, **changes: Any) -> Work:
 
 def replayed() -> Work:
     """The same messages at the same moments by an operator who only repeats them."""
-    from replayed_operator import replay, taped
+    from helpers.network.replaying_operator import replay, taped
 
     made = built("drive-to-event", {"pattern": "latest-wins", **FAR})
     tape, _ = taped(made, 1)
@@ -151,7 +151,7 @@ def pointing() -> Work:
 
 def report() -> Work:
     """The main study's report, of 432 synthetic runs."""
-    import synthetic_study as synthetic
+    from helpers.studies import synthetic_results as synthetic
 
     from dva_sim.experiments.report.report import write_report
 

@@ -11,11 +11,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from patience import PATIENCE_S, becomes
+from helpers.paths import TESTS
+from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Browser, Page
 
 REAL = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
-FAKE = (str(Path(__file__).parents[1] / "console" / "fake_world.py"),)
+FAKE = (str(TESTS / "console" / "fake_world.py"),)
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
 # What a page does is noted: keys, what it sends and is told, and which input a robot obeys when.

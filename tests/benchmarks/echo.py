@@ -15,10 +15,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
 import zmq
-from granted import give
+from helpers.dva.permissions import give
+from helpers.paths import TESTS
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.recorder import Recorder
@@ -88,7 +88,7 @@ def start(role: str) -> Iterator[str]:
     """The address of another process, which ends when this one is done with it."""
     command = [sys.executable, __file__, role]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    tests = {"PYTHONPATH": str(Path(__file__).parents[1])}
+    tests = {"PYTHONPATH": str(TESTS)}
     with subprocess.Popen(command, env=os.environ | tests, **pipes) as process:
         assert process.stdout is not None
         try:

@@ -28,7 +28,7 @@ sys.path.insert(1, str(ROOT / "tests"))
 from benchmarks import runner, startup  # noqa: E402
 from benchmarks.cases import CASES, RATIOS  # noqa: E402
 from benchmarks.counting import FOLDER, Callgrind, Nothing, available, pinned  # noqa: E402
-from other_version import end_with_signals, output, version  # noqa: E402
+from helpers.processes.other_version import end_with_signals, output, version  # noqa: E402
 
 REPEATS = 5
 GIT = ["git", "-C", str(ROOT)]

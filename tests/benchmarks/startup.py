@@ -14,9 +14,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import synthetic_study as synthetic
 from benchmarks.counting import FOLDER, Callgrind, Perf
-from other_version import RUNNING
+from helpers.processes.other_version import RUNNING
+from helpers.studies import synthetic_results as synthetic
 
 NOBODY = "no-such-name"
 COMMANDS = {

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from benchmarks.console_visits import console, load
 from benchmarks.goals import goal
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 from scipy import stats
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from benchmarks.console_visits import FAKE, Console, console, load, visit
 from benchmarks.goals import goal
-from chromium import chromium
+from helpers.console.chromium import chromium
 from playwright.sync_api import Page, expect
 
 STEPS, STEP_MS, WARM_UP_MS = 300, 130, 2000  # of keys pressed in turn

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 from benchmarks.goals import goal
-from office import DVA, Office, east
+from helpers.dva.dispatch_desk import DVA, Office, east
 
 from dva_sim.core.assignments import Rules
 from dva_sim.protocol import messages as m

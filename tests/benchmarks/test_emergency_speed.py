@@ -26,12 +26,13 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks.goals import goal
-from console_served import Served, serving_phones
-from patience import PATIENCE_S
+from helpers.console.served_console import Served, serving_phones
+from helpers.paths import TESTS
+from helpers.processes.patience import PATIENCE_S
 from websockets.sync.client import connect
 
 CONNECTIONS, STOPS, SETTLED_S = 2000, 200, 10.0
-FLOODING = Path(__file__).parents[1] / "flooding.py"
+FLOODING = TESTS / "helpers/console/connection_flood.py"
 MOST_MS = 150.0  # the 99th percentile of a stop by button should be less
 
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zmq
-from programs import Programs, all_gone_after
+from helpers.processes.programs import Programs, all_gone_after
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode

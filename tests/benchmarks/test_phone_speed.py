@@ -25,8 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from benchmarks.goals import goal
-from patience import PATIENCE_S, becomes
-from phone_in_hand import Hand
+from helpers.console.browser_phone import Hand
+from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Page, Response, expect, sync_playwright
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect

@@ -16,19 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import small_study as kit
 from benchmarks.goals import goal
+from helpers.paths import PYTHON_PATH
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import executors
 from dva_sim.experiments.execution.runner import run_study
 
 STAT = Path("/proc/stat")
-TESTS = Path(kit.__file__).parent
-ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))}
+ENVIRONMENT = {**os.environ, "PYTHONPATH": PYTHON_PATH}
 MEMORY = """
 import json, re, sys
 from pathlib import Path
-import small_study as kit
+from helpers.studies import small_study as kit
 folder, jobs, total = Path(sys.argv[1]), int(sys.argv[2]), []
 def peak():
     return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]) / 1024

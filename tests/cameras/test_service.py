@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from threading import Thread
 
 import pytest
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 from PIL import Image
 
 from dva_sim.agents.observation import Cameras

@@ -7,17 +7,15 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from small_study import cheap, study_in, unlucky
+from helpers.paths import ROOT
+from helpers.studies.small_study import cheap, study_in, unlucky
 
 from dva_sim.cli import call, names
 from dva_sim.experiments.execution.dry_run import _Tried
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.kernel.errors import ExitCode
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ import shlex
 import subprocess
 import sys
 from itertools import takewhile
-from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 from typer.main import get_command
 
 from dva_sim import __version__
@@ -150,7 +150,7 @@ def test_the_program_is_a_module_and_a_reader_that_goes_away_is_no_traceback():
 
 
 def test_the_table_on_the_page_says_of_each_exit_code_what_the_help_says():
-    page = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| (\d+) \| (.*) \|$", page, re.MULTILINE)
     told = {int(code): meaning.replace("\\|", "|") for code, meaning in rows}
     assert told == {int(code): code.meaning for code in ExitCode}

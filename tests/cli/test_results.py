@@ -6,9 +6,9 @@ import shutil
 import sys
 
 import pytest
-import synthetic_study as synthetic
+from helpers.studies import synthetic_results as synthetic
+from helpers.studies.small_study import cheap, study_in, unlucky
 from rich.console import Console
-from small_study import cheap, study_in, unlucky
 
 from dva_sim import cli
 from dva_sim.experiments.execution.runner import run_study

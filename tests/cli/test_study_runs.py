@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.cli import study_runs
 from dva_sim.cli.study_runs import RunPace, duration

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from phone_page import PhonePage
+from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.console.alarm_desk import ESCALATED_FOR, AlarmDesk, RunFacts
 from dva_sim.console.refusal import Refused

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from free_ports import free_port
-from patience import becomes
-from programs import Program, Programs, all_gone_after
+from helpers.network.free_ports import free_port
+from helpers.processes.patience import becomes
+from helpers.processes.programs import Program, Programs, all_gone_after
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import AttachOptions

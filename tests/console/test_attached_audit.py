@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from attached_page import OWN, AttachedPage, attached
+from helpers.console.attached_console import OWN, AttachedPage, attached
 
 from dva_sim.agents.device import AUDIT
 from dva_sim.console.audit_measures import measured

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from attached_page import OWN, AttachedPage, attached
+from helpers.console.attached_console import OWN, AttachedPage, attached
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.protocol import messages as m

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from attached_page import OWN, AttachedPage, attached
+from helpers.console.attached_console import OWN, AttachedPage, attached
 
 from dva_sim.console.attached.sensing import RENEW
 from dva_sim.protocol.mistakes import check_message

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from patience import becomes
+from helpers.processes.patience import becomes
 
 from dva_sim.console import audit_keeper
 from dva_sim.console.audit_keeper import AuditKeeper, check_target

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from patience import PATIENCE_S, becomes
+from helpers.processes.patience import PATIENCE_S, becomes
 from PIL import Image
 
 pytestmark = pytest.mark.system

@@ -12,7 +12,7 @@ from functools import partial
 from http.cookiejar import CookieJar
 
 import pytest
-from programs import Programs, wait_until
+from helpers.processes.programs import Programs, wait_until
 from websockets.sync.client import connect
 
 import dva_sim

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phone_page import PhonePage
+from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.audit_keeper import AuditKeeper

@@ -1,7 +1,7 @@
 """A command is as old as the picture that its person's page has drawn last."""
 
 import pytest
-from console_page import Page
+from helpers.console.simulated_console import Page
 
 from dva_sim.agents.robot.controller import Mode
 

@@ -1,7 +1,7 @@
 """A person takes robots, drives them, and is stopped by all that should stop a drive."""
 
 import pytest
-from console_page import Page
+from helpers.console.simulated_console import Page
 
 from dva_sim.agents.operator import steps
 from dva_sim.agents.robot.controller import Mode

@@ -6,8 +6,8 @@ import re
 import socket
 
 import pytest
-from console_page import Page
-from patience import PATIENCE_S
+from helpers.console.simulated_console import Page
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.console.device_rows import link_of
 from dva_sim.console.fake_devices import RENEW

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from phone_page import PhonePage
+from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.core.events import State
 from dva_sim.kernel.errors import ConfigError

@@ -5,8 +5,8 @@ import shutil
 import sqlite3
 
 import pytest
-from console_page import Page
-from programs import wait_until
+from helpers.console.simulated_console import Page
+from helpers.processes.programs import wait_until
 
 import dva_sim
 from dva_sim.console.kept_results import KeptResults, name_of

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from patience import becomes
+from helpers.processes.patience import becomes
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.actions import Actions

@@ -1,7 +1,7 @@
 """The link changes under a drive, and frames, commands and round trips follow."""
 
 import pytest
-from console_page import Page
+from helpers.console.simulated_console import Page
 
 from dva_sim.agents.robot.controller import Mode
 

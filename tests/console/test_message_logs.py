@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
-from console_served import HOSTILE, scene
-from logged_messages import DVA, PHONE, ROBOT, asks, batch, line, said
+from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, line, said
+from helpers.console.served_console import HOSTILE, scene
+from helpers.paths import ROOT
 from lxml import etree
 
 from dva_sim.cameras.pipes import MOST_WAITING, LineOutbox
@@ -22,7 +22,7 @@ from dva_sim.network.messaging import Request
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
 
-SAMPLES = Path(__file__).parents[2] / "protocol" / "samples" / "valid"
+SAMPLES = ROOT / "protocol" / "samples" / "valid"
 HEADER = {"DestinationID", "MessageID", "SourceID", "Timestamp", "SessionID"}
 GROUPS = {"Access", "Dispatch", "Event", "Mission", "Sensor", "TeleOp"}  # of several kinds
 

@@ -9,11 +9,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from patience import run
+from helpers.paths import ROOT
+from helpers.processes.patience import run
 
 from dva_sim.console import palette
 
-ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 STATIC = ROOT / "dva_sim" / "console" / "static"
 OWN = sorted((STATIC / "js").rglob("*.js"))

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from phone_page import CALIBRATION, HeldPhone, PhonePage
+from helpers.console.simulated_phone import CALIBRATION, HeldPhone, PhonePage
 
 from dva_sim.agents.robot.controller import Mode
 

@@ -1,7 +1,7 @@
 """A robot that does not answer ends in a message with its address, and never in a hang."""
 
 import pytest
-from phone_page import HeldPhone, PhonePage
+from helpers.console.simulated_phone import HeldPhone, PhonePage
 
 from dva_sim.agents.robot.controller import Mode
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from phone_page import HeldPhone, PhonePage
+from helpers.console.simulated_phone import HeldPhone, PhonePage
 
 from dva_sim.agents.tilt import Accelerometer, load_part
 from dva_sim.agents.tilt.accelerometer import GRAVITY

@@ -4,9 +4,9 @@ import json
 import math
 
 import pytest
+from helpers.console.simulated_phone import HeldPhone, PhonePage
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from phone_page import HeldPhone, PhonePage
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.phone_input import samples_of, settings_of

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 from PIL import Image
 
 from dva_sim.cameras.drawing import BEST, WORST, Encoder, Eyes

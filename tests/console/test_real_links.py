@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from console_page import Page
-from patience import PATIENCE_S
+from helpers.console.simulated_console import Page
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.real_links import TITLE, ConsoleSockets

@@ -4,8 +4,8 @@ import time
 from dataclasses import replace
 
 import pytest
-from granted import confirmation
-from patience import PATIENCE_S
+from helpers.dva.permissions import confirmation
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.console.robot_desk import RobotDesk
 from dva_sim.console.robot_simulator import RobotOptions

@@ -1,8 +1,8 @@
 """A robot's windows in a run: what they are told, manual control from a page, faults on demand."""
 
 import pytest
-from console_page import Page
-from patience import PATIENCE_S
+from helpers.console.simulated_console import Page
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.latencies import KEPT, Latencies

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from console_served import Served, serving
+from helpers.console.served_console import Served, serving
 
 from dva_sim.console.audit_measures import measured
 from dva_sim.console.web.audit import csv_of

@@ -12,8 +12,8 @@ from contextlib import suppress
 from threading import Thread
 
 import pytest
-from console_served import Served, serving
-from patience import PATIENCE_S, becomes
+from helpers.console.served_console import Served, serving
+from helpers.processes.patience import PATIENCE_S, becomes
 from PIL import Image
 
 from dva_sim.cameras.frames import Picture, pack

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from console_served import places, scene
+from helpers.console.served_console import places, scene
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -9,15 +9,15 @@ import ssl
 import subprocess
 import sys
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from threading import Thread
 
 import pytest
-from console_served import serving_phones
-from patience import PATIENCE_S, becomes
+from helpers.console.served_console import serving_phones
+from helpers.paths import TESTS
+from helpers.processes.patience import PATIENCE_S, becomes
 from websockets.sync.client import connect
 
-FLOODING = Path(__file__).parents[1] / "flooding.py"
+FLOODING = TESTS / "helpers/console/connection_flood.py"
 COUNT = 700  # more than there are places
 
 

@@ -10,9 +10,9 @@ import zipfile
 from urllib.parse import quote
 
 import pytest
-from console_served import serving
-from logged_messages import DVA, PHONE, ROBOT, asks, batch, line, said
-from patience import becomes
+from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, line, said
+from helpers.console.served_console import serving
+from helpers.processes.patience import becomes
 from websockets.exceptions import ConnectionClosed
 
 from dva_sim.protocol import messages as m

@@ -10,8 +10,8 @@ from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from console_served import Answer, Served, serving, serving_phones
-from patience import PATIENCE_S
+from helpers.console.served_console import Answer, Served, serving, serving_phones
+from helpers.processes.patience import PATIENCE_S
 from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
 from websockets.sync.client import connect
 

@@ -6,8 +6,8 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from console_served import serving
-from patience import PATIENCE_S
+from helpers.console.served_console import serving
+from helpers.processes.patience import PATIENCE_S
 from websockets.exceptions import InvalidStatus
 
 

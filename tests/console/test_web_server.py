@@ -13,8 +13,8 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
-from console_served import HOSTILE, Served, places, scene, serving
-from patience import PATIENCE_S, becomes
+from helpers.console.served_console import HOSTILE, Served, places, scene, serving
+from helpers.processes.patience import PATIENCE_S, becomes
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 HEADERS = {

@@ -8,7 +8,7 @@ import socket
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 
-from console_served import scene
+from helpers.console.served_console import scene
 
 from dva_sim.console.web.simulation import MOST_PENDING, SILENCE, Simulation
 

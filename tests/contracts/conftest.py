@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from transports import GUARD, NODES, VIRTUAL, SocketWorld, VirtualWorld, World
+from helpers.network.transports import GUARD, NODES, VIRTUAL, SocketWorld, VirtualWorld, World
 
 from dva_sim.network.keys import KeyRing, create_keys
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from searching import search
-from transports import (
+from helpers.network.transports import (
     BRIEF,
     NODES,
     PHONE,
@@ -26,6 +23,9 @@ from transports import (
     echo,
     numbered,
 )
+from helpers.processes.search_settings import search
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dva_sim.network.keys import KeyRing
 

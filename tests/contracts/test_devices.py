@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 import pytest
-from granted import give
-from transports import (
+from helpers.dva.permissions import give
+from helpers.network.transports import (
     BRIEF,
     DVA,
     PHONE,

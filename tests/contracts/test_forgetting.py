@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 import zmq
-from office import Office
-from transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
+from helpers.dva.dispatch_desk import Office
+from helpers.network.transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
 
 from dva_sim.agents.device import HEARTBEAT, AgentDevice
 from dva_sim.network import sockets

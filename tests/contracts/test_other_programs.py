@@ -8,8 +8,7 @@ from contextlib import ExitStack
 
 import pytest
 import zmq
-from patience import PATIENCE_S
-from transports import (
+from helpers.network.transports import (
     BRIEF,
     DVA,
     GUARD,
@@ -22,6 +21,7 @@ from transports import (
     numbered,
     small_device,
 )
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.network.sockets import LARGEST
 from dva_sim.protocol import messages as m

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from patience import PATIENCE_S
-from transports import PHONE, ROBOT, VirtualWorld, World
+from helpers.network.transports import PHONE, ROBOT, VirtualWorld, World
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.network.patterns import PATTERNS, Pattern, load_pattern
 from dva_sim.testing.patterns import TriedDrive

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 import zmq
-from transports import (
+from helpers.network.transports import (
     DVA,
     GUARD,
     NODES,

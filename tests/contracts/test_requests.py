@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from transports import (
+from helpers.network.transports import (
     BRIEF,
     GUARD,
     NODES,

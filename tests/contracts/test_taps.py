@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from transports import BRIEF, PATIENT, PHONE, ROBOT, Asker, World, echo, numbered
+from helpers.network.transports import BRIEF, PATIENT, PHONE, ROBOT, Asker, World, echo, numbered
 
 from dva_sim.network.messaging import Request
 from dva_sim.network.tap import Exchange, Tap

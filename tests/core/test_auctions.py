@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from office import (
+from helpers.dva.dispatch_desk import (
     DETECTOR,
     GUARD,
     OPERATOR,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from office import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, Office, east
+from helpers.dva.dispatch_desk import DETECTOR, GUARD, OPERATOR, OTHER_GUARD, ROBOT, Office, east
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Advice, Assignment, HazardTeam, Policy, Situation

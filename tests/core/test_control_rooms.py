@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from office import (
+from helpers.dva.dispatch_desk import (
     DVA,
     GUARD,
     OPERATOR,

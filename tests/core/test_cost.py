@@ -8,7 +8,7 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from office import ADDRESS, DETECTOR, GUARD, OPERATOR, ROBOT, Office
+from helpers.dva.dispatch_desk import ADDRESS, DETECTOR, GUARD, OPERATOR, ROBOT, Office
 
 from dva_sim.protocol import messages as m
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from office import (
+from helpers.dva.dispatch_desk import (
     DETECTOR,
     GUARD,
     OPERATOR,

@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 import pytest
-from office import DETECTOR, GUARD, HERE, OPERATOR, OTHER_DETECTOR, ROBOT, Office, east
+from helpers.dva.dispatch_desk import (
+    DETECTOR,
+    GUARD,
+    HERE,
+    OPERATOR,
+    OTHER_DETECTOR,
+    ROBOT,
+    Office,
+    east,
+)
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import KEPT_CLOSED, MOST_SOURCES, EventBook, State

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from office import ADDRESS, DETECTOR, GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_desk import (
+    ADDRESS,
+    DETECTOR,
+    GUARD,
+    OPERATOR,
+    OTHER_OPERATOR,
+    OTHER_ROBOT,
+    ROBOT,
+    Office,
+)
 
 from dva_sim.core.events import State
 from dva_sim.core.sessions import Send

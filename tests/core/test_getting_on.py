@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from office import GUARD, OPERATOR, OTHER_GUARD, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_desk import GUARD, OPERATOR, OTHER_GUARD, OTHER_ROBOT, ROBOT, Office
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State

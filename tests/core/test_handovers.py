@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 import pytest
-from office import ADDRESS, DVA, GUARD, OPERATOR, OTHER_OPERATOR, ROBOT, TEAM, Office
+from helpers.dva.dispatch_desk import (
+    ADDRESS,
+    DVA,
+    GUARD,
+    OPERATOR,
+    OTHER_OPERATOR,
+    ROBOT,
+    TEAM,
+    Office,
+)
 
 from dva_sim.core.events import State
 from dva_sim.core.handovers import ANSWER_WITHIN, DECLINED_FOR, FETCH_WITHIN, STOP_WITHIN

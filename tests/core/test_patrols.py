@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from office import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
+from helpers.dva.dispatch_desk import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
 from dva_sim.core.dispatcher import REST, Patrols
 from dva_sim.core.dva import Dva

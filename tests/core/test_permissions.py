@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from office import (
+from helpers.dva.dispatch_desk import (
     ADDRESS,
     DETECTOR,
     GUARD,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from office import (
+from helpers.dva.dispatch_desk import (
     GUARD,
     OPERATOR,
     OTHER_OPERATOR,

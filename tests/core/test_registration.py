@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from office import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
+from helpers.dva.dispatch_desk import ADDRESS, DETECTOR, DVA, GUARD, OPERATOR, ROBOT, Office
 
 from dva_sim.core.registry import Registry
 from dva_sim.core.sessions import Send

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from office import GUARD, OPERATOR, ROBOT, Office, east
+from helpers.dva.dispatch_desk import GUARD, OPERATOR, ROBOT, Office, east
 
 from dva_sim.core.dispatch import Advice, Coverage, MinEta, Policy, Relocation, Situation
 from dva_sim.core.sessions import Send

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from office import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
+from helpers.dva.dispatch_desk import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State

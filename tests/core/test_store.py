@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from office import (
+from helpers.dva.dispatch_desk import (
     ADDRESS,
     GUARD,
     OPERATOR,
@@ -19,7 +19,8 @@ from office import (
     ROBOT,
     Office,
 )
-from walks import Walk, snapshot
+from helpers.dva.random_days import Walk, snapshot
+from helpers.paths import TESTS
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dva import Dva
@@ -253,7 +254,7 @@ def test_a_copy_of_the_file_taken_at_any_moment_knows_what_was_kept_until_then(
 SAYS_WHAT_IT_KEPT = """
 import sys
 sys.path.insert(0, sys.argv[2])
-from office import Office
+from helpers.dva.dispatch_desk import Office
 from dva_sim.core.store import Memory
 office, memory = Office(), Memory(sys.argv[1])
 while True:
@@ -267,7 +268,7 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file: Path) -
     """Three kills, each amid the writing."""
     for enough in (3, 17, 60):
         command = [sys.executable, "-c", SAYS_WHAT_IT_KEPT, str(file)]
-        command += [str(Path(__file__).parents[1]), OPERATOR]
+        command += [str(TESTS), OPERATOR]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
             said = 0

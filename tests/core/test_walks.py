@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from walks import POLICY_NAMES, Walk
+from helpers.dva.random_days import POLICY_NAMES, Walk
 
 # A walk of 400 steps finds what one of 100 does not: orders that come to nothing time and again.
 SHORT, LONG = 100, 400

@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 with atheris.instrument_imports(include=["dva_sim.protocol"]):
     from dva_sim.protocol.codec import decode, encode
 
-from message_mutations import mutated
-from message_oracle import decode_or_refuse
+from helpers.messages.damaged_messages import mutated
+from helpers.messages.message_oracle import decode_or_refuse
 
 SAMPLES = Path(__file__).parents[2] / "protocol" / "samples"
 

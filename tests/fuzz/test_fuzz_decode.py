@@ -5,12 +5,10 @@ import os
 import re
 import shutil
 import sys
-from pathlib import Path
 
-import patience
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from helpers.paths import ROOT
+from helpers.processes import patience
 
 pytestmark = [
     pytest.mark.soak,

@@ -1,9 +1,8 @@
 """The rules that are written down are those that tests guard."""
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from helpers.paths import ROOT
 
 
 def test_each_invariant_is_cited_by_a_test_and_each_citation_is_one():

@@ -5,15 +5,13 @@ import platform
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from benchmarks import cases, counting, meter, runner, startup
+from helpers.paths import TESTS
 from typer.main import get_command
 
 from dva_sim.cli import app
-
-TESTS = Path(__file__).parents[1]
 
 
 @pytest.mark.skipif(platform.system() != "Linux", reason="perf_event_open is Linux's")
@@ -89,7 +87,7 @@ def test_a_ratio_is_told_where_both_its_cases_were_measured():
 
 ASKING = """
 import subprocess, sys
-from other_version import end_with_signals, output, version
+from helpers.processes.other_version import end_with_signals, output, version
 
 end_with_signals()
 with version("HEAD") as folder:

@@ -8,12 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import patience
 import pytest
 from halves import Helper
+from helpers.paths import TESTS
+from helpers.processes import patience
 from skips import MOST_SKIPPED
 
-TESTS = Path(__file__).parents[1]
 CONFTEST = """
 from halves import pytest_addoption, pytest_configure
 from skips import pytest_sessionfinish
@@ -120,7 +120,7 @@ def test_a_test_that_hangs_ends_the_run_with_a_traceback(tmp_path: Path) -> None
 
 WAITS = """
 from pathlib import Path
-import patience
+from helpers.processes import patience
 def test_{own}():
     try:
         Path("{own}").touch()

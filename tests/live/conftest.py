@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from programs import Programs, all_gone_after
+from helpers.processes.programs import Programs, all_gone_after
 
 
 @pytest.fixture

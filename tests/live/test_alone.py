@@ -7,7 +7,7 @@ import signal
 from contextlib import nullcontext
 
 import pytest
-from free_ports import free_port
+from helpers.network.free_ports import free_port
 
 from dva_sim.cli import call
 from dva_sim.kernel.errors import RunsFailed

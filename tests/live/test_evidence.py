@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import call
+from helpers.processes.command_line import call
 
 import dva_sim
 from dva_sim.console.replay.console import ReplayOptions

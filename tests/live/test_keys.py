@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from programs import Program, Programs
+from helpers.processes.programs import Program, Programs
 
 from dva_sim.cli.live_screen import make_keys
 from dva_sim.kernel.errors import ConfigError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from command_line import call
+from helpers.processes.command_line import call
 
 from dva_sim.live import supervisor
 

@@ -11,8 +11,8 @@ import socket
 from pathlib import Path
 
 import pytest
-from command_line import call
-from programs import Program, Programs, wait_until
+from helpers.processes.command_line import call
+from helpers.processes.programs import Program, Programs, wait_until
 
 from dva_sim.agents.robot.decision_log import replay
 from dva_sim.protocol import messages as m

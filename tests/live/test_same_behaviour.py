@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 import pytest
-from one_session import (
+from helpers.network.scripted_session import (
     Decided,
     Way,
     forged,

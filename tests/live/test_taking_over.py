@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from one_session import (
+from helpers.network.scripted_session import (
     OPERATOR,
     PATIENT,
     ROBOT,
@@ -17,7 +17,7 @@ from one_session import (
     Witness,
     _quick_network,
 )
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
 from dva_sim.core.events import State

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from granted import confirmation, enter
-from one_session import ROBOT, over_sockets, pipelined
+from helpers.dva.permissions import confirmation, enter
+from helpers.network.scripted_session import ROBOT, over_sockets, pipelined
 
 from dva_sim.agents.robot.controller import LEASE_S, Limits, RobotController
 from dva_sim.agents.robot.decision_log import (

@@ -1,9 +1,9 @@
 import csv
 import dataclasses
 import math
-from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.pattern_runs import (
@@ -15,7 +15,7 @@ from dva_sim.network.pattern_runs import (
 )
 from dva_sim.network.patterns import PATTERNS
 
-REFERENCE = Path(__file__).parents[2].parent / "shared" / "targets" / "network.csv"
+REFERENCE = ROOT.parent / "shared" / "targets" / "network.csv"
 ASKING = Condition("req", 10, timeout_ms=2500, attempts=3, delay_ms=100, loss=0.05, rate_kbit=64)
 PUBLISHING = Condition("pub", 50, conflate="both", sndbuf=4096, hwm=1, queue_pkts=20)
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.network.messaging import Request, Requester

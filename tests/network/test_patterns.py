@@ -8,6 +8,7 @@ from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.cli import names
 from dva_sim.experiments.report.figures.palette import look_of
@@ -18,7 +19,6 @@ from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.labels import level_name
 from dva_sim.simulation.scenario import Scenario
 
-ROOT = Path(__file__).parents[2]
 EXAMPLE = "acknowledged_pub_sub.py:AcknowledgedPubSub"
 
 

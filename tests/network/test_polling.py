@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 import zmq
-from patience import becomes
+from helpers.processes.patience import becomes
 
 from dva_sim.network import realtime
 from dva_sim.network.realtime import Poller

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import zmq
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network import security as module

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 import zmq
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.options import LiveOptions

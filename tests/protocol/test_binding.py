@@ -11,19 +11,20 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 
-import patience
 import pytest
+from helpers.messages.message_oracle import says
+from helpers.messages.message_strategies import BODIES, messages, with_header
+from helpers.paths import ROOT
+from helpers.processes import patience
+from helpers.processes.search_settings import search
 from hypothesis import given
 from hypothesis import strategies as st
-from message_oracle import says
-from message_strategies import BODIES, messages, with_header
-from searching import search
 from xsdata.formats.dataclass.parsers import XmlParser
 from xsdata.formats.dataclass.serializers import XmlSerializer
 
 from dva_sim.protocol.codec import decode, encode
 
-PROTOCOL = Path(__file__).parents[2] / "protocol"
+PROTOCOL = ROOT / "protocol"
 VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
 
 

@@ -1,16 +1,16 @@
 """The quick way through decode takes only what the schema allows, and reads it the same."""
 
 import re
-from pathlib import Path
 from random import Random
 
 import pytest
+from helpers.messages.damaged_messages import NUMBERS, STRINGS, VALUE, mutated
+from helpers.messages.message_oracle import judged, says
+from helpers.messages.message_strategies import BODIES, ROBOT, TABLET, message, with_header
+from helpers.paths import ROOT
+from helpers.processes.search_settings import LONGER, search
 from hypothesis import given
 from hypothesis import strategies as st
-from message_mutations import NUMBERS, STRINGS, VALUE, mutated
-from message_oracle import judged, says
-from message_strategies import BODIES, ROBOT, TABLET, message, with_header
-from searching import LONGER, search
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import MAX_SESSION, MAX_TICK, MAX_UINT32, decode, encode, read_canonical
@@ -30,7 +30,7 @@ KNOWN = [
     message(m.Registration("robot-1", "Robot", "192.168.1.20:5555")),
 ]
 SEEDS = [encode(one) for one in KNOWN]
-SAMPLES = sorted((Path(__file__).parents[2] / "protocol" / "samples" / "valid").glob("*.xml"))
+SAMPLES = sorted((ROOT / "protocol" / "samples" / "valid").glob("*.xml"))
 known_bodies = st.one_of(
     *(
         BODIES[kind]

@@ -4,12 +4,12 @@ import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from command_line import call
-from patience import PATIENCE_S
+from helpers.paths import ROOT
+from helpers.processes.command_line import call
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.keys import KeyRing
@@ -21,7 +21,7 @@ from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage, id_of, team_of
 
-SPECIFICATION = Path(__file__).parents[2] / "protocol" / "README.md"
+SPECIFICATION = ROOT / "protocol" / "README.md"
 ROBOT = id_of("robot", 1)
 
 

@@ -1,20 +1,20 @@
 import math
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
+from helpers.messages.message_strategies import BODIES, ROBOT, TABLET, message, messages
+from helpers.paths import ROOT
+from helpers.processes.search_settings import search
 from hypothesis import given
 from lxml import etree
-from message_strategies import BODIES, ROBOT, TABLET, message, messages
-from searching import search
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode, timestamp
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.schema import MAX_BYTES
 
-SCHEMA = etree.XMLSchema(file=str(Path(__file__).parents[2] / "protocol" / "dva.xsd"))
+SCHEMA = etree.XMLSchema(file=str(ROOT / "protocol" / "dva.xsd"))
 
 
 def test_every_body_has_a_strategy():

@@ -12,12 +12,13 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from helpers.messages.damaged_messages import LEAF, mutated
+from helpers.messages.message_oracle import decode_or_refuse
+from helpers.messages.message_strategies import message
+from helpers.paths import ROOT
+from helpers.processes.search_settings import LONGER, search
 from hypothesis import example, given
 from hypothesis import strategies as st
-from message_mutations import LEAF, mutated
-from message_oracle import decode_or_refuse
-from message_strategies import message
-from searching import LONGER, search
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
@@ -26,7 +27,7 @@ from dva_sim.protocol.schema import MAX_BYTES
 
 GOOD = encode(message(m.SetTeleOp(0.5, 0.56, 86320)))
 REPLY = encode(message(m.Reply(124, m.BUSY, "é & <ü>", m.SensorInfo("http://10.0.0.1/?a=b"))))
-SAMPLES = Path(__file__).parents[2] / "protocol" / "samples" / "valid"
+SAMPLES = ROOT / "protocol" / "samples" / "valid"
 ALL = {path.stem: encode(decode(path.read_bytes())) for path in sorted(SAMPLES.glob("*.xml"))}
 each_kind = pytest.mark.parametrize("data", ALL.values(), ids=ALL)
 

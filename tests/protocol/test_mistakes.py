@@ -1,14 +1,13 @@
 """Every refusal has a place in the file, and the codec alone decides what is refused."""
 
-from pathlib import Path
-
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.mistakes import check_message, form_of
 
-SAMPLES = Path(__file__).parents[2] / "protocol" / "samples"
+SAMPLES = ROOT / "protocol" / "samples"
 GOOD = (SAMPLES / "valid" / "set-teleop.xml").read_bytes()
 
 

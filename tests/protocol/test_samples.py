@@ -1,17 +1,17 @@
 """The samples and the specification, read as someone writing another implementation would."""
 
 import re
-from pathlib import Path
 from typing import get_args
 
 import pytest
+from helpers.paths import ROOT, TESTS
 from lxml import etree
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
-PROTOCOL = Path(__file__).parents[2] / "protocol"
+PROTOCOL = ROOT / "protocol"
 SCHEMA = etree.XMLSchema(file=str(PROTOCOL / "dva.xsd"))
 VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
 INVALID = sorted((PROTOCOL / "samples" / "invalid").glob("*.xml"))
@@ -48,7 +48,7 @@ NEW = {
     "1.6": {"get-grant-of-a-reader", "get-grant-of-the-holder"},
 }
 OLD = {
-    version: etree.XMLSchema(file=str(Path(__file__).parents[1] / "data" / f"dva-{version}.xsd"))
+    version: etree.XMLSchema(file=str(TESTS / "data" / f"dva-{version}.xsd"))
     for version in ("1.3", "1.4", "1.5")
 }
 

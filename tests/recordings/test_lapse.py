@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 from matplotlib.colors import to_hex
 from recordings.runs import drill
 
@@ -33,14 +33,14 @@ def drawn(tmp_path_factory):
         | {"control": "direct", "is_reference": False, "confirmation_s": value}
         for person, value in enumerate(VALUES)
     ]
-    runs = synthetic_study.columns(rows)
+    runs = synthetic_results.columns(rows)
     part = RunGrid(runs, "drill", [Factor("control", ("direct",))])
     view = StudyView(part, "confirmation_s", None, None, None, {})
     tables = Tables(runs, {}, ["control"])
     episodes = typical_and_worst(folder, "drill", "confirmation_s", tables)
     with styled():
         return {
-            figure.which: figure.drawn(view, episode, synthetic_study.SCENARIO)
+            figure.which: figure.drawn(view, episode, synthetic_results.SCENARIO)
             for figure, episode in zip((TypicalRun(), WorstRun()), episodes, strict=True)
         }
 

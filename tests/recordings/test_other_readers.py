@@ -6,8 +6,8 @@
 import json
 import shutil
 
-import patience
 import pytest
+from helpers.processes import patience
 from mcap.reader import make_reader
 
 READ = """

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
@@ -214,7 +215,7 @@ def test_lines_above_and_below_the_maps_do_not_meet(request, name, inset):
 
 
 def test_the_film_of_the_first_page_is_small_and_as_wide_as_the_page_and_ends_with_both_robots():
-    film = Path(__file__).parents[2] / "experiments/pictures/one-second-away.gif"
+    film = ROOT / "experiments/pictures/one-second-away.gif"
     assert film.stat().st_size < 1_000_000
     with Image.open(film) as gif:
         assert gif.width == 840

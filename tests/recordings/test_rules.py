@@ -4,7 +4,7 @@ import re
 from functools import partial
 
 import pytest
-from command_line import call
+from helpers.processes.command_line import call
 from recordings.runs import drive
 
 from dva_sim.agents.robot.controller import Decision, RobotController

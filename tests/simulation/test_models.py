@@ -1,7 +1,7 @@
 """What a study may ask for is what the rows of its model hold, no more and no less."""
 
 import pytest
-from small_study import STUDY, study_in
+from helpers.studies.small_study import STUDY, study_in
 
 from dva_sim.experiments.study import cell_grid
 from dva_sim.kernel.errors import ConfigError

@@ -8,10 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import call
+from helpers.paths import ROOT, TESTS
+from helpers.processes.command_line import call
 
-MAPS = Path(__file__).parents[1] / "data"
-TRACES = Path(__file__).parents[2] / "experiments" / "traces"
+MAPS = TESTS / "data"
+TRACES = ROOT / "experiments" / "traces"
 STUDY = """\
 question: Which is quicker?
 persons: 3

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+from helpers.paths import ROOT
+
 from dva_sim.agents.operator.strategies import load_strategy
 from dva_sim.testing.operators import check_operator
 from dva_sim.testing.promises import tried
 
-PAGES = Path(__file__).parents[2]
+PAGES = ROOT
 
 
 def test_the_operator_on_the_page_of_agents_keeps_its_promises(tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import typer
+from helpers.paths import ROOT
+from helpers.studies.small_study import cheap, study_in
 from PIL import Image
-from small_study import cheap, study_in
 from typer.testing import CliRunner
 
 import dva_sim
@@ -24,7 +25,7 @@ from dva_sim.cli import app
 from dva_sim.experiments.execution import dry_run
 from dva_sim.experiments.execution.runner import run_study
 
-HOME = Path(__file__).parents[2]
+HOME = ROOT
 PAGE = (HOME / "README.md").read_text(encoding="utf-8")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from command_line import call
+from helpers.processes.command_line import call
 
 STUDY = """\
 question: Does the nearest come sooner?

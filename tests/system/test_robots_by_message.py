@@ -10,7 +10,7 @@ from functools import partial
 
 import pymunk
 import pytest
-from granted import enter
+from helpers.dva.permissions import enter
 
 from dva_sim.agents.device import command_topic, do_nothing
 from dva_sim.agents.robot.command_queue import EACH

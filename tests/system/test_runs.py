@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 import pytest
-from elsewhere import told_here_and_elsewhere
+from helpers.processes.second_process import told_here_and_elsewhere
 
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.robot.controller import Decision, RobotController

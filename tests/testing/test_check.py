@@ -8,7 +8,8 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from command_line import call
+from helpers.paths import ROOT
+from helpers.processes.command_line import call
 
 from dva_sim.cli import checks
 from dva_sim.experiments.study import cell_grid
@@ -17,7 +18,6 @@ from dva_sim.recordings.audit_log import BEGIN, END, AuditEntry, AuditLog
 from dva_sim.validation.network.emulator import cell, self_check
 from dva_sim.validation.network.emulator.self_check import LinkFinding
 
-ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "protocol" / "samples"
 GOOD = SAMPLES / "valid" / "set-teleop.xml"
 FLOOD = "events: [{{kind: flood, hazard: {{{}}}}}]\n"

@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 import pytest
-from searching import LONGER
+from helpers.processes.search_settings import LONGER
 
 from dva_sim.cli import checks
 from dva_sim.experiments.report.figures import Numbers, ReportFigure, panels

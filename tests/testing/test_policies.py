@@ -3,10 +3,10 @@
 import random
 import time
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.cli import checks
 from dva_sim.core.dispatch import (
@@ -24,7 +24,6 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.policies import check_policy
 from dva_sim.testing.promises import tried
 
-ROOT = Path(__file__).parents[2]
 EXAMPLES = [f"{path.name}:{path.stem.title()}" for path in (ROOT / "agents/policies").glob("*.py")]
 
 

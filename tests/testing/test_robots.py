@@ -1,9 +1,9 @@
 """What every robot's motors promise: kept by all that are shipped, missed by the bad ones here."""
 
 import math
-from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
@@ -11,7 +11,6 @@ from dva_sim.testing.promises import tried
 from dva_sim.testing.robots import check_robot
 from dva_sim.worlds.drives import Differential
 
-ROOT = Path(__file__).parents[2]
 NAMES = sorted(path.stem for path in (ROOT / "agents/robots").glob("*.yaml"))
 
 

@@ -1,9 +1,9 @@
 """The printed schemas accept what is shipped, and refuse what the program refuses."""
 
 import json
-from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 from lxml import etree
 
 from dva_sim.experiments.study.loading import load_study
@@ -11,7 +11,6 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.testing.files import schema_text
 
-ROOT = Path(__file__).parents[2]
 SHIPPED = {
     "study": sorted(set(ROOT.glob("experiments/*.yaml")) - set(ROOT.rglob("*.registration.yaml"))),
     # The keys of a user's model are known to its file alone.

@@ -1,7 +1,6 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
+from helpers.paths import TESTS
 
 from dva_sim.worlds.compartments import of_floor, of_rooms
 from dva_sim.worlds.geo import Pose
@@ -9,7 +8,7 @@ from dva_sim.worlds.maps import FREE, OCCUPIED, OccupancyGrid, rasterise
 from dva_sim.worlds.site import load_site, map_site
 from dva_sim.worlds.site_parts import Room
 
-MAPS = Path(__file__).parents[1] / "data"
+MAPS = TESTS / "data"
 
 
 def box(name, xmin, ymin, xmax, ymax, **more):

@@ -1,10 +1,10 @@
 import math
 import runpy
-from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_site import TWO_ROOMS, feature, square, write_site
+from helpers.paths import ROOT
+from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.geojson import write_features
@@ -13,7 +13,7 @@ from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 from dva_sim.worlds.site_parts import QUALITIES
 
-WORLDS = Path(__file__).parents[2] / "worlds"
+WORLDS = ROOT / "worlds"
 
 
 def site_of(folder, *features, **changes):

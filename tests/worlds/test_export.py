@@ -1,8 +1,7 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 import shapely
+from helpers.paths import TESTS
 from PIL import Image
 
 from dva_sim.cli import site
@@ -10,7 +9,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.site import load_site, map_site
 from dva_sim.worlds.site_export import write_site
 
-MAPS = Path(__file__).parents[1] / "data"
+MAPS = TESTS / "data"
 
 
 def sides(walls):

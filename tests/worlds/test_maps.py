@@ -1,10 +1,10 @@
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 from data.make_maps import hall, racks, ragged
+from helpers.paths import ROOT, TESTS
 from PIL import Image
 
 from dva_sim.kernel.errors import ConfigError
@@ -12,8 +12,8 @@ from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, load_ros_map, outline
 from dva_sim.worlds.site import map_site
 
-MAPS = Path(__file__).parents[1] / "data"
-RECORDED = Path(__file__).parents[3] / "shared" / "maps"  # by robots; not everybody has them
+MAPS = TESTS / "data"
+RECORDED = ROOT.parent / "shared" / "maps"  # by robots; not everybody has them
 needs_them = pytest.mark.skipif(not RECORDED.is_dir(), reason=f"no recorded maps at {RECORDED}")
 EACH_MAP = pytest.mark.parametrize(
     ("path", "most"),  # and its walls

@@ -4,9 +4,9 @@ import math
 import numpy as np
 import pytest
 import shapely
+from helpers.processes.search_settings import search
 from hypothesis import example, given
 from hypothesis import strategies as st
-from searching import search
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.maps import FREE

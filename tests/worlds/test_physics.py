@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from elsewhere import told_here_and_elsewhere
+from helpers.processes.second_process import told_here_and_elsewhere
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.drives import DriveSpec

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 import shapely
+from helpers.processes.search_settings import search
 from hypothesis import given
 from hypothesis import strategies as st
-from searching import search
 
 from dva_sim.agents.robot.profile import load_robot
 from dva_sim.kernel.errors import ConfigError

@@ -1,9 +1,9 @@
 import itertools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.paths import TESTS
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -13,7 +13,7 @@ from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
 from dva_sim.worlds.planning import Disc, Planner
 from dva_sim.worlds.site import DEFAULT_FRAME, FOOTPRINT, Site, load_site, map_site
 
-MAPS = Path(__file__).parents[1] / "data"
+MAPS = TESTS / "data"
 
 
 def make_site(walls, size=10.0):

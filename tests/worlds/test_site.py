@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn_site import TWO_ROOMS, feature, square, write_site
+from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.planning import Planner

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pretended_dva import ROBOT, PretendedDva
+from helpers.dva.scripted_dva import ROBOT, PretendedDva
 
 from dva_sim.agents.operator.drive import ATTEMPTS
 from dva_sim.agents.operator.supervision import BLIND_AFTER

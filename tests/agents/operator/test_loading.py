@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
-from closed_loops import CURSOR, ROBOT, drive, person, way
+from helpers.worlds.delayed_loops import CURSOR, ROBOT, drive, person, way
 
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies import (

@@ -8,7 +8,18 @@ from itertools import groupby, pairwise
 from typing import Any
 
 import pytest
-from closed_loops import CURSOR, ROBOT, At, arc, drive, follow, offsets, person, point, way
+from helpers.worlds.delayed_loops import (
+    CURSOR,
+    ROBOT,
+    At,
+    arc,
+    drive,
+    follow,
+    offsets,
+    person,
+    point,
+    way,
+)
 
 from dva_sim.agents.operator.strategies import (
     Adaptive,

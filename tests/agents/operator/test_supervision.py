@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.robot.controller import Mode

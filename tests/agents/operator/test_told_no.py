@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from pretended_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
 
 from dva_sim.agents.operator.refusals import ENOUGH, LATE_FOR, PASSES, SAYS_LATE_FOR, Refusals
 from dva_sim.agents.robot.controller import LEASE_S, Mode

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from chromium import chromium
-from patience import PATIENCE_S, becomes
+from helpers.console.chromium import chromium
+from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 ENDED = "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_REFUSED"  # with a page's world

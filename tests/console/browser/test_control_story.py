@@ -9,10 +9,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from driving_by_keys import Driver
-from patience import PATIENCE_S, becomes
+from helpers.console.keyboard_driver import Driver
+from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import Page, expect
-from programs import Program, Programs, all_gone_after
 
 from dva_sim.protocol.mistakes import check_message
 from dva_sim.recordings.audit_log import read_rows

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
-from patience import becomes
+from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 import zmq
-from free_ports import free_port
-from page_faults import faults
-from patience import PATIENCE_S
+from helpers.console.accessibility import faults
+from helpers.network.free_ports import free_port
+from helpers.processes.patience import PATIENCE_S
+from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import Page, expect
-from programs import Program, Programs, all_gone_after
 
 from dva_sim.network.keys import create_keys
 from dva_sim.protocol import messages as m

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from patience import becomes
-from phone_in_hand import LISTEN
+from helpers.console.browser_phone import LISTEN
+from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
 SCREEN = {"width": 360, "height": 740, "has_touch": True, "is_mobile": True}

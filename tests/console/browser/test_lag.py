@@ -6,7 +6,7 @@ import json
 import re
 
 import pytest
-from patience import becomes
+from helpers.processes.patience import becomes
 from playwright.sync_api import Page, WebSocketRoute, expect
 
 SMALL = ("--robots", "2", "--people", "6")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from patience import becomes
+from helpers.processes.patience import becomes
 from playwright.sync_api import expect
 
 SMALL = ("--robots", "2", "--people", "3")

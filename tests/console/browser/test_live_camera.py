@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers.processes.programs import Programs, all_gone_after
 from playwright.sync_api import Browser
-from programs import Programs, all_gone_after
 
 
 @pytest.fixture

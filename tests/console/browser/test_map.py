@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from patience import becomes
+from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
 SMALL = ("--robots", "3", "--people", "4")

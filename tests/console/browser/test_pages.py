@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from page_faults import faults
+from helpers.console.accessibility import faults
 from playwright.sync_api import Response, expect
 
 PAGES = {

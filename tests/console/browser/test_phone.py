@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from patience import becomes
-from phone_in_hand import FORWARDS, HIDE, LEFT_FORWARDS, Hand
+from helpers.console.browser_phone import FORWARDS, HIDE, LEFT_FORWARDS, Hand
+from helpers.processes.patience import becomes
 from playwright.sync_api import expect
 
 WORLD = ("--phones", "--robots", "3", "--people", "4")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from page_faults import faults
-from phone_in_hand import Hand
+from helpers.console.accessibility import faults
+from helpers.console.browser_phone import Hand
 from playwright.sync_api import Page, Response, expect
 
 WORLD = ("--phones", "--robots", "3", "--people", "4")

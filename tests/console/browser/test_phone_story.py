@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from patience import becomes
-from phone_in_hand import FORWARDS, Hand
+from helpers.console.browser_phone import FORWARDS, Hand
+from helpers.processes.patience import becomes
+from helpers.processes.programs import Programs, all_gone_after
 from playwright.sync_api import expect
-from programs import Programs, all_gone_after
 
 from dva_sim.experiments.results.results import Results
 

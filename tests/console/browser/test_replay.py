@@ -8,10 +8,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from page_faults import faults
-from patience import becomes
+from helpers.console.accessibility import faults
+from helpers.processes.patience import becomes
+from helpers.processes.programs import Programs, all_gone_after
 from playwright.sync_api import Page, expect
-from programs import Programs, all_gone_after
 from recordings.runs import drill, drive
 
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row

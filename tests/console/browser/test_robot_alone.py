@@ -12,16 +12,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from page_faults import faults
-from patience import PATIENCE_S
+from helpers.console.accessibility import faults
+from helpers.paths import ROOT
+from helpers.processes.patience import PATIENCE_S
+from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import Page, expect
-from programs import Program, Programs, all_gone_after
 
 from dva_sim.console.robot_station import two_free_ports
 
 # The client sends no heartbeats: a robot that takes seconds for each message would lose it.
 QUICK = "--set", "robot.processing_s=0.05"
-SPECIFICATION = Path(__file__).parents[3] / "protocol" / "README.md"
+SPECIFICATION = ROOT / "protocol" / "README.md"
 
 
 @pytest.fixture

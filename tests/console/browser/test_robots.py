@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from page_faults import faults
-from patience import becomes
+from helpers.console.accessibility import faults
+from helpers.processes.patience import becomes
+from helpers.processes.programs import Programs, all_gone_after
 from playwright.sync_api import Page, expect
-from programs import Programs, all_gone_after
 
 REGIONS = "Log", "Side view", "Top view", "Manual control", "Latency", "Camera"
 QUIET = "--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operator.count=1"

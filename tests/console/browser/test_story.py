@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from driving_by_keys import Driver
-from patience import PATIENCE_S, becomes
+from helpers.console.keyboard_driver import Driver
+from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import expect
-from programs import Program, Programs, all_gone_after
 
 DELAY_S = 0.5
 NEAR_M = 2.5  # of the fire: there it can be seen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from patience import becomes
+from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
 

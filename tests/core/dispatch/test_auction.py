@@ -1,7 +1,7 @@
 """Ask, and take the best offer."""
 
 import numpy as np
-from small_situations import INF, RNG, act, look, situation
+from helpers.dva.dispatch_situations import INF, RNG, act, look, situation
 
 from dva_sim.core.dispatch import Announcement, Assignment, Auction
 

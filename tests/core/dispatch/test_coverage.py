@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small_situations import INF, RNG, cover, look, situation
+from helpers.dva.dispatch_situations import INF, RNG, cover, look, situation
 
 from dva_sim.core.dispatch import Assignment, Coverage, Relocation
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from small_situations import INF, act, look, pairs, situation
+from helpers.dva.dispatch_situations import INF, act, look, pairs, situation
 
 from dva_sim.core.dispatch import MinEta, NearestIdle, Preference, RandomChoice
 

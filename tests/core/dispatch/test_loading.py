@@ -3,7 +3,7 @@
 from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
-from small_situations import RNG, situation
+from helpers.dva.dispatch_situations import RNG, situation
 
 from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy
 from dva_sim.kernel import plugins

@@ -4,10 +4,10 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
+from helpers.dva.dispatch_situations import INF, look, pairs, situation
+from helpers.processes.search_settings import search
 from hypothesis import given
 from hypothesis import strategies as st
-from searching import search
-from small_situations import INF, look, pairs, situation
 
 from dva_sim.core.dispatch import Instance, MinEta, OraclePolicy, Policy, solve
 from dva_sim.kernel.errors import ConfigError

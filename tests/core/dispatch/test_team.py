@@ -1,6 +1,6 @@
 """The robot looks, the person stands by."""
 
-from small_situations import INF, act, look, pairs, situation
+from helpers.dva.dispatch_situations import INF, act, look, pairs, situation
 
 from dva_sim.core.dispatch import HazardTeam
 

@@ -1,7 +1,7 @@
 """The most urgent first, and taking somebody away for it."""
 
 import numpy as np
-from small_situations import INF, act, look, pairs, situation
+from helpers.dva.dispatch_situations import INF, act, look, pairs, situation
 
 from dva_sim.core.dispatch import Preemptive, PriorityEta
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from helpers.studies.small_study import STUDY, cheap, study_in
 from scipy import stats
-from small_study import STUDY, cheap, study_in
 
 from dva_sim.experiments.analysis.compare import Comparison
 from dva_sim.experiments.execution.runner import run_study

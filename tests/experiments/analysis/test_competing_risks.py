@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
@@ -42,10 +42,10 @@ def endings(events, how="lost link", factors=()):
         | {"outcome": how if row["outcome"] == "escalated" else "timeout"}
         for row in events
     ]
-    table_of_runs = synthetic_study.columns(runs)
+    table_of_runs = synthetic_results.columns(runs)
     part = RunGrid(table_of_runs, "drive", [Factor("command.timeout_s", LEVELS), *factors])
     view = StudyView(part, "drive_time_s", part.factors[0], None, LEVELS, {})
-    return Endings(view, synthetic_study.columns(events), table_of_runs, HORIZON_S), view
+    return Endings(view, synthetic_results.columns(events), table_of_runs, HORIZON_S), view
 
 
 def three_of_four_lost():
@@ -184,8 +184,8 @@ def test_a_run_without_a_drive_is_confirmed_if_its_events_were():
     rows = [confirmed(0, "short"), escalated(1, "short"), event(2, "short")]
     rows += [event(3, "short", is_true=False, outcome="refuted")]
     runs = [{key: row[key] for key in keys} for row in rows]
-    runs = synthetic_study.columns(runs) | {"outcome": np.array([None] * 4, dtype=object)}
-    found = with_endings(runs, synthetic_study.columns(rows))
+    runs = synthetic_results.columns(runs) | {"outcome": np.array([None] * 4, dtype=object)}
+    found = with_endings(runs, synthetic_results.columns(rows))
     assert found["confirmed"][:3].tolist() == [1.0, 0.0, 0.0]
     assert np.isnan(found["confirmed"][3])  # a false alarm is not to be confirmed
     assert found["outcome"].tolist() == ["confirmed", "escalated", "timeout", None]
@@ -194,8 +194,8 @@ def test_a_run_without_a_drive_is_confirmed_if_its_events_were():
 def test_of_several_events_of_a_run_it_is_the_share():
     rows = [confirmed(0, "short"), escalated(0, "short"), confirmed(0, "short"), event(0, "short")]
     keys = ("part", "cell", "person", "trial", "is_reference")
-    runs = synthetic_study.columns([{key: rows[0][key] for key in keys}])
-    assert with_endings(runs, synthetic_study.columns(rows))["confirmed"].tolist() == [0.5]
+    runs = synthetic_results.columns([{key: rows[0][key] for key in keys}])
+    assert with_endings(runs, synthetic_results.columns(rows))["confirmed"].tolist() == [0.5]
 
 
 def test_where_all_went_right_in_the_answers_panel_the_table_shows_the_others():

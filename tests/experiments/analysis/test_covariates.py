@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import synthetic_study
-from small_study import STUDY, study_in
+from helpers.studies import synthetic_results
+from helpers.studies.small_study import STUDY, study_in
 
 from dva_sim.experiments.analysis.study_view import covariates_of, finding_of, view_of
 from dva_sim.experiments.report.method import remarks
@@ -27,7 +27,7 @@ def rows(shift: float = 0.0, persons: int = 30) -> list[dict[str, Any]]:
     """Persons of whom a trait explains most of what REQ/REP costs them."""
     trait = np.random.default_rng(4).normal(shift, 1.0, persons)
     found = []
-    for row in synthetic_study.drive_rows(persons, 1, missed=0.0):
+    for row in synthetic_results.drive_rows(persons, 1, missed=0.0):
         known = trait[row["person"]]
         slow = 20 * known if row.get("pattern") == "req-rep" else 0.0
         found.append(row | {"caution_off": known, "drive_time_s": row["drive_time_s"] + slow})
@@ -35,7 +35,7 @@ def rows(shift: float = 0.0, persons: int = 30) -> list[dict[str, Any]]:
 
 
 def study(*covariates: str) -> dict[str, Any]:
-    whole: dict[str, Any] = synthetic_study.manifest(30, 1)["study"]
+    whole: dict[str, Any] = synthetic_results.manifest(30, 1)["study"]
     return whole | {"covariates": list(covariates)}
 
 
@@ -44,14 +44,14 @@ def half_width(found: Any) -> float:
 
 
 def test_the_answers_band_is_adjusted_and_shorter() -> None:
-    runs = synthetic_study.columns(rows())
+    runs = synthetic_results.columns(rows())
     plain, ours = (finding_of(view_of(study(*names), runs)) for names in ((), ("caution_off",)))
     assert half_width(ours) < 0.7 * half_width(plain)
     assert ours.persons == plain.persons == 30
 
 
 def test_a_covariate_whose_mean_cannot_be_zero_is_left_out_and_told(tmp_path: Path) -> None:
-    runs = synthetic_study.columns(rows(shift=3.0))
+    runs = synthetic_results.columns(rows(shift=3.0))
     view = view_of(study("caution_off"), runs)
     assert view.covariates == ()
     assert covariates_of(study("caution_off"), view.part) == ([], ["caution_off"])
@@ -60,9 +60,9 @@ def test_a_covariate_whose_mean_cannot_be_zero_is_left_out_and_told(tmp_path: Pa
 
 
 def reading(tmp_path: Path, table: list[dict[str, Any]]) -> Reading:
-    whole = synthetic_study.manifest(30, 1)
+    whole = synthetic_results.manifest(30, 1)
     whole["study"] = study("caution_off")
-    return Reading(Results.load(synthetic_study.write(tmp_path / "r", {"runs": table}, whole)))
+    return Reading(Results.load(synthetic_results.write(tmp_path / "r", {"runs": table}, whole)))
 
 
 def remark(found: Reading) -> str:
@@ -78,7 +78,7 @@ def test_the_report_says_what_it_is_adjusted_for_and_what_that_was_worth(tmp_pat
 
 def test_a_product_of_columns_is_one_covariate() -> None:
     assert multiplied("caution_off * way_off_m") == ["caution_off", "way_off_m"]
-    runs = synthetic_study.columns([row | {"one": 1.0} for row in rows()])
+    runs = synthetic_results.columns([row | {"one": 1.0} for row in rows()])
     alone, product = (
         finding_of(view_of(study(name), runs)) for name in ("caution_off", "caution_off*one")
     )
@@ -130,7 +130,7 @@ def test_a_study_stops_at_the_interval_that_it_shows() -> None:
     ]
     assert asked.stop is not None
     seen = stopping.half_widths(asked, asked.stop, found)
-    shown = finding_of(view_of(asked.asked(), synthetic_study.columns(found)))
+    shown = finding_of(view_of(asked.asked(), synthetic_results.columns(found)))
     assert seen == pytest.approx((shown.high - shown.low) / 2)
     plain = asked.model_copy(update={"covariates": ()})
     assert seen[0] < 0.5 * stopping.half_widths(plain, asked.stop, found)[0]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from small_study import cheap, study_in
+from helpers.studies.small_study import cheap, study_in
 
 from dva_sim.experiments.analysis.compare import Comparison, judge
 from dva_sim.experiments.analysis.fail_conditions import Bound, parse

@@ -1,5 +1,5 @@
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.analysis.hypothesis_tests import judged
 from dva_sim.experiments.report.hypothesis_tables import comparison_table, hypothesis_table
@@ -12,12 +12,12 @@ SAME = PLAIN | {"contrast": ["pub-sub", "latest-wins"], "within": {"link.delay_s
 @pytest.fixture(scope="module")
 def runs():
     """Request/reply costs 40 s more at 1 s of delay, and 2.5 s at 250 ms."""
-    rows = synthetic_study.drive_rows(10, 2, effect_s=40.0, missed=0.0)
-    return synthetic_study.columns(rows)
+    rows = synthetic_results.drive_rows(10, 2, effect_s=40.0, missed=0.0)
+    return synthetic_results.columns(rows)
 
 
 def study(**claims):
-    return synthetic_study.manifest(10, 2)["study"] | claims
+    return synthetic_results.manifest(10, 2)["study"] | claims
 
 
 def test_a_comparison_is_made_at_each_level_it_runs_over(runs):

@@ -1,5 +1,5 @@
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.analysis.predictions import judge_all, verdict_of
 from dva_sim.experiments.analysis.study_view import view_of
@@ -39,8 +39,8 @@ def test_a_range_is_judged_by_the_mean_and_fails_only_clear_of_the_interval(low,
 
 
 def judged(*predictions, effect_s=30.0):
-    runs = synthetic_study.columns(synthetic_study.drive_rows(8, 2, effect_s, missed=0.0))
-    study = synthetic_study.manifest(8, 2)["study"] | {"predictions": list(predictions)}
+    runs = synthetic_results.columns(synthetic_results.drive_rows(8, 2, effect_s, missed=0.0))
+    study = synthetic_results.manifest(8, 2)["study"] | {"predictions": list(predictions)}
     return judge_all(study, view_of(study, runs))
 
 
@@ -87,12 +87,12 @@ def test_persons_who_are_all_alike_leave_no_doubt():
         "direction": "below",
         "contrast": ["latest-wins", "latest-wins-too"],
     }
-    runs = synthetic_study.drive_rows(4, 1, missed=0.0)
+    runs = synthetic_results.drive_rows(4, 1, missed=0.0)
     runs += [r | {"pattern": "latest-wins-too"} for r in runs if r["pattern"] == "latest-wins"]
-    study = synthetic_study.manifest(4, 1)["study"] | {"predictions": [same]}
-    patterns = [*synthetic_study.PATTERNS, "latest-wins-too"]
+    study = synthetic_results.manifest(4, 1)["study"] | {"predictions": [same]}
+    patterns = [*synthetic_results.PATTERNS, "latest-wins-too"]
     study["factors"] = study["factors"] | {"pattern": patterns}
-    (found,) = judge_all(study, view_of(study, synthetic_study.columns(runs)))
+    (found,) = judge_all(study, view_of(study, synthetic_results.columns(runs)))
     assert (found.verdict, found.found) == (
         "did not hold",
         "0\N{NO-BREAK SPACE}s (0 to 0\N{NO-BREAK SPACE}s)",
@@ -100,14 +100,14 @@ def test_persons_who_are_all_alike_leave_no_doubt():
 
 
 def test_where_tuning_chose_the_value_there_was_nothing_is_judged():
-    rows = synthetic_study.drive_rows(4, 1, missed=0.0)
+    rows = synthetic_results.drive_rows(4, 1, missed=0.0)
     twice = [row | {"tuning": level} for row in rows for level in ("untuned", "tuned")]
     claim = {"text": "Helps.", "direction": "below", "factor": "tuning"}
-    study = synthetic_study.manifest(4, 1)["study"]
+    study = synthetic_results.manifest(4, 1)["study"]
     study["factors"] = study["factors"] | {"tuning": ["untuned", "tuned"]}
     study["predictions"] = [claim | {"contrast": ["tuned", "untuned"]}]
     study["answer"] = study["answer"] | {"within": {"profile": "default", "tuning": "tuned"}}
-    view = view_of(study, synthetic_study.columns(twice))
+    view = view_of(study, synthetic_results.columns(twice))
     (found,) = judge_all(study, view)
     assert (found.verdict, found.found) == (
         "not judged",

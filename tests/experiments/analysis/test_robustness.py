@@ -1,7 +1,7 @@
 from types import SimpleNamespace
 
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.analysis.robustness import robustness_of, sentences
 from dva_sim.experiments.analysis.study_view import finding_of, view_of
@@ -20,10 +20,11 @@ OWN = {"operator": {"strategy": "pursuit"}}
 
 
 def read(effects, effect_s=12.0, rows=None, scenario=OWN):
-    runs = synthetic_study.columns(synthetic_study.drive_rows(8, 2, effect_s, missed=0.0))
-    study = synthetic_study.manifest(8, 2)["study"] | synthetic_study.CLAIMS
+    runs = synthetic_results.columns(synthetic_results.drive_rows(8, 2, effect_s, missed=0.0))
+    study = synthetic_results.manifest(8, 2)["study"] | synthetic_results.CLAIMS
     view = view_of(study, runs)
-    table = synthetic_study.columns(synthetic_study.repeat_rows(effects) if rows is None else rows)
+    rows = synthetic_results.repeat_rows(effects) if rows is None else rows
+    table = synthetic_results.columns(rows)
     return view, robustness_of(study, table, view, finding_of(view), scenario)
 
 
@@ -49,7 +50,7 @@ def test_each_repeat_has_its_effect_and_an_interval_around_it():
 
 
 def test_a_repeat_without_a_pair_is_left_out():
-    rows = synthetic_study.repeat_rows(EFFECTS)
+    rows = synthetic_results.repeat_rows(EFFECTS)
     half = [r for r in rows if (r["parameters"], r["pattern"]) != (1, "req-rep")]
     _, found = read(EFFECTS, rows=half)
     assert len(found.stops[0].repeats) == 2
@@ -70,7 +71,7 @@ def drawn(view, found):
 def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow():
     rows = [
         row | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
-        for row in synthetic_study.repeat_rows(EFFECTS)
+        for row in synthetic_results.repeat_rows(EFFECTS)
     ]
     view, found = read(EFFECTS, rows=rows)
     assert {(r.strategy, r.is_beyond) for r in found.stops[0].repeats} == {
@@ -105,7 +106,7 @@ def test_the_figure_shows_the_repeats_and_is_the_same_when_drawn_again():
 
 
 def test_a_study_without_repeats_has_none():
-    runs = synthetic_study.columns(synthetic_study.drive_rows(4, 1))
-    study = synthetic_study.manifest(4, 1)["study"]
+    runs = synthetic_results.columns(synthetic_results.drive_rows(4, 1))
+    study = synthetic_results.manifest(4, 1)["study"]
     view = view_of(study, runs)
     assert robustness_of(study, {}, view, finding_of(view), OWN) is None

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 from scipy import stats
 
 from dva_sim.experiments.analysis.hypothesis_tests import judged
@@ -31,7 +31,7 @@ def runs(persons=8, mean_s=3.0):
         for person in range(persons)
         for cell, pattern in enumerate(PATTERNS)
     ]
-    return synthetic_study.columns(rows)
+    return synthetic_results.columns(rows)
 
 
 def fewest(wanted, distance_s, alpha, power):

@@ -1,7 +1,7 @@
 import math
 
 import pytest
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.cli import study_runs
 from dva_sim.experiments.analysis.tuning import tune

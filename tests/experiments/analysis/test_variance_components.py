@@ -1,4 +1,4 @@
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
@@ -6,8 +6,8 @@ from dva_sim.experiments.report.answer_table import spread_table
 
 
 def test_the_table_holds_both_sides_and_the_effect_at_every_stop():
-    runs = synthetic_study.columns(synthetic_study.drive_rows(6, 3))
-    names = (("pattern", synthetic_study.PATTERNS), ("link.delay_s", synthetic_study.DELAYS))
+    runs = synthetic_results.columns(synthetic_results.drive_rows(6, 3))
+    names = (("pattern", synthetic_results.PATTERNS), ("link.delay_s", synthetic_results.DELAYS))
     pattern, delay = (Factor(name, tuple(levels)) for name, levels in names)
     profile = Factor("profile", ("default", "dissertation"))
     part = RunGrid(runs, "drive", [pattern, delay, profile])

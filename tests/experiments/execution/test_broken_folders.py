@@ -9,9 +9,10 @@ import signal
 import sys
 from pathlib import Path
 
-import patience
 import pytest
-import small_study as kit
+from helpers.paths import PYTHON_PATH
+from helpers.processes import patience
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.dry_run import dry_run
@@ -20,8 +21,6 @@ from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.results.results import JOURNAL, Results
 from dva_sim.experiments.results.tables import write_tables
 from dva_sim.kernel.errors import ConfigError, DvaSimError
-
-TESTS = Path(kit.__file__).parent
 
 
 @pytest.fixture
@@ -120,7 +119,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> N
     """In a mount namespace, since nobody keeps root from writing otherwise."""
     words = ["unshare", "--map-root-user", "--mount"]
     program = (
-        "import subprocess, sys, small_study as kit\n"
+        "import subprocess, sys\nfrom helpers.studies import small_study as kit\n"
         "from dva_sim.kernel.errors import DvaSimError\n"
         "from pathlib import Path\n"
         "folder = Path(sys.argv[1])\n"
@@ -144,7 +143,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> N
         [*words, sys.executable, "-c", program, tmp_path],
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
+        env={**os.environ, "PYTHONPATH": PYTHON_PATH},
         check=True,
     )
     new, old, done = ran.stdout.splitlines()

@@ -4,7 +4,7 @@ import sqlite3
 from pathlib import Path
 
 import pytest
-from small_study import study_in
+from helpers.studies.small_study import study_in
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.checkpoint import Checkpoint, RunOutcome

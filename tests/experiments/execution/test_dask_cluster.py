@@ -11,10 +11,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import patience
 import pytest
-import small_study as kit
-from dask_cluster import DaskCluster
+from helpers.processes import patience
+from helpers.studies import small_study as kit
+from helpers.studies.dask_cluster import DaskCluster
 
 from dva_sim.experiments.execution import dask_cluster, scheduling
 from dva_sim.experiments.execution.executors import WorkersLost

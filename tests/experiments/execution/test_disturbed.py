@@ -9,16 +9,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import disturbed_study as kit
-import patience
 import pytest
+from helpers.paths import PYTHON_PATH
+from helpers.processes import patience
+from helpers.studies import interrupted_study as kit
 
-TESTS = Path(kit.__file__).parent
+STUDY = (sys.executable, "-m", "helpers.studies.interrupted_study")
 NAMESPACE = ["unshare", "--map-root-user", "--mount"]
 
 
 def told(*words: str | Path) -> dict[str, Any]:
-    path = os.pathsep.join(map(str, (TESTS.parent, TESTS)))
+    path = PYTHON_PATH
     environment = {**os.environ, "PYTHONPATH": path}
     ran = patience.run(
         list(map(str, words)), capture_output=True, text=True, env=environment, check=False
@@ -31,7 +32,7 @@ def told(*words: str | Path) -> dict[str, Any]:
 @pytest.mark.soak
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path: Path) -> None:
-    found = told(sys.executable, "-m", "disturbed_study", "kills", tmp_path)
+    found = told(*STUDY, "kills", tmp_path)
     assert min(found["call"], found["writing"], found["clock"]) >= kit.KILLS_EACH
     assert found["equal"] == found["ended"] >= 100 // kit.KILLS_A_STUDY
     assert (found["doubled"], found["left behind"]) == (0, 0)
@@ -51,7 +52,7 @@ def mounts_are_allowed(folder: Path) -> bool:
 def test_a_full_disk_is_told_in_one_line_and_nothing_is_lost(tmp_path: Path) -> None:
     if not mounts_are_allowed(tmp_path):
         pytest.skip("this system lets nobody but root mount a small disk")
-    found = told(*NAMESPACE, sys.executable, "-m", "disturbed_study", "disk", tmp_path)
+    found = told(*NAMESPACE, *STUDY, "disk", tmp_path)
     assert len(found["told"]) >= 3
     assert all("\n" not in line for line in found["told"])
     assert any("journal.sqlite: the disk is full" in line for line in found["told"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.cli.results_json import shown
 from dva_sim.experiments.execution.checkpoint import load_so_far

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import small_study as kit
-from patience import PATIENCE_S
+from helpers.paths import PYTHON_PATH
+from helpers.processes.patience import PATIENCE_S
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.dry_run import dry_run
@@ -20,8 +21,6 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results import manifest
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
-
-TESTS = Path(kit.__file__).parent
 
 
 @pytest.fixture
@@ -106,10 +105,10 @@ def started() -> Iterator[Callable[[Path, Path], subprocess.Popen[str]]]:
 
     def start(study: Path, out: Path) -> subprocess.Popen[str]:
         runner = subprocess.Popen(
-            [sys.executable, "-m", "small_study", str(study), str(out), "2"],
+            [sys.executable, "-m", "helpers.studies.small_study", str(study), str(out), "2"],
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (TESTS.parent, TESTS)))},
+            env={**os.environ, "PYTHONPATH": PYTHON_PATH},
             cwd=study.parent,
         )
         runners.append(runner)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.executors import Workers

@@ -1,7 +1,7 @@
 """What an answer depends on, told beside it."""
 
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
@@ -10,11 +10,11 @@ STRATEGY = {"operator": {"strategy": "adaptive"}, "phone": {"profile": "default"
 
 
 def reading(tmp_path, rows=None, study=None, **tables):
-    facts = synthetic_study.manifest(6, 2)
+    facts = synthetic_results.manifest(6, 2)
     facts["study"] |= study or {}
-    facts["scenarios"] = dict.fromkeys(("drive", "story"), synthetic_study.SCENARIO | STRATEGY)
-    runs = synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.0) if rows is None else rows
-    folder = synthetic_study.write(tmp_path / "r", {"runs": runs, **tables}, facts)
+    facts["scenarios"] = dict.fromkeys(("drive", "story"), synthetic_results.SCENARIO | STRATEGY)
+    runs = synthetic_results.drive_rows(6, 2, effect_s=30.0, missed=0.0) if rows is None else rows
+    folder = synthetic_results.write(tmp_path / "r", {"runs": runs, **tables}, facts)
     return Reading(Results.load(folder))
 
 
@@ -31,7 +31,7 @@ def test_persons_are_simulated_and_how_they_steer_is_said(tmp_path):
 
 
 def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
-    rows = synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.0)
+    rows = synthetic_results.drive_rows(6, 2, effect_s=30.0, missed=0.0)
     for row in rows:
         row["move_and_wait_share"] = 0.86 if row["pattern"] == "req-rep" else 0.54
     persons = told(reading(tmp_path, rows).answer.depends)["Persons"]
@@ -43,8 +43,8 @@ def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
 
 def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
     effects = {("pursuit", 0): 20, ("pursuit", 1): 5, ("adaptive", 0): 1, ("adaptive", 1): -4}
-    claims = {"robustness": synthetic_study.CLAIMS["robustness"]}
-    found = reading(tmp_path, study=claims, robustness=synthetic_study.repeat_rows(effects))
+    claims = {"robustness": synthetic_results.CLAIMS["robustness"]}
+    found = reading(tmp_path, study=claims, robustness=synthetic_results.repeat_rows(effects))
     persons = told(found.answer.depends)["Persons"]
     assert "the sign is the same in 2 of 3, and the difference at 1 s runs from" in persons
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 from matplotlib.figure import Figure
 
 from dva_sim.experiments.analysis.answer import Finding
@@ -39,7 +39,7 @@ NOTHING_ELSE = SimpleNamespace(scenario_of=lambda part: {"command": "unknown"})
 
 @pytest.fixture(scope="module")
 def view():
-    runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
+    runs = synthetic_results.columns(synthetic_results.drive_rows(2, 1))
     part = RunGrid(runs, "drive", [PATTERN, DELAY, PROFILE])
     return StudyView(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
 
@@ -91,7 +91,7 @@ def test_every_event_has_a_fate_even_one_nobody_foresaw():
 
 
 def test_shares_of_outcomes_add_up_to_one(view):
-    rows = synthetic_study.columns(synthetic_study.story_rows(4))
+    rows = synthetic_results.columns(synthetic_results.story_rows(4))
     events = Events(rows, "story", view)
     mask = events.under({"profile": "default"}, "req-rep", 1.0)
     assert mask.sum() == 8
@@ -99,8 +99,8 @@ def test_shares_of_outcomes_add_up_to_one(view):
 
 
 def test_a_way_is_found_by_its_pattern_delay_and_profile(view):
-    rows = synthetic_study.track_rows()
-    ways = DrivenWays(synthetic_study.columns(rows), view)
+    rows = synthetic_results.track_rows()
+    ways = DrivenWays(synthetic_results.columns(rows), view)
     (way,) = ways.under("pub-sub", 0.25)
     wanted = [
         (r["x_m"], r["y_m"])
@@ -135,7 +135,7 @@ def test_a_logarithmic_axis_has_plain_numbers_at_round_places_only(ends, numbers
 
 
 def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
-    runs = synthetic_study.columns(synthetic_study.drive_rows(2, 1))
+    runs = synthetic_results.columns(synthetic_results.drive_rows(2, 1))
     part = RunGrid(runs, "drive", [PATTERN, Factor("link.delay_s", (0.0, 0.25)), PROFILE])
     view = StudyView(part, "drive_time_s", PATTERN, None, None, {"link.delay_s": 0.25})
     assert [panel_name(panel).replace("\N{NO-BREAK SPACE}", " ") for panel in view.shown] == [
@@ -168,7 +168,7 @@ def test_narrow_bands_are_shown_whole():
 
 
 def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
-    rows = synthetic_study.columns(synthetic_study.story_rows(4))
+    rows = synthetic_results.columns(synthetic_results.story_rows(4))
     rows["responder_kind"] = np.full(len(rows["part"]), "robot")
     rows["outcome"] = np.full(len(rows["part"]), "confirmed")
     events = Events(rows, "story", view)
@@ -210,7 +210,7 @@ def two_factor_view(effect):
         for r in ratio.levels
         for w in mobilisation.levels
     ]
-    part = RunGrid(synthetic_study.columns(rows), "d", [team, ratio, mobilisation])
+    part = RunGrid(synthetic_results.columns(rows), "d", [team, ratio, mobilisation])
     return StudyView(part, "response_s", team, ratio, ("robot", "guard"), {})
 
 

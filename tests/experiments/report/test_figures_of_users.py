@@ -2,9 +2,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-import small_study
-import synthetic_study
-from page_words import words
+from helpers.studies import small_study, synthetic_results
+from helpers.studies.report_text import words
 
 import dva_sim
 from dva_sim.cli import call
@@ -42,11 +41,11 @@ class Untitled(Mine):
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    rows = [r for r in synthetic_study.drive_rows(2, 1) if r["profile"] == "default"]
-    facts = synthetic_study.manifest(2, 1)
+    rows = [r for r in synthetic_results.drive_rows(2, 1) if r["profile"] == "default"]
+    facts = synthetic_results.manifest(2, 1)
     facts["study"]["factors"] |= {"profile": ["default"]}
     tables = {"runs": [r for r in rows if r["link.delay_s"] in (0.0, 1.0)]}
-    folder = synthetic_study.write(tmp_path_factory.mktemp("of") / "results", tables, facts)
+    folder = synthetic_results.write(tmp_path_factory.mktemp("of") / "results", tables, facts)
     (folder.parent / "mine.py").write_text(MINE, encoding="utf-8")
     return folder
 

@@ -1,7 +1,7 @@
 """How runs of designs that are no grid are laid out."""
 
 import numpy as np
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.analysis.run_grid import RunGrid
 from dva_sim.experiments.analysis.study_view import finding_of, layout_of, points_of, view_of
@@ -25,7 +25,7 @@ def columns(cells, persons=3, slower=None):
         for person in range(persons)
         for trial in range(2)
     ]
-    return synthetic_study.columns(rows)
+    return synthetic_results.columns(rows)
 
 
 def test_factors_taken_together_are_one_and_the_table_shows_them_all():

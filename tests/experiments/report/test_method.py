@@ -1,5 +1,5 @@
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.summary import Reading
@@ -10,10 +10,10 @@ PERSONS = 4
 
 def reading(tmp_path, study=None, **facts):
     """Of a study of four persons, though its file may say that there are six."""
-    whole = synthetic_study.manifest(6, 2, **facts)
+    whole = synthetic_results.manifest(6, 2, **facts)
     whole["study"] |= study or {}
-    rows = [r for r in synthetic_study.drive_rows(PERSONS, 2) if r["profile"] != "dissertation"]
-    return Reading(Results.load(synthetic_study.write(tmp_path / "r", {"runs": rows}, whole)))
+    rows = [r for r in synthetic_results.drive_rows(PERSONS, 2) if r["profile"] != "dissertation"]
+    return Reading(Results.load(synthetic_results.write(tmp_path / "r", {"runs": rows}, whole)))
 
 
 def test_the_persons_are_those_that_were_run(tmp_path):
@@ -63,7 +63,7 @@ def test_the_program_is_told_and_what_is_not_known_of_it(tmp_path, versions, wor
 
 def test_tests_are_told_where_there_are_any(tmp_path):
     claims = {"hypotheses": {"h": {"direction": "above"}}}
-    claims["comparisons"] = {"c": synthetic_study.manifest(6, 2)["study"]["answer"]}
+    claims["comparisons"] = {"c": synthetic_results.manifest(6, 2)["study"]["answer"]}
     told = " ".join(remarks(reading(tmp_path, claims)))
     assert "Hypotheses are judged by a one-sided test against their margin" in told
     assert "Comparisons are tested two-sided by permutation" in told

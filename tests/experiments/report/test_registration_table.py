@@ -1,5 +1,5 @@
 import pytest
-import synthetic_study
+from helpers.studies import synthetic_results
 
 from dva_sim.experiments.report.hypothesis_tables import registration_table
 from dva_sim.experiments.study.hashing import fingerprint_of_judges
@@ -19,8 +19,8 @@ PLAN = {
 @pytest.fixture(scope="module")
 def runs():
     """Request/reply costs 40 s more at 1 s of delay."""
-    rows = synthetic_study.drive_rows(4, 2, effect_s=40.0, missed=0.0)
-    return synthetic_study.columns([r for r in rows if r["profile"] == "default"])
+    rows = synthetic_results.drive_rows(4, 2, effect_s=40.0, missed=0.0)
+    return synthetic_results.columns([r for r in rows if r["profile"] == "default"])
 
 
 def rows_of(runs, plan=PLAN, study=PLAN, persons=4, **found):

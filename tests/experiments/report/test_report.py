@@ -1,8 +1,8 @@
 import re
 
 import pytest
-import synthetic_study
-from page_words import words
+from helpers.studies import synthetic_results
+from helpers.studies.report_text import words
 
 from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.report.answer_table import size_of
@@ -37,20 +37,20 @@ def of_one_profile(rows):
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     tables = {
-        "runs": of_one_profile(synthetic_study.drive_rows(6, 2, effect_s=30.0, missed=0.5)),
-        "events": of_one_profile(synthetic_study.story_rows(6)),
-        "tracks": of_one_profile(synthetic_study.track_rows()),
-        "robustness": synthetic_study.repeat_rows(
+        "runs": of_one_profile(synthetic_results.drive_rows(6, 2, effect_s=30.0, missed=0.5)),
+        "events": of_one_profile(synthetic_results.story_rows(6)),
+        "tracks": of_one_profile(synthetic_results.track_rows()),
+        "robustness": synthetic_results.repeat_rows(
             {("pursuit", 0): 20, ("pursuit", 1): 5, ("adaptive", 0): 1, ("adaptive", 1): -4}
         ),
     }
-    facts = synthetic_study.manifest(6, 2)
+    facts = synthetic_results.manifest(6, 2)
     facts["study"]["factors"] |= {"profile": ["default"]}
-    facts["study"] |= synthetic_study.CLAIMS
-    facts["tuned"] = synthetic_study.TUNED
+    facts["study"] |= synthetic_results.CLAIMS
+    facts["tuned"] = synthetic_results.TUNED
     facts["basis"] = {"persons": "these", "phones": "these"}
     return write_report(
-        synthetic_study.write(tmp_path_factory.mktemp("study") / "results", tables, facts)
+        synthetic_results.write(tmp_path_factory.mktemp("study") / "results", tables, facts)
     )
 
 
@@ -154,8 +154,8 @@ def test_the_question_and_the_answer_come_before_the_evidence_and_that_before_th
 
 
 def test_figures_of_an_older_report_do_not_stay(tmp_path):
-    facts = synthetic_study.manifest(2, 1, failures=[{"error": "no site"}])
-    folder = synthetic_study.write(tmp_path / "r", {}, facts)
+    facts = synthetic_results.manifest(2, 1, failures=[{"error": "no site"}])
+    folder = synthetic_results.write(tmp_path / "r", {}, facts)
     (folder / "figures").mkdir()
     for name in ("old.svg", "old.csv", "mine.txt"):
         (folder / "figures" / name).touch()
@@ -164,8 +164,8 @@ def test_figures_of_an_older_report_do_not_stay(tmp_path):
 
 
 def test_a_pdf_is_made_when_asked_for_and_kept_up_to_date(tmp_path):
-    facts = synthetic_study.manifest(2, 1, failures=[{"error": "no site"}])
-    folder = synthetic_study.write(tmp_path / "r", {}, facts)
+    facts = synthetic_results.manifest(2, 1, failures=[{"error": "no site"}])
+    folder = synthetic_results.write(tmp_path / "r", {}, facts)
     write_report(folder)
     assert not (folder / "report.pdf").exists()
     write_report(folder, pdf=True)
@@ -178,17 +178,17 @@ def test_a_pdf_is_made_when_asked_for_and_kept_up_to_date(tmp_path):
 def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_beside_the_result(
     tmp_path,
 ):
-    facts = synthetic_study.manifest(8, 1)
+    facts = synthetic_results.manifest(8, 1)
     facts["study"] |= {
-        "factors": {"pattern": synthetic_study.PATTERNS, "link.delay_s": [1.0]},
+        "factors": {"pattern": synthetic_results.PATTERNS, "link.delay_s": [1.0]},
         "hypotheses": {"waits": {"text": "It waits.", "direction": "above", "margin": 2.0}},
     }
     facts["study"]["answer"] |= {"within": {}}
     registration = {"made_with": "0.7.0 abc", "plan": dict(facts["study"]), "hash": "12345678" * 8}
     facts["status"] = {"kind": "confirmatory", "why": [], "registration": registration}
-    rows = synthetic_study.drive_rows(8, 1, effect_s=30.0, missed=0.0)
+    rows = synthetic_results.drive_rows(8, 1, effect_s=30.0, missed=0.0)
     runs = [r for r in of_one_profile(rows) if r["link.delay_s"] == 1.0 or r["is_reference"]]
-    text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
+    text = words(write_report(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts)))
     assert "Confirmatory: run as registered beforehand" in text
     assert "persons x trials 8 x 1 8 x 1 hypothesis waits above 2.0 s ✓ held: " in text
     assert "hash 1234567812345678 earlier" in text
@@ -209,15 +209,15 @@ def test_a_study_that_went_as_declared_is_not_called_exploratory(report):
 
 
 def test_a_poor_study_is_reported_for_what_it_is(tmp_path):
-    runs = [r for r in synthetic_study.drive_rows(1, 1) if r["link.delay_s"] != 0.5]
+    runs = [r for r in synthetic_results.drive_rows(1, 1) if r["link.delay_s"] != 0.5]
     runs[1]["violations"] = 2
-    facts = synthetic_study.manifest(
+    facts = synthetic_results.manifest(
         1,
         1,
         set=["replications=1", "robot.count=1"],
         failures=[{"part": "drive", "error": "robot-1 left the world"}],
     )
-    text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
+    text = words(write_report(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts)))
     assert "Exploratory" in text
     assert "Why: changed on the command line: replications=1, robot.count=1." in text
     assert "Too few persons to answer" in text
@@ -242,7 +242,7 @@ def test_a_study_of_other_factors_and_without_an_answer_is_shown_all_the_same(tm
             "factors": {"dispatch.policy": ["nearest", "min_eta"], "guard.count": [1, 2, 4]},
         }
     }
-    report = write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts))
+    report = write_report(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts))
     text = words(report)
     assert "not declared or not run" in text
     assert "Response time under each dispatch policy" in text
@@ -251,8 +251,8 @@ def test_a_study_of_other_factors_and_without_an_answer_is_shown_all_the_same(tm
 
 
 def test_a_study_of_which_no_run_was_completed_says_so(tmp_path):
-    facts = synthetic_study.manifest(2, 1, failures=[{"error": "no site"}])
-    text = words(write_report(synthetic_study.write(tmp_path / "r", {}, facts)))
+    facts = synthetic_results.manifest(2, 1, failures=[{"error": "no site"}])
+    text = words(write_report(synthetic_results.write(tmp_path / "r", {}, facts)))
     assert "No run was completed" in text
 
 
@@ -262,15 +262,15 @@ def test_a_folder_without_results_is_refused_in_one_line(tmp_path):
 
 
 def test_what_a_treatment_changes_is_said_and_counts_as_varied(tmp_path):
-    runs = [r for r in synthetic_study.drive_rows(2, 1) if r["link.delay_s"] in (0.0, 1.0)]
+    runs = [r for r in synthetic_results.drive_rows(2, 1) if r["link.delay_s"] in (0.0, 1.0)]
     for run in runs:
         run["way"] = "far" if run.pop("link.delay_s") else "near"
-    facts = synthetic_study.manifest(2, 1)
+    facts = synthetic_results.manifest(2, 1)
     treatments = {"way": {"near": {}, "far": {"link.delay_s": 1.0}}}
-    factors = {"pattern": synthetic_study.PATTERNS, "way": ["near", "far"]}
-    factors |= {"profile": synthetic_study.PROFILES}
+    factors = {"pattern": synthetic_results.PATTERNS, "way": ["near", "far"]}
+    factors |= {"profile": synthetic_results.PROFILES}
     facts["study"] |= {"treatments": treatments, "factors": factors, "answer": None}
-    text = words(write_report(synthetic_study.write(tmp_path / "r", {"runs": runs}, facts)))
+    text = words(write_report(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts)))
     assert "near: nothing far: one-way delay 1 s" in text
     assert "one-way delay varied varied" in text
     assert "The time-out is above four round trips and the processing time" in text
@@ -349,14 +349,14 @@ def test_what_does_not_vary_is_said_below_a_table_and_not_in_each_row(report):
     ],
 )
 def test_the_version_that_was_run_is_told_beside_the_usual_size(tmp_path, persons, factors, told):
-    facts = synthetic_study.manifest(
-        persons, 2, usual=dict(synthetic_study.manifest(6, 2)["study"])
+    facts = synthetic_results.manifest(
+        persons, 2, usual=dict(synthetic_results.manifest(6, 2)["study"])
     )
     facts["usual"]["name"] = "synthetic"
     facts["study"]["factors"] |= factors
     kept = facts["study"]["factors"]["link.delay_s"]
-    rows = [r for r in synthetic_study.drive_rows(persons, 2) if r["link.delay_s"] in kept]
-    reading = Reading(Results.load(synthetic_study.write(tmp_path / "r", {"runs": rows}, facts)))
+    rows = [r for r in synthetic_results.drive_rows(persons, 2) if r["link.delay_s"] in kept]
+    reading = Reading(Results.load(synthetic_results.write(tmp_path / "r", {"runs": rows}, facts)))
     said = size_of(reading)
     assert said.startswith(told)
     if persons != 6:

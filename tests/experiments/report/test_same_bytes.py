@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import synthetic_study
-from patience import PATIENCE_S
-from small_study import SHIFT
+from helpers.processes.patience import PATIENCE_S
+from helpers.studies import synthetic_results
+from helpers.studies.small_study import SHIFT
 
 import dva_sim
 from dva_sim.kernel.measure import names_of
@@ -32,9 +32,9 @@ for folder in sys.argv[1:]:
 def grid(folder):
     """Patterns, delays and three profiles: with a second factor to map, and danger to trade."""
     rows = {
-        "runs": synthetic_study.drive_rows(3, 1, missed=0.5),
-        "events": synthetic_study.story_rows(3),
-        "tracks": synthetic_study.track_rows(),
+        "runs": synthetic_results.drive_rows(3, 1, missed=0.5),
+        "events": synthetic_results.story_rows(3),
+        "tracks": synthetic_results.track_rows(),
     }
     for name, every in rows.items():
         few = [row for row in every if row["pattern"] != "pub-sub"]
@@ -45,13 +45,13 @@ def grid(folder):
     rows["events"] += [row | closed for row in rows["events"]]
     rng = np.random.default_rng(1)
     rows["runs"] = [row | {"person_exposure_s": rng.gamma(2.0, 5.0)} for row in rows["runs"]]
-    rows["robustness"] = synthetic_study.repeat_rows({("pursuit", 0): 20, ("adaptive", 0): 1})
-    facts = synthetic_study.manifest(3, 1)
+    rows["robustness"] = synthetic_results.repeat_rows({("pursuit", 0): 20, ("adaptive", 0): 1})
+    facts = synthetic_results.manifest(3, 1)
     facts["study"]["factors"] |= {"pattern": ["req-rep", "latest-wins"]}
     facts["study"]["factors"] |= {"link.delay_s": [0.0, 1.0]}
     facts["study"]["factors"] |= {"profile": ["default", "dissertation", "third"]}
-    facts["study"] |= synthetic_study.CLAIMS
-    return synthetic_study.write(folder, rows, facts)
+    facts["study"] |= synthetic_results.CLAIMS
+    return synthetic_results.write(folder, rows, facts)
 
 
 def points(folder):
@@ -69,13 +69,13 @@ def points(folder):
         for n, pattern in enumerate(patterns)
         for person in range(3)
     ]
-    facts = synthetic_study.manifest(3, 1)
+    facts = synthetic_results.manifest(3, 1)
     ranges = {"link.delay_s": {"low": 0, "high": 1}}
     ranges |= {"robot.processing_s": {"low": 0.01, "high": 1, "scale": "log"}}
     facts["study"]["factors"] = {"point": list(range(len(where))), "pattern": list(patterns)}
     facts["study"]["design"] = {"saltelli": 8, "ranges": ranges}
     facts["study"]["answer"] |= {"over": None, "within": {}}
-    return synthetic_study.write(folder, {"runs": rows}, facts)
+    return synthetic_results.write(folder, {"runs": rows}, facts)
 
 
 def shifts(folder):
@@ -94,7 +94,7 @@ def shifts(folder):
     study["answer"] |= {"contrast": ["random", "min_eta"], "over": "intensity"}
     scenario = build(SHIFT).model_dump(mode="json")
     facts = {"study": study, "scenarios": {"shift": scenario}, "set": []}
-    return synthetic_study.write(folder, tables, facts)
+    return synthetic_results.write(folder, tables, facts)
 
 
 def contest(folder):
@@ -107,12 +107,12 @@ def contest(folder):
         | {"movement_time_s": 80.0 + 40 * (transport == "tcp") + person}
         for transport, crowd, person in places
     ]
-    facts = synthetic_study.manifest(4, 1)
+    facts = synthetic_results.manifest(4, 1)
     facts["study"]["factors"] = {"transport": ["udp", "tcp"], "crowd": ["0", "8"]}
     facts["study"]["answer"] = {"part": "drive", "measure": "movement_time_s", "over": "crowd"}
     facts["study"]["answer"] |= {"factor": "transport", "contrast": ["tcp", "udp"]}
     facts["scenarios"] = {"drive": {"model": "transports", "bottleneck": {"rate_bps": 1e6}}}
-    return synthetic_study.write(folder, {"runs": rows}, facts)
+    return synthetic_results.write(folder, {"runs": rows}, facts)
 
 
 KINDS = {

@@ -3,9 +3,9 @@ import re
 
 import numpy as np
 import pytest
-import synthetic_study
-from page_words import words
-from small_study import SHIFT
+from helpers.studies import synthetic_results
+from helpers.studies.report_text import words
+from helpers.studies.small_study import SHIFT
 
 from dva_sim.experiments.analysis.shift_effects import pooled
 from dva_sim.experiments.report.report import write_report
@@ -43,7 +43,7 @@ def report(tmp_path_factory):
         for name, rows in tables.items():
             rows += [design | changes | {"is_reference": False} | row for row in made[name]]
     folder = tmp_path_factory.mktemp("study") / "results"
-    return write_report(synthetic_study.write(folder, tables, FACTS))
+    return write_report(synthetic_results.write(folder, tables, FACTS))
 
 
 def test_the_answer_names_both_sides_of_the_trade(report):

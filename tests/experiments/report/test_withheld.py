@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import call
+from helpers.processes.command_line import call
 
 import dva_sim
 from dva_sim.experiments.report.summary import Reading

@@ -1,7 +1,7 @@
 """Every column of every table is explained, and its name ends in its unit."""
 
 import pytest
-from small_study import study_in
+from helpers.studies.small_study import study_in
 
 from dva_sim.experiments.results.results import describe
 from dva_sim.experiments.results.tables import design_row

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from small_study import cheap, study_in
+from helpers.studies.small_study import cheap, study_in
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.export import export

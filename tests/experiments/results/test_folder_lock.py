@@ -8,9 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import patience
 import pytest
-import small_study as kit
+from helpers.processes import patience
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results import folder_lock

@@ -4,11 +4,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from command_line import call
+from helpers.paths import TESTS
+from helpers.processes.command_line import call
 
 import dva_sim
 
-DATA = Path(__file__).parents[2] / "data" / "results-0.7.0"
+DATA = TESTS / "data" / "results-0.7.0"
 CONFIRMED_S = {"req-rep": [39.477242, 110.563333], "latest-wins": [35.876995, 88.163333]}
 
 

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
-import synthetic_study as synthetic
-from small_study import cheap, study_in
+from helpers.studies import synthetic_results as synthetic
+from helpers.studies.small_study import cheap, study_in
 
 import dva_sim
 from dva_sim.experiments.execution.runner import run_study

@@ -1,7 +1,7 @@
 import hashlib
 from collections import defaultdict
 
-from small_study import REPEATED, RUNS, STUDY, study_in
+from helpers.studies.small_study import REPEATED, RUNS, STUDY, study_in
 
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.hashing import inputs

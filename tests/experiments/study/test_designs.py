@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_study import STUDY, cheap, study_in, write_study
+from helpers.studies.small_study import STUDY, cheap, study_in, write_study
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small_study import STUDY, write_study
+from helpers.studies.small_study import STUDY, write_study
 
 from dva_sim.experiments.execution.dry_run import rehearse_all
 from dva_sim.experiments.report.episode import EpisodeRequest

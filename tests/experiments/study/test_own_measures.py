@@ -4,7 +4,7 @@ import json
 import shutil
 
 import pytest
-from small_study import STUDY, study_in
+from helpers.studies.small_study import STUDY, study_in
 
 from dva_sim.cli import names
 from dva_sim.experiments.execution.runner import run_study

@@ -1,7 +1,7 @@
 """Commit and state of the program, by git checkouts made for the purpose."""
 
-import patience
 import pytest
+from helpers.processes import patience
 
 from dva_sim.experiments.study.hashing import state_of
 

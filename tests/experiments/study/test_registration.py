@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from small_study import REPEATED, STUDY, study_in, write_study
+from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
 
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study import cell_grid, registration

@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results

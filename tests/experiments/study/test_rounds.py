@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results

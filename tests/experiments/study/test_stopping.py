@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from small_study import REPEATED, STUDY, study_in, write_study
+from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
 
 from dva_sim.experiments.study import cell_grid, stopping
 from dva_sim.experiments.study.cell_grid import REFERENCE

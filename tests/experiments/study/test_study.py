@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from small_study import STUDY, study_in, write_study
+from helpers.studies.small_study import STUDY, study_in, write_study
 
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from small_study import REPEATED, STUDY, study_in, write_study
+from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
 
 from dva_sim.cli import study_runs
 from dva_sim.experiments.execution import dry_run

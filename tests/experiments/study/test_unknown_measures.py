@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
-from small_study import SHIFT, STUDY, cheap, study_in
+from helpers.paths import ROOT
+from helpers.studies.small_study import SHIFT, STUDY, cheap, study_in
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.report.report import write_report
@@ -16,7 +15,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, model_of
 
-TASKS = Path(__file__).parents[3] / "experiments" / "scenarios" / "tasks"
+TASKS = ROOT / "experiments" / "scenarios" / "tasks"
 DESIGN_ONLY = {"outcome", "cause", "network_depth"}
 
 

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, read_delay_log, read_trace
 from dva_sim.network.link.link import make_link
 
-TRACES = Path(__file__).parents[3] / "experiments" / "traces"
+TRACES = ROOT / "experiments" / "traces"
 PING = """\
 PING 10.0.0.7 (10.0.0.7) 56(84) bytes of data.
 [1700000001.030000] 64 bytes from 10.0.0.7: icmp_seq=1 ttl=57 time=30.0 ms

@@ -1,7 +1,7 @@
 """When acknowledgements leave. One way takes 50 ms."""
 
 import pytest
-from scripted_tcp import Pair, options
+from helpers.network.scripted_tcp import Pair, options
 
 
 def acknowledged_at(pair, start):

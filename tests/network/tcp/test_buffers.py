@@ -1,7 +1,7 @@
 """Room at both ends. The numbers of the send buffer were measured on Linux 6.18."""
 
 import pytest
-from scripted_tcp import Pair, keep_writing, options
+from helpers.network.scripted_tcp import Pair, keep_writing, options
 
 
 def fill(send_buffer, size=409, writes=400):

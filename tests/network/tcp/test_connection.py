@@ -1,7 +1,7 @@
 """Opening, finishing, giving up."""
 
 import pytest
-from scripted_tcp import EXACT, Pair, ScriptedLink, options
+from helpers.network.scripted_tcp import EXACT, Pair, ScriptedLink, options
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scripted_tcp import EXACT, options
+from helpers.network.scripted_tcp import EXACT, options
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp import TcpConnection, TcpOptions

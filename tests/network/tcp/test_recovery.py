@@ -1,7 +1,7 @@
 """What happens to lost segments. Round trip 100 ms, so the time-out is 300 ms."""
 
 import pytest
-from scripted_tcp import Pair, keep_writing, options
+from helpers.network.scripted_tcp import Pair, keep_writing, options
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp.sender import Sender

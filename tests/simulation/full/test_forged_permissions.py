@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Iterator
 
 import pytest
-from granted import enter
+from helpers.dva.permissions import enter
 
 from dva_sim.agents.robot.controller import PATIENCE, RobotController
 from dva_sim.agents.robot.inquiry import BURST, RATE

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.agents.device import HEARTBEAT, STATUS
 from dva_sim.agents.robot.controller import Mode
@@ -79,7 +80,7 @@ def test_a_drive_that_fails_is_told_once_and_counted_and_the_run_goes_on(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "broken.py").write_text(DRIVE)
-    known = Path(__file__).parents[3] / "agents/robots/servrobot.yaml"
+    known = ROOT / "agents/robots/servrobot.yaml"
     profile = known.read_text().replace("differential", "broken.py:Broken")
     (tmp_path / "broken.yaml").write_text(profile)
     run = Run(scenario({"robot.profile": str(tmp_path / "broken.yaml")}), seed=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from granted import enter
+from helpers.dva.permissions import enter
 
 from dva_sim.agents.robot.controller import STAND, Decision, RobotController, TimedSetPoint
 from dva_sim.agents.robot.faults import RobotFaults

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from replayed_operator import replay, taped
+from helpers.network.replaying_operator import replay, taped
 
 from dva_sim.simulation import scenario as scenarios
 

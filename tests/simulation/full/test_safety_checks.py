@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from granted import enter
+from helpers.dva.permissions import enter
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.drive import Teleoperation

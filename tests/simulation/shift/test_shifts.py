@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from elsewhere import told_here_and_elsewhere
+from helpers.processes.second_process import told_here_and_elsewhere
 
 from dva_sim.core.dispatch import known_policies
 from dva_sim.kernel.yaml_files import load_yaml

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-import synthetic_study
-from page_words import words
+from helpers.studies import synthetic_results
+from helpers.studies.report_text import words
 
 from dva_sim.experiments.report.report import write_report
 from dva_sim.kernel.measure import names_of
@@ -50,12 +50,12 @@ def row(cell: int, transport: str, crowd: str, person: int) -> dict[str, object]
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cells = [(t, c) for t in TRANSPORTS for c in CROWDS]
     rows = [row(n, t, c, p) for n, (t, c) in enumerate(cells) for p in range(PERSONS)]
-    facts = synthetic_study.manifest(PERSONS, 1) | {
+    facts = synthetic_results.manifest(PERSONS, 1) | {
         "study": STUDY,
         "scenarios": {"drive": {"model": "transports", "bottleneck": {"rate_bps": 1e6}}},
     }
     folder = tmp_path_factory.mktemp("study") / "results"
-    return write_report(synthetic_study.write(folder, {"runs": rows}, facts))
+    return write_report(synthetic_results.write(folder, {"runs": rows}, facts))
 
 
 def test_the_report_finds_what_was_put_in(report):

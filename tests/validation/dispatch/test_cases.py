@@ -1,9 +1,9 @@
 """Case files: parameters read from the scenario, and mistakes told with their place."""
 
 import math
-from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.validation.dispatch import exact
@@ -92,5 +92,5 @@ def test_an_unknown_file_is_refused():
 
 
 def test_the_shipped_policy_of_stages_lies_beside_the_cases():
-    root = Path(__file__).parents[3]
+    root = ROOT
     assert (root / "experiments/validation/stages.py").is_file()

@@ -2,10 +2,10 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.simulation.shift.distributions import (
     Constant,
@@ -20,7 +20,7 @@ from dva_sim.simulation.shift.distributions import (
 from dva_sim.validation.dispatch import exact
 from dva_sim.validation.dispatch.queues import erlang_b, laplace
 
-TARGETS = Path(__file__).parents[4] / "shared/targets/dispatch.json"
+TARGETS = ROOT.parent / "shared/targets/dispatch.json"
 
 
 def gamma(mean, shape=1.0):

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import IO
 
 import pytest
-from emulated import all_end, need_link, networks, wait_for_children
-from patience import becomes
+from helpers.network.emulated_link import all_end, need_link, networks, wait_for_children
+from helpers.processes.patience import becomes
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator.cell import (

@@ -1,7 +1,7 @@
 import sys
 
-import patience
 import pytest
+from helpers.processes import patience
 
 from dva_sim.validation.network.emulator.programs import NoteKind, Notes
 

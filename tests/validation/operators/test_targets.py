@@ -2,9 +2,9 @@
 
 import csv
 import json
-from pathlib import Path
 
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.agents.operator.published import (
     SplitFile,
@@ -20,7 +20,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.validation.operators.exact import EXACT
 
 _COMPARISONS = ("first", "second", "third")
-SHARED = Path(__file__).parents[4] / "shared/targets/operator.json"
+SHARED = ROOT.parent / "shared/targets/operator.json"
 LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.worlds.hazards import Fire, detection_time, first_detection, make_hazard
 from dva_sim.worlds.hazards.detectors import CoAlarm
@@ -22,7 +22,7 @@ from dva_sim.worlds.hazards.fire import (
 from dva_sim.worlds.site import load_site
 from dva_sim.worlds.site_parts import Detector
 
-TARGETS = Path(__file__).parents[4] / "shared" / "targets" / "operator.json"
+TARGETS = ROOT.parent / "shared" / "targets" / "operator.json"
 BANDS = {30.0: (120.0, math.inf), 50.0: (60.0, 90.0), 100.0: (10.0, 40.0), 300.0: (0.0, 3.0)}
 
 

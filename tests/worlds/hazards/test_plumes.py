@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.paths import ROOT
 
 from dva_sim.worlds.hazards.gas_dispersion import CLASSES, plume, sigma_y, sigma_z
 
-TARGETS = Path(__file__).parents[4] / "shared" / "targets" / "operator.json"
+TARGETS = ROOT.parent / "shared" / "targets" / "operator.json"
 AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0}  # Martin [m]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from phone_page import PhonePage
+from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.links import AttachedLinks

@@ -8,9 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from patience import becomes
+from helpers.paths import PYTHON_PATH
+from helpers.processes.patience import becomes
 
-TESTS = Path(__file__).parent
 _QUIET = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}
 
 
@@ -32,7 +32,7 @@ class DaskCluster:
         self.workers.append(self._start("dask_worker", *words, cwd=cwd))
 
     def _start(self, what: str, *words: str, cwd: Path | None = None) -> subprocess.Popen[bytes]:
-        path = os.pathsep.join(map(str, (TESTS.parent, TESTS)))
+        path = PYTHON_PATH
         self._started += 1
         with (self._folder / f"{what}-{self._started}.log").open("wb") as log:
             return subprocess.Popen(

@@ -1,4 +1,4 @@
-"""The system's Chromium; `python tests/chromium.py` says whether there is one."""
+"""The system's Chromium; `python tests/helpers/console/chromium.py` says whether there is one."""
 
 from __future__ import annotations
 

@@ -7,16 +7,16 @@ import re
 from dataclasses import fields, is_dataclass
 from decimal import Decimal
 from fractions import Fraction
-from pathlib import Path
 from typing import Any, get_args
 
+from helpers.paths import ROOT
 from lxml import etree
 
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
-SCHEMA = etree.XMLSchema(file=str(Path(__file__).parents[1] / "protocol" / "dva.xsd"))
+SCHEMA = etree.XMLSchema(file=str(ROOT / "protocol" / "dva.xsd"))
 PLAIN = re.compile(r"[A-Za-z]\w*", re.ASCII)
 XML_SPACE = " \t\r\n"
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from office import DVA, crow, east
+from helpers.dva.dispatch_desk import DVA, crow, east
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import (

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 import numpy as np
-from patience import PATIENCE_S, becomes
+from helpers.processes.patience import PATIENCE_S, becomes
 from playwright.sync_api import Page
 
 from dva_sim.worlds.planning import Planner

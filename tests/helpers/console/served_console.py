@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 from websockets.sync.client import ClientConnection, connect
 
 from dva_sim.cameras.frames import ALIVE, Picture, pack

@@ -14,7 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).parents[1]
+from helpers.paths import ROOT
+
 RUNNING: list[subprocess.Popen[Any]] = []
 """What ends with this program; each leads a session of its own."""
 

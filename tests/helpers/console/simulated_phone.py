@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from console_page import Page
+from helpers.console.simulated_console import Page
 
 from dva_sim.agents.tilt import Accelerometer, Hand, load_part
 from dva_sim.agents.tilt.device_axes import to_device_axes

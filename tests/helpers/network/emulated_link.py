@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from patience import PATIENCE_S, becomes
+from helpers.processes.patience import PATIENCE_S, becomes
 
 from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatorError, run_job
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from granted import confirmation
+from helpers.dva.permissions import confirmation
 
 from dva_sim.agents.observation import no_smoke
 from dva_sim.agents.operator.operator import OperatorAgent

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from patience import LOOK_S, PATIENCE_S, becomes
+from helpers.processes.patience import LOOK_S, PATIENCE_S, becomes
 
 WIDE = "200"  # columns, so that no line is broken
 

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator, drill

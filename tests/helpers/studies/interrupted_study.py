@@ -20,7 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import small_study as kit
+from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import runner
 from dva_sim.experiments.execution.runner import run_study

@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 import sys
 from contextlib import redirect_stdout
-from pathlib import Path
 
-import patience
+from helpers.paths import ROOT, TESTS
+from helpers.processes import patience
 
-PATHS = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+PATHS = [str(TESTS), str(ROOT)]
 
 
 def told_here_and_elsewhere(program: str) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from random import Random
 from typing import Any
 
 import zmq
-from patience import PATIENCE_S
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.clock import Clock

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
+from helpers.paths import TESTS
 from playwright.sync_api import Page
 
-AXE = (Path(__file__).parent / "console" / "browser" / "vendor" / "axe.min.js").read_text()
+AXE = (TESTS / "console/browser/vendor/axe.min.js").read_text()
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 
 
