@@ -1,13 +1,11 @@
-"""What holds for all tests: how they are shared between processes, and how many may be skipped."""
+"""What holds for all tests: what a run tells at its end, and how long it looks for rare cases."""
 
 import signal
 
-from halves import pytest_addoption, pytest_configure
 from helpers.processes.search_settings import search
 from hypothesis import settings
-from skips import pytest_sessionfinish
 
-__all__ = ["pytest_addoption", "pytest_configure", "pytest_sessionfinish"]
+pytest_plugins = ["helpers.reporting.cpu_by_room", "helpers.reporting.left_out"]
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # As for a command that a script starts with `&`: then nothing that is started here would hear

@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import ast
 import hashlib
+import itertools
 import os
 import re
 import shutil
@@ -93,11 +94,17 @@ class Mutant:
         old, new = (" ".join(text.split())[:40] for text in (self.old, self.new))
         return f"{self.file}:{self.line} {self.place}: {old} -> {new}"
 
-    def plant(self, root: Path) -> None:
-        file = root / self.file
-        source = file.read_bytes()
+    def in_place(self, source: bytes) -> bytes:
+        """The file with the fault in it."""
         assert source[self.start : self.end].decode() == self.old
-        file.write_bytes(source[: self.start] + self.new.encode() + source[self.end :])
+        return source[: self.start] + self.new.encode() + source[self.end :]
+
+    def is_python(self) -> bool:
+        try:
+            ast.parse(self.in_place((ROOT / self.file).read_bytes()))
+        except SyntaxError:
+            return False
+        return True
 
 
 class Sites(ast.NodeVisitor):
@@ -126,11 +133,6 @@ class Sites(ast.NodeVisitor):
 
     def _add(self, node: ast.expr | ast.stmt, start: int, end: int, new: str) -> None:
         old, place = self._source[start:end].decode(), ".".join(self._place)
-        changed = self._source[:start] + new.encode() + self._source[end:]
-        try:
-            ast.parse(changed)
-        except SyntaxError:
-            return
         self._seen[place, old, new] += 1
         number = self._seen[place, old, new]
         line = self._source.count(b"\n", 0, start) + 1
@@ -254,7 +256,11 @@ def drawn(draw: str) -> list[Mutant]:
 
     rooms = candidates()
     number = shares({room: len(found) for room, found in rooms.items()}, MUTANTS)
-    return [m for room in sorted(rooms) for m in sorted(rooms[room], key=rank)[: number[room]]]
+    chosen: list[Mutant] = []
+    for room, found in sorted(rooms.items()):
+        good = filter(Mutant.is_python, sorted(found, key=rank))
+        chosen += itertools.islice(good, number[room])
+    return chosen
 
 
 def nearest_tests(mutant: Mutant, root: Path) -> list[str]:
@@ -283,7 +289,7 @@ def copy_of_the_tree(root: Path) -> None:
 def notice(mutant: Mutant, root: Path) -> str:
     """Which test noticed a fault that is planted in a copy; empty if none did."""
     kept = (root / mutant.file).read_bytes()
-    mutant.plant(root)
+    (root / mutant.file).write_bytes(mutant.in_place(kept))
     for compiled in (root / mutant.file).parent.glob("__pycache__/*"):
         compiled.unlink()
     pytest = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-m", QUICK]

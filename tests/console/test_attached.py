@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from helpers.network.free_ports import free_port
+from helpers.processes.command_line import call
 from helpers.processes.patience import becomes
 from helpers.processes.programs import Program, Programs, all_gone_after
 
@@ -90,12 +91,12 @@ def test_an_event_is_shown_as_the_dva_tells_it():
 
 @pytest.mark.parametrize("dva", ["here", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:70000", ":5600"])
 def test_what_is_no_address_is_refused(dva):
-    with pytest.raises(ConfigError, match="should be HOST:PORT"):
+    with pytest.raises(ConfigError, match="HOST:PORT"):
         AttachOptions(dva=dva).check()
 
 
 def test_an_audit_log_that_cannot_be_kept_is_told_before_anything_starts():
-    with pytest.raises(ConfigError, match=r"should end in \.sqlite"):
+    with pytest.raises(ConfigError, match=r"\.sqlite"):
         AttachOptions(dva="127.0.0.1:5600", audit=Path("log.txt")).check()
 
 
@@ -159,6 +160,7 @@ def live(programs: Programs, dva: str, part: str, *words: str) -> Program:
     return programs.start("live", "hands-on", "--only", part, "--dva", dva, *more)
 
 
+@pytest.mark.system
 def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     dva = f"127.0.0.1:{free_port()}"
     first = live(programs, dva, "dva")
@@ -182,7 +184,10 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     fire = next(e["number"] for e in console.state()["events"] if e["kind"] == "fire")
     assert console.act("event_proposal", event=fire)["ok"]
     noted = console.act("event_note", event=fire, text="seen from outside")
-    assert noted["text"] == "control room has the role look; to note needs dispatch"
+    assert all(word in noted["text"] for word in ("look", "note", "dispatch"))
+    assert becomes(lambda: console.act("fake_add", label="ghost", type="Robot")["ok"])
+    assert becomes(lambda: "ghost" in [one["label"] for one in console.state()["robots"]])
+    assert console.act("fake_remove", device=id_of("fake", 1))["ok"]
 
     first.process.send_signal(signal.SIGKILL)
     assert becomes(lambda: any("dva does not answer" in line for line in console.story()))
@@ -192,16 +197,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
     assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
 
 
-def test_a_fake_device_is_added_to_a_dva_elsewhere_and_taken_away(programs: Programs):
-    dva = f"127.0.0.1:{free_port()}"
-    live(programs, dva, "dva")
-    console = Attached(programs, dva)
-
-    assert becomes(lambda: console.act("fake_add", label="ghost", type="Robot")["ok"])
-    assert becomes(lambda: [one["label"] for one in console.state()["robots"]] == ["ghost"])
-    assert console.act("fake_remove", device=id_of("fake", 1))["ok"]
-
-
+@pytest.mark.system
 def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(
     programs: Programs, tmp_path: Path
 ):
@@ -221,24 +217,23 @@ def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(
     assert becomes(lambda: any(e["kind"] == "fire" for e in console.state()["events"]))
     assert console.act("event_acknowledge", event=1)["ok"]
     done = console.act("event_assign", event=1, device="guard-1", reason="is near")
-    assert done["text"] == "guard-1 is sent to event 1"
+    assert done["ok"]
     assert becomes(lambda: "guard-1" in console.state()["events"][0]["assigned"])
     refused = console.act("dispatch_mode", mode="ask_first")
-    assert "to set dispatch needs supervise" in refused["text"]
+    assert "supervise" in refused["text"]
 
 
 @pytest.mark.parametrize(
-    ("words", "told_"),
+    ("words", "names"),
     [
-        (("--dva", "nowhere"), "should be HOST:PORT"),
-        (("--dva", "127.0.0.1:5600", "--links", "real"), "--links is not for --dva"),
-        (("--dva", "127.0.0.1:5600", "--keys", "none"), "there is no such folder"),
-        (("--keys", "keys"), "--keys is for --dva"),
+        (("--dva", "nowhere"), "HOST:PORT"),
+        (("--dva", "127.0.0.1:5600", "--links", "real"), "--links"),
+        (("--dva", "127.0.0.1:5600", "--keys", "none"), "none"),
+        (("--keys", "keys"), "--dva"),
     ],
 )
-def test_what_cannot_be_is_told_in_a_line(programs: Programs, words, told_):
-    program = programs.start("console", "--no-open", "--port", "0", *words)
-    assert becomes(lambda: program.process.poll() is not None)
-    assert program.process.returncode == 2
-    (line,) = program.complained
-    assert told_ in line
+def test_what_cannot_be_is_told_in_a_line(words, names):
+    ended = call("console", "--no-open", "--port", "0", *words)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert names in line
