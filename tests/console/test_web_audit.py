@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -46,16 +47,16 @@ def assigned(
     return entry("assign", event=event, subject=whom, role=role, details=details | more)
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    path = tmp_path / "audit.sqlite"
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "audit.sqlite"
     log = AuditLog(path)
     log.append([entry(BEGIN), *(entry("note", event=n, text=f"note {n}") for n in range(1, 1200))])
     log.close()
     return path
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def served(file: Path) -> Iterator[Served]:
     with serving("--audit", str(file)) as one:
         yield one
@@ -70,22 +71,9 @@ def test_rows_come_by_the_thousand_after_a_number(served: Served) -> None:
     assert rest["rows"][0]["before"] == first["rows"][-1]["hash"]
 
 
-@pytest.mark.parametrize("after", ["-1", "x", "1e3", "9" * 13])
-def test_a_number_that_is_none_is_refused(served: Served, after: str) -> None:
-    assert served.ask(f"/api/audit?after={after}", token=served.look).status == 400
-
-
-def test_a_change_is_told_and_so_is_a_file_that_is_gone(served: Served, file: Path) -> None:
-    assert served.ask("/api/audit/check", token=served.look).json["problem"] is None
-    with closing(sqlite3.connect(file, isolation_level=None)) as by_hand:
-        by_hand.execute("DROP TRIGGER audit_is_not_changed")
-        by_hand.execute("UPDATE audit SET text = 'other' WHERE number = 700")
-
-    problem = served.ask("/api/audit/check", token=served.look).json["problem"]
-    assert problem["row"] == 700
-    file.unlink()
-    for path in ("", "/check", "/measures"):
-        assert served.ask(f"/api/audit{path}", token=served.look).status == 503
+def test_a_number_that_is_none_is_refused(served: Served) -> None:
+    for after in ("-1", "x", "1e3", "9" * 13):
+        assert served.ask(f"/api/audit?after={after}", token=served.look).status == 400, after
 
 
 def test_nobody_reads_it_without_a_token_and_without_a_log_there_is_none(served: Served) -> None:
@@ -93,6 +81,21 @@ def test_nobody_reads_it_without_a_token_and_without_a_log_there_is_none(served:
         assert served.ask(f"/api/audit{path}").status == 401
     with serving() as without:
         assert without.ask("/api/audit", token=without.look).status == 404
+
+
+def test_a_change_is_told_and_so_is_a_file_that_is_gone(file: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copy(file, tmp_path))
+    with serving("--audit", str(copy)) as served:
+        assert served.ask("/api/audit/check", token=served.look).json["problem"] is None
+        with closing(sqlite3.connect(copy, isolation_level=None)) as by_hand:
+            by_hand.execute("DROP TRIGGER audit_is_not_changed")
+            by_hand.execute("UPDATE audit SET text = 'other' WHERE number = 700")
+
+        problem = served.ask("/api/audit/check", token=served.look).json["problem"]
+        assert problem["row"] == 700
+        copy.unlink()
+        for path in ("", "/check", "/measures"):
+            assert served.ask(f"/api/audit{path}", token=served.look).status == 503
 
 
 def test_what_a_spreadsheet_would_compute_is_exported_as_words() -> None:

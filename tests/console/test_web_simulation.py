@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 from helpers.console.served_console import scene
 
+from dva_sim.console.web import simulation as web_simulation
 from dva_sim.console.web.simulation import MOST_PENDING, SILENCE, Simulation
 
 
@@ -87,6 +88,22 @@ def test_it_has_ended_when_it_says_so_or_is_gone():
 
     play(says)
     play(goes)
+
+
+def test_who_waits_in_vain_is_told_after_a_while_and_longer_for_what_crosses_the_link(monkeypatch):
+    monkeypatch.setattr(web_simulation, "PATIENCE", 0.001)
+    monkeypatch.setattr(web_simulation, "LONG", 0.002)
+
+    async def story(simulation, clock, end):
+        told = []
+        for action in ("emergency", "pattern"):
+            simulation.ask({"id": action, "do": action, "client": "c1"}, told.append)
+        await until(lambda: len(told) == 2)
+        assert [line["id"] for line in told] == ["pattern", "emergency"]
+        assert [line["late"] for line in told] == [True, True]
+        assert ["0.001 s" in told[0]["text"], "0.002 s" in told[1]["text"]] == [True, True]
+
+    play(story)
 
 
 def test_an_answer_goes_to_all_who_asked_the_same():

@@ -31,7 +31,12 @@ class VirtualPace(PacedClock):
 
 
 class Page:
-    """What a page would do, and what it is told."""
+    """What a page would do, and what it is told.
+
+    Args:
+        measured: Whether what happens is kept for tables.
+        changes: Of the scenario, with `__` for a dot; nobody walks about unless one asks for it.
+    """
 
     def __init__(
         self,
@@ -45,6 +50,7 @@ class Page:
     ):
         document = load(scenario) if isinstance(scenario, str) else scenario
         changes = {key.replace("__", "."): value for key, value in changes.items()}
+        changes.setdefault("bystander.count", 0)
         clock = VirtualPace() if sockets is None else PacedClock()
         scenario = build(document, changes)
         self.world = ConsoleWorld(scenario, "a test", seed, clock, sockets, measured)
