@@ -43,7 +43,7 @@ MUTANTS = 60
 SIDE_BY_SIDE = 2
 PATIENCE_S = 900.0
 QUICK = "not system and not soak and not browser"  # as `make test` has it
-FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?: - |$)", re.MULTILINE)
+FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", re.MULTILINE)
 
 OPERATORS = {
     ast.Lt: ("<", "<="),
