@@ -13,6 +13,7 @@ from threading import Thread
 
 import pytest
 from helpers.processes.patience import PATIENCE_S
+from helpers.wording import unnamed
 from PIL import Image
 
 from dva_sim.agents.observation import Cameras
@@ -136,9 +137,8 @@ def test_the_url_that_a_robot_tells_is_a_stream_that_any_player_shows(world: Liv
     told = world.robots[ROBOT].controller.camera_url
     assert told == f"http://127.0.0.1:{world.port}/camera/robot-1.mjpg"
     assert m.SensorInfo(told, ()).camera_url == told
-    assert world.told == [
-        f"shows pictures of the robots at http://127.0.0.1:{world.port}/camera/LABEL.mjpg"
-    ]
+    (line,) = world.told
+    assert unnamed(line, f"http://127.0.0.1:{world.port}/camera/LABEL.mjpg") == []
     seen = list[tuple[dict[str, str], bytes]]()
     world.let(lambda: seen.extend(pictures(world.port, "/camera/robot-1.mjpg", 3)))
     for headers, data in seen:
@@ -156,7 +156,7 @@ def test_a_single_picture_and_what_there_is_not(world: LiveWorld) -> None:
     assert data.startswith(b"\xff\xd8")
     status, data = world.asked("/camera/robot-9.jpg")
     assert status == 404
-    assert data == b"there is no such robot; there are: robot-1, robot-2\n"
+    assert unnamed(data.decode(), "robot-1", "robot-2") == []
     assert world.asked("/")[0] == 404
     assert world.asked("/camera/..%2f..%2fetc/passwd.jpg")[0] == 404
 
@@ -174,7 +174,7 @@ def test_more_viewers_than_there_is_room_for_are_refused(world: LiveWorld) -> No
     try:
         world.let(look)
         status, data = world.asked("/camera/robot-1.mjpg")
-        assert (status, data) == (503, b"64 viewers are looking already\n")
+        assert (status, unnamed(data.decode(), MOST_VIEWERS)) == (503, [])
     finally:
         for viewer in viewers:
             viewer.close()
@@ -221,7 +221,7 @@ def test_a_process_is_there_while_somebody_looks_and_replaced_when_it_was_killed
 
     os.kill(first, signal.SIGKILL)
     world.until(lambda: world.process == 0)
-    assert "shows no pictures for 0.05 s: the camera process has ended: killed" in world.told[-1]
+    assert unnamed(world.told[-1], "0.05 s", "killed") == []
     world.let(lambda: pictures(world.port, "/camera/robot-1.mjpg", 1))
     second = world.process
     assert second not in (0, first)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from helpers.console.attached_console import OWN, AttachedPage, attached
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.attached.system import UNHEARD
@@ -89,7 +90,7 @@ def test_a_robot_of_which_nothing_is_heard_since_it_was_driven_is_lost(page: Att
     page.world.world.run.network.leave(robot.device.id_tag)
     page.let(15.0)
 
-    assert f"{robot.device.label} is lost in drive: nothing is heard of it" in page.alarms()
+    assert any(unnamed(text, robot.device.label, "lost") == [] for text in page.alarms())
 
 
 def test_nobody_is_left_to_send_once_all_were_sent(

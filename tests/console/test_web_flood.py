@@ -62,6 +62,7 @@ def stop(served, port, tls):
     return found
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
 def test_under_a_flood_of_connections_a_stop_and_a_page_get_through(console, tls):
     port = console.phones_port if tls else console.port
@@ -120,6 +121,7 @@ def test_requests_that_make_no_sense_after_their_answer_fill_no_pipe_and_stop_no
     assert console.ask("/").status == 401
 
 
+@pytest.mark.system
 def test_pictures_are_streamed_over_https_and_a_viewer_that_leaves_is_no_mistake(console):
     port = console.phones_port
     console.live()

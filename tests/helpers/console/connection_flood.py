@@ -1,7 +1,7 @@
 """Connections that keep a port busy and ask for nothing: silent, half-open, slow and with TLS.
 
-`python connection_flood.py HOST PORT COUNT [--tls]` holds so many open, opens another for each one that is
-cut, and prints a line when all have been opened once. It ends with its standard input.
+`python connection_flood.py HOST PORT COUNT [--tls]` holds so many open, opens another for each one
+that is cut, and prints a line when all have been opened once. It ends with its standard input.
 """
 
 from __future__ import annotations
