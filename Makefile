@@ -9,16 +9,14 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak tools check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
 export PYTHONDONTWRITEBYTECODE =
 
-# Two processes share the tests; but pages are drawn by several processes of the browser already,
-# and their tests run alone.
-PYTEST := $(BIN)/python -m pytest --halves
-BROWSER := $(BIN)/python -m pytest tests/console/browser
+# As many processes as there are processors share the tests, file by file.
+PYTEST := $(BIN)/python -m pytest -n logical --dist loadfile --max-worker-restart=0
 
 help:  ## say what can be made
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /make \1\t/' | expand -t 20
@@ -35,27 +33,28 @@ published: $(RUNTIME)  ## the main study at its published size, and its report: 
 	@$(BIN)/dva-sim run req-rep-vs-pub-sub -o results/req-rep-vs-pub-sub
 
 test: $(DEV)  ## the tests that are quick, which are nearly all
-	@echo "Running the tests ..."
-	@$(PYTEST) -m "not system and not soak and not browser"
+	@echo "Running the quick tests ..."
+	@$(PYTEST) --cpu-by-room -m "not system and not soak and not browser"
 
-test-all: $(DEV)  ## all tests
-	@echo "Running those in a browser, then all others ..."
-	@$(BIN)/python tests/helpers/console/chromium.py
-	@$(BROWSER)
-	@$(PYTEST) -m "not browser"
+test-all: test-browser check test test-system  ## what must pass: all but the long tests; make -j2 does two at a time
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
 	@$(PYTEST) -m contract
 
 test-system: $(DEV)  ## programs as users start them, with real processes, sockets and signals
-	@$(PYTEST) -m system
+	@echo "Running the tests of whole programs ..."
+	@$(PYTEST) -m "system and not soak and not browser"
 
 test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@$(BIN)/python tests/helpers/console/chromium.py
-	@$(BROWSER)
+	@echo "Running the tests in a browser ..."
+	@$(PYTEST) tests/console/browser
 
 test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
+
+tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript
+	@tests/install_tools.sh $(VENV)
 
 check: $(DEV)  ## lint, format, types, import contracts
 	@echo "Checking style, types and import contracts ..."

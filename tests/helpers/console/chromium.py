@@ -23,7 +23,7 @@ ASK_THE_NETWORK = (
 )
 """Playwright switches them off, too; but our list takes the place of its own."""
 
-MISSING = "tests in a browser need Chromium: apt-get install chromium (make test leaves them out)"
+MISSING = "tests in a browser need Chromium: make tools (make test leaves them out)"
 
 
 def installed() -> str:

@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# What some tests need besides Python, where it is missing: a browser, node and its packages.
+# `tests/install_tools.sh FOLDER` keeps those packages in FOLDER/node_modules.
+set -euo pipefail
+folder=$1
+
+installed() { command -v "$1" >/dev/null; }
+
+missing=()
+installed chromium || installed chromium-browser || installed google-chrome || missing+=(chromium)
+installed node || missing+=(nodejs)
+installed npm || missing+=(npm)
+if ((${#missing[@]})); then
+  if ! installed apt-get; then
+    echo "please install: ${missing[*]}" >&2
+    exit 1
+  fi
+  echo "Installing ${missing[*]} ..."
+  as_root=()
+  [[ $(id -u) == 0 ]] || as_root=(sudo)
+  "${as_root[@]}" apt-get update -q
+  "${as_root[@]}" apt-get install -qy --no-install-recommends "${missing[@]}"
+fi
+
+if ! [[ -x $folder/node_modules/.bin/tsc && -d $folder/node_modules/@mcap/core ]]; then
+  echo "Installing packages of node ..."
+  npm install --silent --no-audit --no-fund --prefix "$folder" typescript@7.0.2 @mcap/core@2 fzstd@0.1
+fi
