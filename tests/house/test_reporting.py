@@ -1,0 +1,87 @@
+"""What a run of the tests tells at its end, and which faults are planted to see them noticed."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import mutants
+import pytest
+from helpers.paths import PYTHON_PATH
+from helpers.processes.patience import run
+from helpers.reporting import cpu_by_room
+from helpers.reporting.left_out import MOST_SKIPPED
+from helpers.wording import unnamed
+
+
+def test_rooms_are_shown_beside_those_before_the_dearest_first() -> None:
+    head, *lines = cpu_by_room.table({"worlds": 2.0, "core": 3.5}, "abc", {"core": 1.0, "old": 4.0})
+    assert "abc" in head
+    assert [line.split() for line in lines] == [
+        ["core", "3.5", "1.0", "+2.5"],
+        ["worlds", "2.0", "0.0", "+2.0"],
+        ["old", "0.0", "4.0", "-4.0"],
+        ["all", "5.5", "5.0", "+0.5"],
+    ]
+
+
+def test_the_newest_commit_that_was_tested_before_is_the_one_beside(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cpu_by_room, "commits", lambda: ["now", "one", "two", "three"])
+    known = {"now": {"a": 1.0}, "three": {"a": 3.0}, "two": {"a": 2.0}}
+    assert cpu_by_room.before(known) == ("two", {"a": 2.0})
+    assert unnamed(cpu_by_room.before({"now": {"a": 1.0}})[0], "elsewhere") == []
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(("skipped", "code"), [(MOST_SKIPPED, 0), (MOST_SKIPPED + 1, 1)])
+def test_a_run_in_which_too_many_tests_are_skipped_has_failed(
+    tmp_path: Path, skipped: int, code: int
+) -> None:
+    (tmp_path / "test_m.py").write_text(
+        f"import pytest\n@pytest.mark.parametrize('n', range({skipped}))\n"
+        "def test_m(n): pytest.skip('too dark')\n"
+    )
+    words = ["-n", "1", "-p", "no:cacheprovider", "-p", "helpers.reporting.left_out"]
+    done = run(
+        [sys.executable, "-m", "pytest", *words, "--rootdir", str(tmp_path)],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": PYTHON_PATH},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == code, done.stdout
+    assert ("may be" in done.stdout) == bool(code)
+
+
+SOURCE = b'''
+def f(x: int = 2) -> bool:
+    """1 < 2."""
+    log(x)
+    return not x < 10 and True, f"{x + 1}"
+'''
+
+
+def test_faults_fit_where_a_program_could_be_wrong_and_nowhere_else() -> None:
+    found = mutants.Sites("dva_sim/room/f.py", SOURCE).found
+    assert [(one.old, one.new) for one in found][1:] == [
+        ("log(x)", "pass"),
+        ('return not x < 10 and True, f"{x + 1}"', "return None"),
+        ("and", "or"),
+        ("not ", ""),
+        ("<", "<="),
+        ("10", "11"),
+        ("True", "False"),
+    ]
+    assert (found[0].old, found[0].new, found[0].line, found[0].room) == ("2", "3", 2, "room")
+    assert b"x <= 10" in next(one for one in found if one.old == "<").in_place(SOURCE)
+
+
+def test_every_room_gives_a_fault_and_large_ones_more() -> None:
+    assert mutants.shares({"small": 1, "middle": 30, "large": 69}, 13) == {
+        "small": 1,
+        "middle": 4,
+        "large": 8,
+    }
