@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 PATIENCE_S = 240.0
-"""Less than `faulthandler_timeout`, so that who waits in vain can tell what for."""
+"""Less than the time-out of a test, so that who waits in vain can tell what for."""
 
 LOOK_S = 0.02
 
