@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import small_study as kit
+from helpers.studies.report_text import words_of
 
 from dva_sim.cli.results_json import shown
 from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.execution.runner import run_study
-from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import StudyJob
@@ -69,11 +69,10 @@ def test_the_page_of_a_study_under_way_is_marked_partial_and_the_final_one_is_no
     stopped, tmp_path
 ):
     out = stopped(after=kit.RUNS - 5)
-    told = f'<p class="banner" role="status">Partial: {kit.RUNS - 5} of {kit.RUNS} runs are done'
-    assert told in write_report(out).read_text(encoding="utf-8")
+    assert f"Partial: {kit.RUNS - 5} of {kit.RUNS} runs" in words_of(out)
     assert status_of(load_so_far(out).manifest).kind == "exploratory"
     run_study(kit.study_in(tmp_path), out, jobs=1, episode=measured)
-    assert "Partial:" not in write_report(out).read_text(encoding="utf-8")
+    assert "Partial:" not in words_of(out)
 
 
 def test_as_data_it_says_how_much_is_there(stopped):
@@ -90,7 +89,7 @@ def test_looking_changes_nothing_in_the_folder(stopped, tmp_path):
 
 def test_before_any_person_has_all_runs_that_is_said(stopped):
     out = stopped(after=2)
-    with pytest.raises(ConfigError, match=f"2 of {kit.RUNS} runs are done, and no person has all"):
+    with pytest.raises(ConfigError, match=f"2 of {kit.RUNS} runs .* no person"):
         load_so_far(out)
 
 
@@ -114,13 +113,13 @@ def test_an_unfinished_study_of_an_older_version_is_refused_in_one_line(tmp_path
     with sqlite3.connect(tmp_path / "journal.sqlite") as db:
         db.execute("CREATE TABLE study (id INTEGER, identity TEXT, wall_s REAL)")
         db.execute("INSERT INTO study VALUES (1, 'abc', 0)")
-    with pytest.raises(ConfigError, match="unfinished study of another version of dva-sim"):
+    with pytest.raises(ConfigError, match="unfinished study"):
         load_so_far(tmp_path)
 
 
 def test_a_file_is_no_results_folder(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigError, match="is not a folder; give the folder"):
+    with pytest.raises(ConfigError, match="is not a folder"):
         load_so_far(tmp_path / "file")
 
 

@@ -14,6 +14,7 @@ import pytest
 from helpers.paths import PYTHON_PATH
 from helpers.processes.patience import PATIENCE_S
 from helpers.studies import small_study as kit
+from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import scheduling
 from dva_sim.experiments.execution.dry_run import dry_run
@@ -23,17 +24,8 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 
 
-@pytest.fixture
-def plain(tmp_path: Path) -> dict[str, bytes]:
-    """The files of the small study, run in one process without interruption."""
-    return kit.files(
-        run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=kit.cheap)
-    )
-
-
-def test_the_tables_hold_every_run_with_design_and_measures(tmp_path):
-    study = kit.study_in(tmp_path)
-    results = Results.load(run_study(study, tmp_path / "out", jobs=1, episode=kit.cheap))
+def test_the_tables_hold_every_run_with_design_and_measures_in_order(finished):
+    results = Results.load(finished)
     runs = results.table("runs")
     assert list(runs)[:9] == [
         *("part", "cell", "config", "pattern", "link.delay_s"),
@@ -48,19 +40,9 @@ def test_the_tables_hold_every_run_with_design_and_measures(tmp_path):
     assert (runs["confirmed"] == (runs["seed"] % 3 > 0)).all()
     assert (np.isnan(runs["round_trip_s"]) == (runs["seed"] % 2 == 1)).all()
     assert [o is None for o in runs["outcome"]] == (runs["seed"] % 3 == 0).tolist()
-
-
-def test_rows_stand_in_the_order_of_the_design(tmp_path):
-    run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)
-    runs = Results.load(tmp_path / "out").table("runs")
-    columns = zip(*(runs[c].tolist() for c in ("part", "cell", "person", "trial")), strict=True)
-    order = list(columns)
+    order = list(zip(*(runs[c].tolist() for c in ("part", "cell", "person", "trial")), strict=True))
     assert order == sorted(order)
-
-
-def test_a_table_can_be_read_for_one_part(tmp_path):
-    run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)
-    tracks = Results.load(tmp_path / "out").table("tracks", part="story")
+    tracks = results.table("tracks", part="story")
     assert set(tracks["part"]) == {"story"}
     assert len(tracks["t_s"]) == 3 * 12
 
@@ -90,22 +72,22 @@ def test_two_processes_write_the_same_bytes_as_one(tmp_path, plain):
     assert seen[-1] == (kit.RUNS, kit.RUNS)
 
 
-def test_a_finished_study_is_not_run_again(tmp_path, plain):
+def test_a_finished_study_is_not_run_again(tmp_path, out, plain):
     def never(job: object) -> kit.Tables:
         raise AssertionError("run again")
 
-    out = run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=never)
-    assert kit.files(out) == plain
+    assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)) == plain
 
 
 @pytest.fixture
-def started() -> Iterator[Callable[[Path, Path], subprocess.Popen[str]]]:
+def started() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     """Starts runners in processes of their own; none of them outlives the test."""
     runners: list[subprocess.Popen[str]] = []
 
-    def start(study: Path, out: Path) -> subprocess.Popen[str]:
+    def start(study: Path, out: Path, jobs: int = 2) -> subprocess.Popen[str]:
+        program = [sys.executable, "-m", "helpers.studies.small_study"]
         runner = subprocess.Popen(
-            [sys.executable, "-m", "helpers.studies.small_study", str(study), str(out), "2"],
+            [*program, str(study), str(out), str(jobs)],
             stdout=subprocess.PIPE,
             text=True,
             env={**os.environ, "PYTHONPATH": PYTHON_PATH},
@@ -133,25 +115,25 @@ def stopped(runner: subprocess.Popen[str], when: int, how: signal.Signals) -> st
     return runner.communicate(timeout=PATIENCE_S)[0]  # only returns when its workers are gone too
 
 
-def test_a_runner_killed_again_and_again_ends_with_the_same_bytes(tmp_path, plain, started):
-    study, out = kit.write_study(tmp_path), tmp_path / "killed"
-    for when in (3, 20):
-        runner = started(study, out)
-        stopped(runner, when, signal.SIGKILL)
-        assert runner.returncode == -signal.SIGKILL
-    done = dry_run(kit.study_in(tmp_path), out).done
-    assert 20 <= done < kit.RUNS
-    assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
-
-
-def test_repeats_go_on_after_a_kill_too_and_end_with_the_same_bytes(tmp_path, started):
+def test_a_runner_that_was_killed_goes_on_and_ends_with_the_same_bytes(tmp_path, started):
+    """It is killed among its first runs, and goes on to stop among the repeats."""
     study, out = kit.write_study(tmp_path, kit.REPEATED), tmp_path / "killed"
-    whole = run_study(kit.load_study(study), tmp_path / "whole", jobs=1, episode=kit.cheap)
-    stopped(started(study, out), kit.RUNS + 4, signal.SIGKILL)
+    runner = started(study, out)
+    stopped(runner, 3, signal.SIGKILL)
+    assert runner.returncode == -signal.SIGKILL
+    assert 3 <= dry_run(kit.load_study(study), out).done < kit.RUNS
+
+    def stop(done: int, total: int) -> None:
+        if done >= kit.RUNS + 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(kit.load_study(study), out, jobs=1, episode=kit.cheap, progress=stop)
     assert kit.RUNS < dry_run(kit.load_study(study), out).done < kit.REPEATED_RUNS
-    again = run_study(kit.load_study(study), out, jobs=2, episode=kit.cheap)
-    assert kit.files(again) == kit.files(whole)
-    assert "robustness.parquet" in kit.files(whole)
+    again = kit.files(run_study(kit.load_study(study), out, jobs=2, episode=kit.cheap))
+    whole = run_study(kit.load_study(study), tmp_path / "whole", jobs=1, episode=kit.cheap)
+    assert again == kit.files(whole)
+    assert "robustness.parquet" in again
 
 
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, started):
@@ -159,7 +141,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, starte
     runner = started(study, out)
     said = stopped(runner, 3, signal.SIGINT)
     assert runner.returncode == 130
-    assert "of 42 runs, which are kept; the same command goes on from there" in said
+    assert "of 42 runs, which are kept" in said
     assert 3 <= dry_run(kit.study_in(tmp_path), out).done < kit.RUNS
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
@@ -175,15 +157,16 @@ def test_ctrl_c_while_a_lock_of_the_pool_is_taken_ends_the_run_all_the_same(tmp_
         return wait(futures, **words)
 
     monkeypatch.setattr(scheduling, "wait", wait_and_press)
-    with pytest.raises(KeyboardInterrupt, match="which are kept; the same command goes on"):
+    with pytest.raises(KeyboardInterrupt, match="which are kept"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=kit.cheap)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.system
 def test_of_two_runners_on_one_folder_one_makes_the_study(tmp_path, plain, started):
     """The other is refused, unless it has begun when the first one has ended."""
     study, out = kit.write_study(tmp_path), tmp_path / "shared"
-    pair = [started(study, out) for _ in range(2)]
+    pair = [started(study, out, jobs=1) for _ in range(2)]
     for runner in pair:
         runner.communicate(timeout=PATIENCE_S)
     assert min(runner.returncode for runner in pair) == 0
@@ -191,30 +174,26 @@ def test_of_two_runners_on_one_folder_one_makes_the_study(tmp_path, plain, start
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_a_run_that_fails_is_named_and_the_others_go_on(tmp_path, jobs):
-    study = kit.study_in(tmp_path)
-    out = run_study(study, tmp_path / "out", jobs=jobs, episode=kit.unlucky)
-    results = Results.load(out)
+def test_a_run_that_fails_is_named_and_the_others_go_on_and_it_is_tried_again(
+    tmp_path, plain, jobs
+):
+    study, out = kit.study_in(tmp_path), tmp_path / "out"
+    results = Results.load(run_study(study, out, jobs=jobs, episode=kit.unlucky))
     (failure,) = results.failures
-    assert failure["error"] == "RuntimeError: the robot fell into a hole"
-    assert (failure["part"], failure["cell"], failure["person"], failure["trial"]) == (
-        *("drive", -1, 1, 0),
-    )
+    assert failure["error"] == "RuntimeError: the robot fell into a hole"  # in one line
+    assert [failure[key] for key in ("part", "cell", "person", "trial")] == ["drive", -1, 1, 0]
     assert len(results.table("runs")["seed"]) == kit.RUNS - 1
-
-
-def test_a_failed_run_is_tried_again_the_next_time(tmp_path, plain):
-    study = kit.study_in(tmp_path)
-    run_study(study, tmp_path / "out", jobs=1, episode=kit.unlucky)
-    assert dry_run(study, tmp_path / "out").done == kit.RUNS - 1
-    assert kit.files(run_study(study, tmp_path / "out", jobs=1, episode=kit.cheap)) == plain
+    plan = dry_run(study, out, jobs=1)
+    assert (plan.done, plan.tried) == (kit.RUNS - 1, 0)  # the runs that are done tell the rest
+    assert plan.estimate_s > 0
+    assert kit.files(run_study(study, out, jobs=1, episode=kit.cheap)) == plain
 
 
 def test_a_run_that_kills_its_process_again_and_again_fails_and_the_others_go_on(tmp_path):
     out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=kit.deadly)
     results = Results.load(out)
     (failure,) = results.failures
-    assert "killed the process it ran in, again" in failure["error"]
+    assert "killed the process" in failure["error"]
     assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
     assert len(results.table("runs")["seed"]) == kit.RUNS - 1
 
@@ -224,7 +203,7 @@ def test_a_run_that_stalls_ends_as_a_failure_at_its_limit(tmp_path, jobs):
     study = kit.study_in(tmp_path)
     out = run_study(study, tmp_path / "out", jobs=jobs, episode=kit.stalls, limit_s=1.0)
     (failure,) = Results.load(out).failures
-    assert failure["error"] == "RunTooLong: took more than its 1 s"
+    assert unnamed(failure["error"], "RunTooLong", "1 s") == []
     assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
 
 
@@ -271,26 +250,25 @@ def test_numpy_numbers_are_kept_as_numbers(tmp_path):
     assert runs["x"][0] == 0.5
 
 
-def test_the_folder_of_another_study_is_refused(tmp_path, plain):
-    for settings in (["seed=4"], ["robot.processing_s=0.3"]):
+@pytest.mark.parametrize("setting", ["seed=4", "robot.processing_s=0.3"])
+def test_the_folder_of_another_study_is_refused_with_or_without_a_journal(
+    tmp_path, out, plain, setting
+):
+    study = kit.study_in(tmp_path, setting)
+    for _ in range(2):
         with pytest.raises(ConfigError, match="holds another study"):
-            run_study(
-                kit.study_in(tmp_path, *settings), tmp_path / "plain", jobs=1, episode=kit.cheap
-            )
-    assert kit.files(tmp_path / "plain") == plain
+            run_study(study, out, jobs=1, episode=kit.cheap)
+        assert kit.files(out) == plain
+        (out / "journal.sqlite").unlink(missing_ok=True)
 
 
-def test_a_folder_whose_runs_were_made_with_another_numpy_is_refused(tmp_path, plain, monkeypatch):
+def test_a_folder_whose_runs_were_made_with_another_numpy_is_refused(
+    tmp_path, out, plain, monkeypatch
+):
     monkeypatch.setattr(manifest, "version", lambda name: f"other {name}")
-    with pytest.raises(ConfigError, match="the program or its libraries were changed"):
-        run_study(kit.study_in(tmp_path), tmp_path / "plain", jobs=1, episode=kit.cheap)
-    assert kit.files(tmp_path / "plain") == plain
-
-
-def test_results_of_another_study_without_a_journal_are_refused_too(tmp_path, plain):
-    (tmp_path / "plain" / "journal.sqlite").unlink()
-    with pytest.raises(ConfigError, match="holds another study"):
-        run_study(kit.study_in(tmp_path, "seed=4"), tmp_path / "plain", episode=kit.cheap)
+    with pytest.raises(ConfigError, match="libraries were changed"):
+        run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)
+    assert kit.files(out) == plain
 
 
 def test_a_file_cannot_be_a_results_folder(tmp_path):
@@ -305,17 +283,8 @@ def test_a_dry_run_counts_and_writes_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_dry_run_of_a_study_half_done_estimates_the_rest(tmp_path):
-    study = kit.study_in(tmp_path)
-    run_study(study, tmp_path / "out", jobs=1, episode=kit.unlucky)
-    plan = dry_run(study, tmp_path / "out", jobs=1)
-    assert plan.done == kit.RUNS - 1
-    assert plan.tried == 0  # the runs that are done tell it
-    assert plan.estimate_s > 0
-
-
-def test_times_and_costs_stay_apart_from_the_results(tmp_path, plain):
-    machine = json.loads((tmp_path / "plain" / "machine.json").read_text())
+def test_times_and_costs_stay_apart_from_the_results(finished):
+    machine = json.loads((finished / "machine.json").read_text())
     assert machine["jobs"] == 1
     assert set(machine["cpu_s_per_run"]) == {
         *("drive/-1", *(f"drive/{i}" for i in range(4)), *(f"story/{i}" for i in range(4)))
@@ -329,6 +298,6 @@ def test_a_folder_without_results_is_refused_by_name(tmp_path):
         Results.load(tmp_path / "nowhere")
 
 
-def test_a_table_that_was_not_written_is_refused_with_those_there_are(tmp_path, plain):
-    with pytest.raises(ConfigError, match="no table 'events'; tables: runs, tracks"):
-        Results.load(tmp_path / "plain").table("events")
+def test_a_table_that_was_not_written_is_refused_with_those_there_are(finished):
+    with pytest.raises(ConfigError, match="'events'; tables: runs, tracks"):
+        Results.load(finished).table("events")

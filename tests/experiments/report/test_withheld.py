@@ -4,6 +4,7 @@ import json
 
 import pytest
 from helpers.processes.command_line import call
+from helpers.studies.report_text import blank_pictures
 
 import dva_sim
 from dva_sim.experiments.report.summary import Reading
@@ -24,7 +25,7 @@ replications: 1
 factors:
   dispatch.policy: [min_eta, "mine.py:Mine"]
 parts:
-  shift: {scenario: small-shift}
+  shift: {scenario: small-shift, changes: {horizon_s: 3600}}
 answer:
   part: shift
   measure: response_mean_s
@@ -49,25 +50,26 @@ def study(tmp_path):
 
 def test_a_policy_that_always_fails_is_compared_with_nothing(study, tmp_path):
     out = tmp_path / "out"
-    ran = call("run", study, "-o", out, "--jobs", "1")
+    with blank_pictures():
+        ran = call("run", study, "-o", out, "--jobs", "1")
     assert ran.returncode == ExitCode.RUNS_FAILED
-    assert "error: in part shift a class of yours failed" in ran.stderr
+    assert "part shift a class of yours" in ran.stderr
     reading = Reading(Results.load(out))
     assert reading.finding is None
-    assert reading.answer.lead.startswith("The answer is withheld: a class of yours failed")
+    assert reading.answer.lead.startswith("The answer is withheld")
     assert [c.difference for c in reading.judgement.compared if c.difference is not None] == []
-    assert any("no contrast of this part is shown" in line for line in reading.warnings)
+    assert any("no contrast" in line for line in reading.warnings)
     assert "The answer is withheld" in (out / "report.html").read_text()
     assert not list(out.glob("figures/answer*"))
     assert json.loads(call("show", out, "--json").stdout)["answer"]["finding"] is None
     for more in ((), ("--fail-if", "share(confirmed) < 95 %"), ("--json",)):
         compared = call("compare", out, out, *more)
         assert compared.returncode == ExitCode.MISTAKE
-        assert "in part shift of A a class of yours failed" in compared.stderr
+        assert "part shift of A" in compared.stderr
 
 
 def test_without_a_failure_nothing_is_withheld(study, tmp_path):
     (tmp_path / "mine.py").write_text(POLICY.replace('raise RuntimeError("no idea")', "return []"))
-    results = dva_sim.run(study, tmp_path / "out", jobs=1)
+    results = dva_sim.run(study, tmp_path / "out", jobs=1, report=False)
     assert Reading(results).distrusted == {}
     assert Reading(results).finding is not None
