@@ -346,19 +346,19 @@ def test_nobody_can_talk_a_robot_to_death() -> None:
             run.clock.call_at(begun, ask)
         for number in range(strangers):
             wire = run.network.connect(f"stranger-{number}", ROBOT, lambda *_: None, True)
-            for tag in range(500):
+            for tag in range(250):
                 run.clock.call_at(1.0 + tag / 50, wire.send, tag, b"<msg>rubbish %d</msg>" % tag)
         run.clock.run(15.0)
         assert run.field.robots[ROBOT].applied == 60
     assert max(served["flooded"]) == pytest.approx(max(served["alone"]), abs=0.001)
     counted = run.recorder.counters
     unread = counted["refused unread: of a peer that sends no messages"]
-    assert counted["refused"] + unread == 20 * 500
-    assert unread > 5000
+    assert counted["refused"] + unread == 20 * 250
+    assert unread > 2000
 
 
 HOLDER, SERVICE = id_of("operator", 1), 0.05
-STRANGERS = (1, 5, 20)
+STRANGERS = (1, 20)
 ANSWERED_BY_ITSELF: tuple[m.Body, ...] = (
     m.GetSensorInfo(),
     m.GetSensorInfo(ROBOT),
@@ -440,7 +440,7 @@ class Driven:
         elif not self.commands.busy:
             self.commands.request(data, lambda _: None)
 
-    def flood(self, strangers: int, source: str, body: m.Body, lasts: float = 1.0) -> None:
+    def flood(self, strangers: int, source: str, body: m.Body, lasts: float = 0.6) -> None:
         """Strangers send so, 25 a second each, over connections that are new."""
         service, begun = self.run.network.service(ROBOT), self.clock.now
         assert service is not None
@@ -474,7 +474,7 @@ def test_no_valid_message_of_strangers_keeps_the_holder_waiting(pattern: str) ->
             applied = len(driven.waits)
             driven.flood(strangers, source, body)
             assert driven.robot.controller.mode == "Teleoperation", body
-            assert len(driven.waits) - applied >= 4, (strangers, body)
+            assert len(driven.waits) - applied >= 2, (strangers, body)
     assert max(driven.waits) < SERVICE + 1e-4
     assert driven.robot.controller.grant is not None
     assert not driven.run.recorder.violations
@@ -492,7 +492,7 @@ def test_what_only_the_holder_may_say_costs_a_robot_that_is_driven_nothing() -> 
 def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body: m.Body) -> None:
     driven = Driven("pub-sub")
     for strangers in STRANGERS:
-        cries = [0.1 + 0.1537 * number for number in range(5)]
+        cries = [0.1 + 0.1537 * number for number in range(3)]
         for cry in cries:
             driven.clock.call_after(cry, driven.cry)
         driven.flood(strangers, "", body)

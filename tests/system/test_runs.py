@@ -33,14 +33,14 @@ def rows(recording: Recording) -> str:
 PROGRAM = """
 from system.test_runs import rows, run
 rough = {"link__delay_s": 0.1, "link__loss": 0.02, "link__jitter_s": 0.02}
-print(rows(run("fire-drill", 5, horizon_s=120, **rough)))
+print(rows(run("fire-drill", 5, horizon_s=60, **rough)))
 """
 
 
 def test_the_same_seed_gives_the_same_bytes_in_two_processes() -> None:
     here, elsewhere = told_here_and_elsewhere(PROGRAM)
     assert here == elsewhere
-    assert len(here) > 10_000
+    assert len(here) > 5_000
 
 
 def test_another_seed_gives_another_run() -> None:
@@ -57,7 +57,7 @@ def test_adding_a_guard_changes_nobody_elses_luck() -> None:
 
 @pytest.mark.parametrize(
     ("name", "changes"),
-    [("drive-to-event", {"link.delay_s": 0.1}), ("evacuation", {"horizon_s": 90})],
+    [("drive-to-event", {"link.delay_s": 0.1}), ("evacuation", {"horizon_s": 40})],
 )
 def test_keeping_traffic_for_pictures_changes_nothing(name: str, changes: dict[str, float]) -> None:
     scenario = scenarios.build(scenarios.load(name), changes)
@@ -68,29 +68,28 @@ def test_keeping_traffic_for_pictures_changes_nothing(name: str, changes: dict[s
 
 @pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
 @pytest.mark.parametrize("profile", ["default", "dissertation"])
-@pytest.mark.parametrize("link", [{}, {"loss": 0.1, "jitter_s": 0.1, "delay_s": 0.2}])
-def test_no_safety_rule_is_broken_on_any_link(
-    pattern: str, profile: str, link: dict[str, float]
-) -> None:
-    recording = run(pattern=pattern, phone__profile=profile, link=link, horizon_s=120)
+def test_no_safety_rule_is_broken_on_a_rough_link(pattern: str, profile: str) -> None:
+    link = {"loss": 0.1, "jitter_s": 0.1, "delay_s": 0.2}
+    recording = run(pattern=pattern, phone__profile=profile, link=link, horizon_s=60)
     assert recording.recorder.violations == {}
     assert recording.recorder.drives[0].applied
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1, 0.25, 0.5, 1.0])
+@pytest.mark.parametrize("delay", [0.0, 0.1, 1.0])
 def test_request_reply_makes_commands_rarer_by_its_closed_form(delay: float) -> None:
     """Period = max(wanted period, round trip + processing), whole periods of the phone."""
-    drive = run(pattern="req-rep", link__delay_s=delay).recorder.drives[0]
+    drive = run(pattern="req-rep", link__delay_s=delay, horizon_s=60).recorder.drives[0]
     gaps = [b.time - a.time for a, b in itertools.pairwise(drive.applied)]
     expected = max(0.1, 2 * delay + 0.05)
     middle = sorted(gaps)[len(gaps) // 2]
     assert middle == pytest.approx(expected, abs=0.004)
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("delay", [0.0, 1.0])
 def test_a_window_of_requests_makes_commands_as_many_times_as_frequent(delay: float) -> None:
     """Rate = min(wanted rate, window / (round trip + processing))."""
-    drive = run(pattern="pipelined", command__window=4, link__delay_s=delay).recorder.drives[0]
+    ways = {"command__window": 4, "link__delay_s": delay, "horizon_s": 60}
+    drive = run(pattern="pipelined", **ways).recorder.drives[0]
     first, last = drive.applied[10], drive.applied[-10]
     rate = (len(drive.applied) - 20) / (last.time - first.time)
     assert rate == pytest.approx(min(10.0, 4 / (2 * delay + 0.05)), rel=0.08)
@@ -98,14 +97,14 @@ def test_a_window_of_requests_makes_commands_as_many_times_as_frequent(delay: fl
 
 def test_publishing_keeps_the_wanted_rate_at_any_delay() -> None:
     for delay in (0.0, 1.0):
-        drive = run(pattern="pub-sub", link__delay_s=delay).recorder.drives[0]
+        drive = run(pattern="pub-sub", link__delay_s=delay, horizon_s=40).recorder.drives[0]
         gaps = [b.time - a.time for a, b in itertools.pairwise(drive.applied)]
         assert sorted(gaps)[len(gaps) // 2] == pytest.approx(0.1, abs=0.002)
 
 
 def test_a_slow_robot_falls_behind_under_plain_publishing_but_not_if_the_latest_wins() -> None:
     """10 commands a second into a robot that needs 0.2 s for each."""
-    slow = {"robot__processing_s": 0.2, "horizon_s": 60}
+    slow = {"robot__processing_s": 0.2, "horizon_s": 40}
     plain = run(pattern="pub-sub", **slow).recorder.drives[0].applied
     latest = run(pattern="latest-wins", **slow).recorder.drives[0].applied
     assert max(a.time - a.issued for a in latest) < 0.45
@@ -137,7 +136,7 @@ def test_each_stage_of_the_delay_budget_is_what_it_is_made_of() -> None:
     assert stages["motor"] == 0.15
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.25, 1.0])
+@pytest.mark.parametrize("delay", [0.0, 1.0])
 def test_the_loop_delay_is_what_operators_come_to_see(
     delay: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -160,7 +159,7 @@ def test_the_loop_delay_is_what_operators_come_to_see(
 
 
 def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay() -> None:
-    slow = {"phone__profile": "dissertation", "link__delay_s": 0.5}
+    slow = {"phone__profile": "dissertation", "link__delay_s": 0.5, "horizon_s": 60}
     waited = measures.run_row(run(pattern="req-rep", **slow))["delay_pattern_s"]
     assert 0.05 < waited < 1.05
     assert measures.run_row(run(pattern="pub-sub", **slow))["delay_pattern_s"] == 0.0
@@ -238,7 +237,7 @@ def test_two_fires_reported_as_one_event_are_both_accounted_for() -> None:
 
 
 def test_a_story_ends_with_every_event_accounted_for() -> None:
-    for seed in range(3):
+    for seed in range(2):
         recording = run("fire-drill", seed)
         events = measures.event_rows(recording)
         assert len(events) == 2

@@ -32,7 +32,7 @@ def blank_pictures() -> Iterator[None]:
     To lay out and paint them is four fifths of what a report costs.
     """
     with (
-        mock.patch.object(ConstrainedLayoutEngine, "execute", lambda *_: None),
+        mock.patch.object(ConstrainedLayoutEngine, "execute"),
         mock.patch.object(FigureCanvasAgg, "print_png", lambda _, file, **__: file.write(b"png")),
         mock.patch.object(FigureCanvasSVG, "print_svg", lambda _, file, **__: file.write(b"svg")),
     ):
