@@ -41,11 +41,8 @@ def stopped_at(module: str, words: list[str], ignored: bool = False) -> tuple[in
     ("module", "words"),
     [
         ("dva_sim.cli", ["list"]),
-        ("typer", ["list"]),
-        ("dva_sim.cli.program", LIVE),
         ("dva_sim.kernel.rare_collection", LIVE),
         ("dva_sim.live", LIVE),
-        ("numpy", LIVE),
         ("zmq", LIVE),
     ],
 )

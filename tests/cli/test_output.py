@@ -10,7 +10,9 @@ import sys
 
 import pytest
 from helpers.paths import ROOT
+from helpers.studies.report_text import blank_pictures
 from helpers.studies.small_study import cheap, study_in, unlucky
+from helpers.wording import unnamed
 
 from dva_sim.cli import call, names
 from dva_sim.experiments.execution.dry_run import _Tried
@@ -65,7 +67,8 @@ def test_a_list_of_one_kind_or_none_that_there_is(say):
     assert "fire-drill" not in say("list", "sites")[1]
     code, out, err = say("list", "scenario")
     assert (code, out) == (2, "")
-    assert err == "error: there is no list of 'scenario'; did you mean 'scenarios'?\n"
+    assert err.startswith("error: ")
+    assert unnamed(err, "'scenario'", "'scenarios'") == []
 
 
 def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch, capsys):
@@ -108,8 +111,7 @@ def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
         for told in (plugins.group, plugins.key, plugins.public, plugins.folder):
             assert told in out
             assert told in page
-    assert "dva-sim check policy mine.py:Mine" in out
-    assert "agents/policies/patrol.py" in out
+    assert unnamed(out, "check policy mine.py:Mine", "agents/policies/patrol.py") == []
 
 
 # --- JSON ------------------------------------------------------------------------------
@@ -195,13 +197,15 @@ def test_an_episode_is_quiet_as_usual_or_tells_every_measure(say):
     usual, more = say(*words)[1], say(*words, "-v")[1]
     assert "safety rules broken" in usual
     assert len(more.splitlines()) > len(usual.splitlines()) + 40
-    assert re.search(r"\ntraffic_bytes +\d+ B +size of all messages on the network\n", more)
+    assert re.search(r"\ntraffic_bytes +\d+ B +\w", more)
 
 
 def test_a_report_is_quiet_or_tells_its_files(say, folders):
     results, _ = folders
-    assert say("report", results, "--quiet") == (0, "", "")
-    assert re.search(r"tables/runs\.parquet: [\d,]+ bytes\n", say("report", results, "-v")[1])
+    with blank_pictures():
+        assert say("report", results, "--quiet") == (0, "", "")
+        told = say("report", results, "-v")[1]
+    assert re.search(r"tables/runs\.parquet: [\d,]+ bytes\n", told)
 
 
 def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypatch):
@@ -215,9 +219,11 @@ def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypa
 def test_runs_that_failed_are_told_on_standard_error_however_quiet(say, tmp_path, monkeypatch):
     monkeypatch.setattr("dva_sim.experiments.execution.runner.run_job", one_fails)
     path = study_in(tmp_path).file
-    code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")
+    with blank_pictures():
+        code, out, err = say("run", path, "-q", "-j", 1, "-o", tmp_path / "out")
     assert (code, out) == (ExitCode.RUNS_FAILED, "")
-    assert err == "error: 1 run failed; the same command tries again\n"
+    assert err.startswith("error: 1 run failed")
+    assert err.count("\n") == 1
 
 
 # --- completion ------------------------------------------------------------------------

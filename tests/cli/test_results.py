@@ -2,12 +2,14 @@
 
 import io
 import json
+import re
 import shutil
 import sys
 
 import pytest
 from helpers.studies import synthetic_results as synthetic
 from helpers.studies.small_study import cheap, study_in, unlucky
+from helpers.wording import unnamed
 from rich.console import Console
 
 from dva_sim import cli
@@ -74,13 +76,10 @@ def test_show_tells_question_status_size_answer_and_every_cell(tmp_path, command
     folder = synthetic.write(tmp_path / "out", {"runs": rows}, facts)
     code, out, _ = command("show", folder)
     assert code == 0
-    assert out.startswith("REQ/REP or PUB/SUB for driving a robot by tilt, as delay grows?\n")
-    assert "Status: exploratory: --set persons=6\n" in out
-    assert "888 runs in 0 configurations, 0 failed; 6 persons x 2 trials, seed 1\n" in out
-    assert (
-        "dva-sim 0.0, commit 0a1b2c3d4e5f with changes that are not committed, "
-        "study 0123456789abcdef\n"
-    ) in out
+    assert out.startswith(f"{facts['question']}\n")
+    size = ("888 runs in 0", " 0 failed", "6 persons x 2 trials", "seed 1\n")
+    made = ("dva-sim 0.0", "commit 0a1b2c3d4e5f ", "not committed", "study 0123456789abcdef\n")
+    assert unnamed(out, "Status: exploratory: --set persons=6\n", *size, *made) == []
     assert Reading(Results.load(folder)).answer.lead in out
     cells = [line for line in out.splitlines() if line.startswith("latest-wins PUB/SUB  100\xa0ms")]
     assert len(cells) == 4  # two profiles in two parts
@@ -89,8 +88,8 @@ def test_show_tells_question_status_size_answer_and_every_cell(tmp_path, command
 
 def test_show_counts_failures_and_warns_of_them(folders, command):
     _, out, _ = command("show", folders["unlucky"])
-    assert "41 runs in 9 configurations, 1 failed; 3 persons x 2 trials, seed 3\n" in out
-    assert "Runs that failed and are missing below: 1" in out
+    size = ("41 runs in 9", " 1 failed", "3 persons x 2 trials", "seed 3\n", "missing below: 1")
+    assert unnamed(out, *size) == []
 
 
 def test_show_tells_what_ended_a_study_early(folders, tmp_path, command):
@@ -99,7 +98,7 @@ def test_show_tells_what_ended_a_study_early(folders, tmp_path, command):
     (tmp_path / "manifest.json").write_text(json.dumps(facts))
     (tmp_path / "tables").symlink_to(folders["cheap"] / "tables")
     _, out, _ = command("show", tmp_path)
-    assert "Ended after 2 of 6 rounds: its interval is narrow enough\n" in out
+    assert "after 2 of 6 rounds: its interval" in out
 
 
 def test_show_prints_the_first_rows_of_a_table(folders, command):
@@ -116,7 +115,7 @@ def test_show_prints_the_first_rows_of_a_table(folders, command):
 def test_show_explains_columns(folders, command):
     _, out, _ = command("show", folders["cheap"], "--columns", "--table", "tracks")
     assert out.splitlines()[0] == "tracks"
-    assert "t_s           s     time of the run" in out
+    assert re.search(r"\nt_s +s +\w", out)
 
 
 def test_a_narrow_terminal_shows_fewer_columns_and_names_the_others(folders):
@@ -135,9 +134,8 @@ def test_a_narrow_terminal_shows_fewer_columns_and_names_the_others(folders):
 def test_compare_tells_medians_and_differences_with_intervals(folders, command):
     code, out, _ = command("compare", folders["cheap"], folders["later"], "--by", "pattern")
     assert code == 0
-    assert "8 cells are in both" in out
-    assert "Compared in pairs of the same person, trial and seed: all runs of A" in out
-    assert "drive_time_s [s]" in out
+    told = ("8 cells are in both", "Compared in pairs", "all runs of A", "drive_time_s [s]")
+    assert unnamed(out, *told) == []
     row = next(line for line in out.splitlines() if line.startswith("drive  REQ/REP"))
     assert row.endswith("5.0 (5.0 to 5.0) *")
     assert "1 of 5 measures changed: drive_time_s" in out
@@ -146,7 +144,7 @@ def test_compare_tells_medians_and_differences_with_intervals(folders, command):
 def test_the_same_results_are_told_to_be_identical(folders, command):
     _, out, _ = command("compare", folders["cheap"], folders["cheap"])
     assert out.count("identical") == 8
-    assert "All 5 measures are the same in every pair of runs" in out
+    assert "All 5 measures are the same" in out
 
 
 def test_another_question_other_settings_and_other_configurations_are_told(
@@ -160,8 +158,8 @@ def test_another_question_other_settings_and_other_configurations_are_told(
         cell["config"] = "0"
     (other / "manifest.json").write_text(json.dumps(manifest))
     _, out, _ = command("compare", folders["cheap"], other)
-    assert "Two different studies:\n  A: Which is quicker?\n  B: Which is safer?\n" in out
-    assert "8 cells are in both, 2 of them with another configuration in each" in out
+    assert unnamed(out, "\n  A: Which is quicker?\n  B: Which is safer?\n") == []
+    assert unnamed(out, "8 cells are in both, 2 of them with another configuration") == []
     assert ", --set link.loss=0.1\n" in out
 
 
@@ -182,7 +180,7 @@ def test_a_gate_ends_with_4_if_a_condition_holds(folders, command, conditions, c
 
 def test_runs_that_failed_are_told(folders, command):
     _, out, _ = command("compare", folders["cheap"], folders["unlucky"])
-    assert "1 runs of B failed and take no part" in out
+    assert "1 runs of B failed" in out
 
 
 @pytest.mark.parametrize(

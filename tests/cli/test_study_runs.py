@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from helpers.studies import small_study as kit
+from helpers.wording import unnamed
 
 from dva_sim.cli import study_runs
 from dva_sim.cli.study_runs import RunPace, duration
@@ -75,9 +76,7 @@ def test_a_run_that_fails_when_tried_is_told(tmp_path: Path) -> None:
 
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=falls)
     assert (plan.tried, plan.estimate_s) == (0, None)
-    assert study_runs._time(plan) == (
-        "no estimate of the time: a run that was tried failed: RuntimeError: fell deep"
-    )
+    assert study_runs._time(plan).endswith("RuntimeError: fell deep")  # in one line
 
 
 @pytest.mark.parametrize(
@@ -110,9 +109,8 @@ def test_an_estimate_says_what_it_rests_on(plan: DryRun, words: str) -> None:
 
 def test_a_plan_says_that_a_study_may_stop_early() -> None:
     plan = DryRun(42, 7, 9, 4, 2, 30.0, 0, "")
-    assert study_runs._plan(plan, Path("out")) == (
-        "at most 42 runs in 9 configurations and up to 4 rounds, 7 of them done already; into out"
-    )
+    told = study_runs._plan(plan, Path("out"))
+    assert unnamed(told, "at most 42 runs in 9", "up to 4 rounds", "7 of them", "into out") == []
 
 
 def test_a_probe_spreads_over_the_design() -> None:
@@ -135,8 +133,8 @@ def test_what_is_stopped_names_the_command_that_goes_on(
     code = study_runs.run(RunRequest(study, tmp_path / "out", jobs=1))
     assert code == 130
     *_, what, how = capsys.readouterr().out.splitlines()
-    assert what == "Stopped: interrupted after 7 of 42 runs"
-    assert how == "To go on: dva-sim run 'my study.yaml' --set seed=3"
+    assert "7 of 42 runs" in what
+    assert how.endswith("dva-sim run 'my study.yaml' --set seed=3")
 
 
 def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(

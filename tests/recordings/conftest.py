@@ -1,10 +1,11 @@
-"""Recordings of the short runs, written once."""
+"""Recordings of the short runs, written and read once."""
 
 from pathlib import Path
 
 import pytest
 from recordings.runs import drill, drive, evacuation
 
+from dva_sim.recordings.reading import Opened, read_recording
 from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 
@@ -15,3 +16,9 @@ def folder(tmp_path_factory) -> Path:
     for run in (drive, drill, evacuation):
         write_recording(run(), folder / f"{run.__name__}.mcap", tables=tables_of(run()))
     return folder
+
+
+@pytest.fixture(scope="session")
+def opened(folder: Path) -> dict[str, Opened]:
+    """What is read of each of them, by its name."""
+    return {path.stem: read_recording(path) for path in folder.glob("*.mcap")}

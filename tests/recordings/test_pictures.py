@@ -43,8 +43,8 @@ def drive():
 
 @pytest.fixture(scope="module")
 def film():
-    """Three seconds of the same."""
-    return Film([run_of(**{"horizon_s": 3, "link.delay_s": 0.5})])
+    """A second of the same."""
+    return Film([run_of(**{"horizon_s": 1, "link.delay_s": 0.5})])
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_an_mp4_has_every_frame_at_the_size_of_the_film(film, tmp_path):
     path = tmp_path / "film.mp4"
     write_film(film, path)
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert frames == len(film) == 48
+    assert frames == len(film) == 32
     assert seconds == pytest.approx(frames / 8)
     reader = imageio_ffmpeg.read_frames(str(path))
     meta, first = next(reader), next(reader)
@@ -95,7 +95,7 @@ def test_a_gif_has_every_frame_and_moves(film, tmp_path):
 @pytest.mark.parametrize(
     ("script", "said"),
     [
-        ("echo 'Unknown encoder' >&2; exit 3", "ffmpeg could not write the video: Unknown encoder"),
+        ("echo 'Unknown encoder' >&2; exit 3", "ffmpeg .*: Unknown encoder"),
         ("head -c 100000 >/dev/null; kill -9 $$", "ended with -9"),
         ("cat >/dev/null; echo part > $(eval echo \\${$#}); exit 1", "ended with 1"),
     ],
@@ -124,7 +124,7 @@ def test_a_film_that_fails_leaves_the_old_one_alone(film, tmp_path, monkeypatch)
 def test_without_any_ffmpeg_one_is_told_what_to_install_before_the_run(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ConfigError, match=r"pip install 'dva-sim\[video\]', or install ffmpeg"):
+    with pytest.raises(ConfigError, match=r"'dva-sim\[video\]', or .* ffmpeg"):
         Wanted(video=tmp_path / "film.mp4")
 
 
@@ -144,6 +144,17 @@ def race():
     return [run_of(**{"horizon_s": 20 - 8 * number, "link.delay_s": 0.1}) for number in (0, 1)]
 
 
+@pytest.fixture(scope="module")
+def films(race):
+    """Both in a film, without and with the pictures of their cameras."""
+    return {inset: Film(race, inset) for inset in (False, True)}
+
+
+@pytest.fixture(scope="module")
+def film_of_drill(drill):
+    return Film([drill])
+
+
 def halves(picture):
     half = picture.shape[1] // 2
     return picture[:, :half], picture[:, half:]
@@ -155,8 +166,8 @@ def pixels_of(picture, colour):
 
 
 @pytest.mark.parametrize("inset", [False, True])
-def test_a_side_that_has_ended_stays_as_it_was_at_its_end_with_its_robot_there(race, inset):
-    film = Film(race, inset)
+def test_a_side_that_has_ended_stays_as_it_was_at_its_end_with_its_robot_there(films, inset):
+    film = films[inset]
     (goes_on, ended), (last, still_ended) = halves(film.at(13.0)), halves(film.at(20.0))
     assert np.array_equal(ended, still_ended)
     assert not np.array_equal(goes_on, last)
@@ -169,8 +180,8 @@ def test_a_film_stands_long_enough_at_its_end_to_be_read(film):
     assert all(np.array_equal(frame, frames[-1]) for frame in frames[-24:])
 
 
-def test_below_each_map_stands_how_its_run_ended_from_then_on_and_not_before(race):
-    film = Film(race)
+def test_below_each_map_stands_how_its_run_ended_from_then_on_and_not_before(films):
+    film = films[False]
     told = [scene_lines(ax) for ax in film.figure.axes[:2]]
     film.at(11.9)
     assert [ended.get_text() for _, ended in told] == [
@@ -189,19 +200,17 @@ def scene_lines(ax):
 
 
 @pytest.mark.parametrize("inset", [False, True])
-def test_every_word_of_a_film_is_legible_at_the_width_of_a_page(race, inset):
-    figure = Film(race, inset).figure
+def test_every_word_of_a_film_is_legible_at_the_width_of_a_page(films, inset):
+    figure = films[inset].figure
     assert figure.bbox.width == 840
     words = [t for t in figure.findobj(Text) if t.get_text().strip() and t.get_visible()]
     assert len(words) > 40
     assert min(word.get_fontsize() for word in words) * figure.dpi / 72 >= 9
 
 
-@pytest.mark.parametrize("inset", [False, True])
-@pytest.mark.parametrize("name", ["race", "drill"])
-def test_lines_above_and_below_the_maps_do_not_meet(request, name, inset):
-    runs = request.getfixturevalue(name)
-    figure = Film(runs if isinstance(runs, list) else [runs], inset).figure
+@pytest.mark.parametrize(("name", "inset"), [("race", False), ("race", True), ("drill", True)])
+def test_lines_above_and_below_the_maps_do_not_meet(race, drill, name, inset):
+    figure = Film(race if name == "race" else [drill], inset).figure
     lines = [figure.legends[0], *figure.texts]
     for ax in figure.axes:
         lines += [t for t in (ax.title, ax._left_title, ax._right_title) if t.get_text()]
@@ -242,8 +251,8 @@ def test_between_two_samples_a_body_is_between_two_places():
     assert moments.at("robot-1", -1.0)[1:3] == (0.0, 0.0)
 
 
-def test_fire_darkens_its_room_with_smoke_and_gas_tints_its_own(drill):
-    film = Film([drill])
+def test_fire_darkens_its_room_with_smoke_and_gas_tints_its_own(drill, film_of_drill):
+    film = film_of_drill
     before, after = film.at(1.0).astype(int), film.at(120.0).astype(int)
     axes = film.figure.axes[0]
     fire = next(i for i in drill.incidents if i.kind == "fire")
@@ -372,9 +381,9 @@ def test_the_picture_a_camera_takes_changes_as_the_robot_moves(drive):
 
 
 def test_a_strip_has_a_panel_for_each_moment_with_its_clock(drive):
-    figure = strip([drive], even_times([drive], 5))
+    figure = strip([drive], even_times([drive], 3))
     clocks = [ax.get_title(loc="right") for ax in figure.axes]
-    assert clocks == ["6.0 s", "12.0 s", "18.0 s", "24.0 s", "30.0 s"]
+    assert clocks == ["10.0 s", "20.0 s", "30.0 s"]
     assert len(figure.legends) == 1
 
 
@@ -401,7 +410,7 @@ def test_a_still_shows_the_moment_asked_for(drive, tmp_path):
     late, early = (still([drive], time) for time in (29.0, 1.0))
     assert late.axes[0].get_title(loc="right") == "29.0 s"
     for name, figure in (("late", late), ("early", early)):
-        figure.savefig(tmp_path / f"{name}.png")
+        figure.savefig(tmp_path / f"{name}.png", dpi=40)
     pictures = [
         np.asarray(Image.open(tmp_path / f"{n}.png")).astype(int) for n in ("late", "early")
     ]
@@ -425,10 +434,10 @@ def test_everything_wanted_is_written_and_named(drive, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"video": "film.avi"}, "video should end in .gif or .mp4, not 'film.avi'"),
-        ({"still": "a.gif"}, "still should end in .png, .pdf or .svg"),
-        ({"still": "a.pdf", "camera": "robot-1"}, "still should end in .png or .jpg"),
-        ({"strip": "no/a.png"}, "folder 'no' for the strip does not exist"),
+        ({"video": "film.avi"}, ".gif or .mp4, not 'film.avi'"),
+        ({"still": "a.gif"}, ".png, .pdf or .svg"),
+        ({"still": "a.pdf", "camera": "robot-1"}, ".png or .jpg"),
+        ({"strip": "no/a.png"}, "folder 'no' for the strip"),
         ({"camera": "robot-1"}, "--camera needs --still"),
         ({"inset": True}, "--inset needs --video"),
         ({"at": "3"}, "--at needs --still or --strip"),
@@ -446,10 +455,10 @@ def test_what_cannot_be_drawn_is_said_before_the_run(options, said):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"camera": "robot-9"}, "robot 'robot-9' is unknown; known: robot-1, robot-2"),
-        ({"at": "121"}, "--at 121 is not within the run, which lasts at most 120 s"),
-        ({"at": "-1"}, "--at -1 is not within the run"),
-        ({"at": "nan"}, "--at nan is not within the run"),
+        ({"camera": "robot-9"}, "'robot-9' is unknown; known: robot-1, robot-2"),
+        ({"at": "121"}, "--at 121 .* 120 s"),
+        ({"at": "-1"}, "--at -1 is not"),
+        ({"at": "nan"}, "--at nan is not"),
     ],
 )
 def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, said, tmp_path):
@@ -461,7 +470,7 @@ def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, said, tmp
 
 def test_a_moment_after_the_end_is_refused(drive, tmp_path):
     wanted = Wanted(still=tmp_path / "a.png", at="99")
-    with pytest.raises(ConfigError, match="--at 99 is not within the run, which lasts 30 s"):
+    with pytest.raises(ConfigError, match=r"--at 99 .* 30 s"):
         list(wanted.write([drive]))
 
 

@@ -24,14 +24,13 @@ def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") 
 
 def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_each_other() -> None:
     said = told()
-    assert said.count("operator-1  shall drive robot-1 to event 1") == 2
+    assert said.count("robot-1 to event 1") == 2
     headings = ("req-rep, 100 ms each way", "latest-wins, 100 ms each way", "side by side")
     places = [said.index(f" {heading}") for heading in headings]
     assert places == sorted(places)
-    assert said[places[-1] :].splitlines()[1:] == [
-        "REQ/REP              not confirmed within 12 s",
-        "latest-wins PUB/SUB  not confirmed within 12 s",
-    ]
+    ends = [line.partition("  ") for line in said[places[-1] :].splitlines()[1:]]
+    assert [name for name, _, _ in ends] == ["REQ/REP", "latest-wins PUB/SUB"]
+    assert all("not confirmed within 12 s" in end for _, _, end in ends)
 
 
 def test_a_still_and_a_strip_show_both(tmp_path: Path) -> None:
@@ -45,7 +44,7 @@ def test_a_still_and_a_strip_show_both(tmp_path: Path) -> None:
 
 def test_a_camera_is_one_of_one_run() -> None:
     eye = Wanted(still=Path("eye.png"), camera="robot-1")
-    with pytest.raises(ConfigError, match="--camera shows one run; it does not go with --side-by-"):
+    with pytest.raises(ConfigError, match=r"--camera .*--side-by-side"):
         told(eye)
 
 

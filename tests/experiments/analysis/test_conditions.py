@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
+
+from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
 from dva_sim.experiments.analysis.study_view import keys_of
@@ -20,23 +23,20 @@ def said(factors: dict[str, list[Any]], treatments: dict[str, Any] | None = None
 
 
 def test_nine_seconds_are_enough_for_a_second_each_way() -> None:
-    assert said({"link.delay_s": [0.0, 1.0]}) == (
-        "The time-out is above four round trips and the processing time in every condition "
-        "(8.05 s at most)."
-    )
+    text = said({"link.delay_s": [0.0, 1.0]})
+    assert unnamed(text, "above four round trips", "every condition (8.05 s") == []
 
 
 def test_conditions_with_too_short_a_time_out_are_named() -> None:
     """Needed are 0.45, 0.85 and 1.65 s."""
     text = said({"command.timeout_s": [0.6, 1.2, 2.4], "link.delay_s": [0.05, 0.1, 0.2]})
-    where = "600 ms with round trips of 200 ms, 400 ms; 1.2 s with round trips of 400 ms. There"
-    assert where in text
-    assert text.endswith("In all others it is above.")
+    assert re.search(r"600 ms with .* 200 ms, 400 ms; 1\.2 s with .* 400 ms\. There", text)
+    assert "In all others" in text
 
 
 def test_where_all_are_too_short_there_are_no_others() -> None:
     text = said({"command.timeout_s": [0.3], "link.delay_s": [0.1]})
-    assert "300 ms with round trips of 200 ms" in text
+    assert re.search(r"300 ms with .* 200 ms", text)
     assert "others" not in text
 
 
@@ -50,14 +50,14 @@ def test_what_a_treatment_changes_counts_only_together() -> None:
 def test_each_direction_counts_with_its_own_delay() -> None:
     """0.3 s up and 0.1 s down: 1.65 s, and not 0.85 s."""
     factors: dict[str, list[Any]] = {"command.timeout_s": [1.0], "link.delay_s": [0.1]}
-    assert "with round trips of 400 ms" in said(factors | {"link.up.delay_s": [0.3]})
+    assert "trips of 400 ms" in said(factors | {"link.up.delay_s": [0.3]})
     assert said(factors).startswith("The time-out is above")
 
 
 def test_the_mean_of_a_law_of_processing_counts() -> None:
     law = {"law": "lognormal", "mean_s": 1.0}
     factors: dict[str, list[Any]] = {"place": ["slow"]}
-    assert "900 ms with round trips of 0" in said(
+    assert "trips of 0" in said(
         factors, {"place": {"slow": {"robot.processing_s": law, "command.timeout_s": 0.9}}}
     )
 
@@ -72,7 +72,7 @@ def test_in_a_range_the_farthest_end_counts() -> None:
     ranges["robot.processing_s"] = {"low": 0.02, "high": 0.2}
     study = {"factors": {"point": list(range(8))}, "design": {"sobol": 8, "ranges": ranges}}
     told = timeout_remark({"drive": SCENARIO}, study)
-    assert told.endswith("in every condition (2.6\N{NO-BREAK SPACE}s at most).")
+    assert told.endswith("(2.6\N{NO-BREAK SPACE}s at most).")
 
 
 def test_what_lies_in_a_range_is_said_to_vary() -> None:

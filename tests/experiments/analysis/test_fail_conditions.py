@@ -23,11 +23,20 @@ def later(job):
 
 
 @pytest.fixture(scope="module")
-def sides(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    study = study_in(folder)
-    outs = [run_study(study, folder / e.__name__, jobs=1, episode=e) for e in (cheap, later)]
-    return [Results.load(out) for out in outs]
+def beside(finished, tmp_path_factory):
+    """The small study, and the same of other episodes."""
+
+    def run(episode):
+        folder = tmp_path_factory.mktemp("study")
+        out = run_study(study_in(folder), folder / "out", jobs=1, episode=episode)
+        return Results.load(finished), Results.load(out)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def sides(beside):
+    return beside(later)
 
 
 @pytest.fixture(scope="module")
@@ -204,27 +213,16 @@ def never_arrives(job):
     return tables
 
 
-def against(folder, episode):
-    """The small study, and the same with other episodes."""
-    study = study_in(folder)
-    return Comparison(
-        *(
-            Results.load(run_study(study, folder / e.__name__, jobs=1, episode=e))
-            for e in (cheap, episode)
-        )
-    )
-
-
-def test_runs_that_crashed_in_the_second_folder_do_not_pass(tmp_path):
-    comparison = against(tmp_path, crashes)
-    with pytest.raises(ConfigError, match=r"in part drive 8 runs of the second folder failed"):
+def test_runs_that_crashed_in_the_second_folder_do_not_pass(beside):
+    comparison = Comparison(*beside(crashes))
+    with pytest.raises(ConfigError, match=r"drive 8 runs .* failed"):
         comparison.judge("p95(drive_time_s) > 1.05x")
     drive = comparison.judge("missing(drive_time_s) > 0 %")[0]
     assert (drive.first, drive.second, drive.holds) == (0.0, 1 / 3, True)
 
 
-def test_pairs_with_a_value_on_both_sides_are_held_against_each_other(tmp_path):
-    comparison = against(tmp_path, never_arrives)
+def test_pairs_with_a_value_on_both_sides_are_held_against_each_other(beside):
+    comparison = Comparison(*beside(never_arrives))
     drive = comparison.judge("mean(drive_time_s) > +0.9 s")[0]
     assert drive.second - drive.first == pytest.approx(1.0)
     assert drive.missing == (0.0, 1 / 3)

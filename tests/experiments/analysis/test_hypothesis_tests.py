@@ -68,9 +68,7 @@ def test_the_table_of_hypotheses_sets_claims_beside_what_came_out(runs):
     )
     row = hypothesis_table(judged(declared, runs).tested).rows[0]
     assert row[0] == "h: Waiting costs."
-    assert row[1].endswith(
-        "profile default, one-way delay 1\N{NO-BREAK SPACE}s: above 2.0\N{NO-BREAK SPACE}s"
-    )
+    assert row[1].endswith("delay 1\N{NO-BREAK SPACE}s: above 2.0\N{NO-BREAK SPACE}s")
     assert row[5] == "✓ held"
 
 

@@ -2,6 +2,7 @@ import math
 
 import pytest
 from helpers.studies import small_study as kit
+from helpers.wording import unnamed
 
 from dva_sim.cli import study_runs
 from dva_sim.experiments.analysis.tuning import tune
@@ -124,14 +125,14 @@ def test_other_persons_or_phones_are_told_and_their_descriptions_are_none_of_it(
     edit(
         "people", "operators.yaml", "crossover_rad_s:", "crossover_rad_s: {median: 9, spread: 0} #"
     )
-    assert remark() == "tuned with other persons: run 'dva-sim tune study' again"
+    assert unnamed(remark(), "other persons:", "'dva-sim tune study'") == []
     edit("phones", "default.yaml", "accelerometer:", "accelerometer: perfect #")
-    assert remark() == "tuned with other persons and phones: run 'dva-sim tune study' again"
+    assert unnamed(remark(), "other persons and phones:", "'dva-sim tune study'") == []
     assert dry_run(study_in(tmp_path, "tuning=untuned"), tmp_path / "out", jobs=1).remark == ""
 
 
 def test_a_study_that_was_not_tuned_says_how(tmp_path):
-    with pytest.raises(ConfigError, match=r"is not there; 'dva-sim tune study' makes it"):
+    with pytest.raises(ConfigError, match="'dva-sim tune study' makes"):
         cell_grid.cells(study_in(tmp_path))
     assert cell_grid.cells(study_in(tmp_path, "tuning=untuned"))
 
@@ -144,7 +145,7 @@ def test_values_made_by_another_rule_are_refused(tmp_path):
 
 def test_a_level_that_was_not_tuned_is_refused(tmp_path):
     kept(tmp_path)
-    with pytest.raises(ConfigError, match="nothing was tuned for pattern pub-sub"):
+    with pytest.raises(ConfigError, match="tuned for pattern pub-sub"):
         cell_grid.cells(study_in(tmp_path, "pattern=pub-sub"))
 
 
@@ -154,13 +155,13 @@ def test_nothing_is_chosen_from_runs_that_failed(tmp_path):
             raise RuntimeError("fell into a hole")
         return bowl(job)
 
-    with pytest.raises(DvaSimError, match="6 runs failed, so nothing is chosen"):
+    with pytest.raises(DvaSimError, match="6 runs failed"):
         tune(study_in(tmp_path), tmp_path / "trials", jobs=1, episode=unlucky)
 
 
 def test_a_measure_that_no_run_has_is_refused(tmp_path):
     study = study_in(tmp_path, old="measure: drive_time_s", new="measure: mood")
-    with pytest.raises(ConfigError, match="measure 'mood' is unknown; known: "):
+    with pytest.raises(ConfigError, match="'mood' is unknown; known: "):
         tune(study, tmp_path / "trials", jobs=1, episode=bowl)
 
 

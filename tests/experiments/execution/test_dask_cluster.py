@@ -15,6 +15,7 @@ import pytest
 from helpers.processes import patience
 from helpers.studies import small_study as kit
 from helpers.studies.dask_cluster import DaskCluster
+from helpers.wording import unnamed
 
 from dva_sim.experiments.execution import dask_cluster, scheduling
 from dva_sim.experiments.execution.executors import WorkersLost
@@ -79,9 +80,8 @@ def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 1.0)
     with pytest.raises(WorkersLost) as lost:
         run_study(study, out, scheduler=address, episode=kit.slower, progress=kill_it)
-    told = f"the scheduler at {address} is gone; {seen[-1]} of {kit.RUNS} runs are kept; "
-    told += "the same command goes on from there, also with another --scheduler or with --jobs"
-    assert str(lost.value) == told
+    names = (address, f"{seen[-1]} of {kit.RUNS} runs are kept", "--scheduler", "--jobs")
+    assert unnamed(lost.value, *names) == []
     assert capfd.readouterr() == ("", "")  # the library's logs are not let through
     begun: list[int] = []
     run_study(study, out, jobs=1, episode=kit.cheap, progress=lambda done, _: begun.append(done))
@@ -96,13 +96,11 @@ def test_a_cluster_nobody_works_or_answers_in_is_told(
     with dask_cluster.DaskCluster(dask.address) as place:
         place.look_after(is_idle=True)
         monkeypatch.setattr(dask_cluster, "_WORKERS_S", 0.0)
-        with pytest.raises(
-            WorkersLost, match=r"has had no workers for 0 s: start some with 'dask w"
-        ):
+        with pytest.raises(WorkersLost, match=r"no workers .* 0 s: .* 'dask w"):
             place.look_after(is_idle=True)
         monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.2)
         dask.scheduler.send_signal(signal.SIGSTOP)
-        with pytest.raises(WorkersLost, match="has not answered for 0 s"):
+        with pytest.raises(WorkersLost, match=r"not answered for 0 s"):
             place.look_after(is_idle=True)
         place.look_after(is_idle=False)  # something has come meanwhile
         dask.scheduler.send_signal(signal.SIGCONT)
@@ -116,7 +114,7 @@ def test_a_worker_with_another_profile_near_it_is_refused(
     phones.mkdir(parents=True)
     (phones / "default.yaml").write_text("filter: none\n")
     dask.add_worker(cwd=tmp_path / "elsewhere")
-    with pytest.raises(DvaSimError, match=r"worker tcp://.* has fingerprint \w+ \(here \w+\)"):
+    with pytest.raises(DvaSimError, match=r"tcp://.* fingerprint \w+ \(here \w+\)"):
         run_study(
             kit.study_in(tmp_path), tmp_path / "out", scheduler=dask.address, episode=kit.cheap
         )
@@ -140,7 +138,7 @@ def test_a_scheduler_that_is_not_there_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.01)
-    with pytest.raises(ConfigError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9: nothing"):
+    with pytest.raises(ConfigError, match=r"tcp://127\.0\.0\.1:9: nothing"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
 
@@ -194,7 +192,7 @@ def test_a_run_in_a_thread_of_a_worker_has_its_limit_too() -> None:
 
     with ThreadPoolExecutor(1) as executor:
         assert executor.submit(is_quick).result() == "done"
-        with pytest.raises(RunTooLong, match=r"took more than its 0\.05 s"):
+        with pytest.raises(RunTooLong, match=r" 0\.05 s"):
             executor.submit(stalls).result()
         assert executor.submit(is_quick).result() == "done"
 

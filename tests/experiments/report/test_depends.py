@@ -1,7 +1,10 @@
 """What an answer depends on, told beside it."""
 
+import re
+
 import pytest
 from helpers.studies import synthetic_results
+from helpers.wording import unnamed
 
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
@@ -24,10 +27,8 @@ def told(found):
 
 def test_persons_are_simulated_and_how_they_steer_is_said(tmp_path):
     persons = told(reading(tmp_path).answer.depends)["Persons"]
-    assert persons == (
-        "6 simulated, 2 trials each; no human took part. They steer by the strategy adaptive; "
-        "with another, not tried here, the difference may be smaller or larger."
-    )
+    parts = ("6 simulated, 2 trials each", "no human", "strategy adaptive", "not tried here")
+    assert unnamed(persons, *parts) == []
 
 
 def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
@@ -35,10 +36,7 @@ def test_who_chooses_to_move_and_wait_did_so_for_a_share_of_the_time(tmp_path):
     for row in rows:
         row["move_and_wait_share"] = 0.86 if row["pattern"] == "req-rep" else 0.54
     persons = told(reading(tmp_path, rows).answer.depends)["Persons"]
-    assert (
-        "strategy adaptive, here by moving and waiting for 86 % of the time under REQ/REP and "
-        "54 % of the time under latest-wins PUB/SUB;" in persons
-    )
+    assert re.search(r"86 % of .* under REQ/REP and 54 % of .* under latest-wins PUB/SUB", persons)
 
 
 def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
@@ -46,13 +44,13 @@ def test_other_models_of_persons_say_how_far_the_effect_reaches(tmp_path):
     claims = {"robustness": synthetic_results.CLAIMS["robustness"]}
     found = reading(tmp_path, study=claims, robustness=synthetic_results.repeat_rows(effects))
     persons = told(found.answer.depends)["Persons"]
-    assert "the sign is the same in 2 of 3, and the difference at 1 s runs from" in persons
+    assert unnamed(persons, "same in 2 of 3", "difference at 1 s") == []
 
 
 def test_the_answer_under_the_other_settings_that_were_run_stands_beside_it(tmp_path):
     found = reading(tmp_path)
     settings = told(found.answer.depends)["Settings"]
-    assert settings.startswith("The answer is for profile default. The difference at a one-way")
+    assert "for profile default." in settings
     assert "with profile dissertation." in settings
     assert settings.endswith("Not varied: phone default.")
 

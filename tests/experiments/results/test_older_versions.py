@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from helpers.paths import TESTS
 from helpers.processes.command_line import call
+from helpers.wording import unnamed
 
 import dva_sim
 
@@ -47,7 +48,7 @@ def test_older_results_are_shown(older):
 def test_the_columns_of_older_results_are_explained(older):
     done = call("show", older, "--columns")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "detection until somebody is on scene" in done.stdout
+    assert "somebody is on scene" in done.stdout
 
 
 @pytest.mark.system  # draws
@@ -71,7 +72,7 @@ def test_older_results_are_exported(older, tmp_path):
 def test_an_older_unfinished_study_is_shown_as_far_as_it_is(unfinished):
     done = call("show", unfinished)
     assert done.returncode == 0
-    assert "Partial: 4 of 4 runs are done." in done.stdout
+    assert "Partial: 4 of 4 runs" in done.stdout
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -81,7 +82,7 @@ def test_an_older_study_is_not_gone_on_with_by_another_program(older, finished):
     done = call("run", older / "study.yaml", "-o", older)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert "the program or its libraries were changed; give another folder with -o" in line
+    assert unnamed(line, "libraries were changed", "-o") == []
 
 
 def test_an_older_recording_is_played(older):

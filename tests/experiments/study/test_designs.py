@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies.small_study import STUDY, cheap, study_in, write_study
+from helpers.wording import unnamed
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
@@ -132,7 +133,7 @@ def test_a_mistake_in_a_file_of_rows_is_told_with_line_and_column(tmp_path, csv,
 def test_a_file_of_rows_in_another_encoding_is_told_with_line_and_column(tmp_path):
     (tmp_path / "rows.csv").write_bytes("link.delay_s\n0.5\nzw\u00f6lf\n".encode("latin-1"))
     told = complaint(tmp_path, ONLY_PATTERN + "design: {csv: rows.csv}\n")
-    assert told == "rows.csv:3:3: is not text in UTF-8"
+    assert unnamed(told, "rows.csv:3:3: ", "UTF-8") == []
 
 
 @pytest.mark.parametrize(
@@ -255,7 +256,7 @@ def test_rows_with_too_many_levels_for_a_grid_are_points(tmp_path):
 
 def test_what_the_design_varies_cannot_be_set_beside_it(tmp_path):
     told = complaint(tmp_path, ONLY_PATTERN + ROWS, "link.loss=0.2")
-    assert told == "--set link.loss=0.2: 'link.loss' is varied by the design; change 'design'"
+    assert unnamed(told, "--set link.loss=0.2: ", "'link.loss'", "change 'design'") == []
 
 
 def test_the_size_of_a_design_can_be_set(tmp_path):
@@ -270,7 +271,7 @@ def test_an_answer_may_run_over_a_range(tmp_path):
 
 def test_repeats_need_the_full_grid(tmp_path):
     text = STUDY.replace(DELAYS, "") + SAMPLED.format(kind="sobol") + "robustness: {sets: 2}\n"
-    assert "robustness needs all levels with each other" in complaint(tmp_path, text)
+    assert "robustness needs all levels" in complaint(tmp_path, text)
 
 
 @pytest.mark.parametrize(
@@ -311,7 +312,7 @@ def test_of_many_points_only_the_ends_of_the_ranges_are_rehearsed(tmp_path):
 def test_an_end_of_a_range_that_no_point_meets_must_be_valid_too(tmp_path):
     """Two points with seed 3 lie below 0.9, as the scenario wants it; others might not."""
     text = ONLY_PATTERN + "design: {sobol: 2, ranges: {link.loss: [0, 0.95]}}\n"
-    assert "study.yaml:14:29: link.loss: should be at most" in complaint(tmp_path, text)
+    assert "study.yaml:14:29: link.loss: " in complaint(tmp_path, text)
 
 
 @pytest.mark.parametrize(
@@ -335,14 +336,14 @@ def test_a_grid_of_ten_thousand_cells_is_taken_and_a_larger_one_is_refused(tmp_p
     delays = [i / 1000 for i in range(51)]
     taken = study_in(tmp_path, text=grid.replace("{delays}", str(delays[:50])))
     assert size(taken) == 10_000
-    told = "study.yaml:5:1: a part would have 10,200 cells, more than 10,000; have fewer levels"
-    assert complaint(tmp_path, grid.replace("{delays}", str(delays))).startswith(told)
+    told = complaint(tmp_path, grid.replace("{delays}", str(delays)))
+    assert unnamed(told, "study.yaml:5:1: ", "10,200 cells", "10,000") == []
 
 
 def test_too_many_points_with_too_many_levels_are_refused(tmp_path):
     text = PLAIN + "design: {sobol: 65536, ranges: {link.loss: [0, 0.1]}}\n"
     told = complaint(tmp_path, text)
-    assert told.startswith("study.yaml:15:1: a part would have 262,144 cells, more than 65,536")
+    assert unnamed(told, "study.yaml:15:1: ", "262,144 cells", "65,536") == []
 
 
 def test_an_item_of_a_list_can_be_a_factor(tmp_path):

@@ -73,15 +73,15 @@ def test_it_answers_its_question(fresh, tmp_path):
 
 
 def test_nothing_is_overwritten(fresh):
-    with pytest.raises(ConfigError, match=r"mine\.yaml is there already; give another name"):
+    with pytest.raises(ConfigError, match=r"mine\.yaml is there already"):
         write_study("mine.yaml")
-    with pytest.raises(DvaSimError, match="cannot be written: No such file or directory"):
+    with pytest.raises(DvaSimError, match="No such file"):
         write_study("nowhere/mine")
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", ".yaml"])
 def test_a_study_without_a_name_is_not_written(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="is no name for a study"):
+    with pytest.raises(ConfigError, match="is no name"):
         write_study(name)
     assert list(tmp_path.iterdir()) == []

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
+from helpers.wording import unnamed
 
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study import cell_grid, registration
@@ -87,7 +88,7 @@ def test_a_study_changed_after_its_registration_is_exploratory_and_says_in_what(
 def test_a_scenario_changed_after_the_registration_is_found(tmp_path):
     path = registered(tmp_path)
     (tmp_path / "one.yaml").write_text("description: one robot\nhorizon_s: 61\n")
-    assert load_study(path).status.why == ("other than registered: scenarios, cells",)
+    assert unnamed(load_study(path).status.why, "scenarios", "cells") == []
 
 
 def test_a_file_that_a_scenario_names_counts_by_its_content_wherever_it_lies(tmp_path):
@@ -106,15 +107,16 @@ def test_words_may_be_mended_after_the_registration_and_are_told(tmp_path):
     path = registered(tmp_path)
     path.write_text(CLAIMED.replace("Which is quicker?", "Which one is quicker?"))
     status = load_study(path).status
-    told = "its question was worded otherwise when it was registered: 'Which is quicker?'"
-    assert (status.kind, status.why) == ("confirmatory", (told,))
+    assert status.kind == "confirmatory"
+    assert unnamed(status.why, "question", "Which is quicker?") == []
 
 
 def test_the_registration_of_another_study_is_told(tmp_path):
     beside(registered(tmp_path)).rename(tmp_path / "other.registration.yaml")
     (tmp_path / "other.yaml").write_text(CLAIMED)
     status = load_study(tmp_path / "other.yaml").status
-    assert (status.kind, status.why) == ("confirmatory", ("it was registered as 'study'",))
+    assert status.kind == "confirmatory"
+    assert "'study'" in status.why[0]
 
 
 def test_settings_make_it_exploratory_with_the_luck_of_the_study(tmp_path):
@@ -163,7 +165,7 @@ def test_an_edited_registration_is_found(tmp_path):
     path.write_text(CLAIMED.replace("margin: 1.0", "margin: 0.0"))
     status = load_study(path).status
     assert status.kind == "exploratory"
-    assert status.why == ("the registration was edited: its hash is not that of what it fixes",)
+    assert unnamed(status.why, "edited", "hash") == []
 
 
 def test_a_registration_with_a_hash_of_ones_own_choice_is_found(tmp_path):
@@ -188,14 +190,14 @@ def test_what_was_registered_is_not_confirmed_by_fewer_runs(tmp_path):
     broken = {"status": status, "failures": [{"error": "ValueError: no"}]}
     found = status_of(broken)
     assert (found.kind, found.reproducible) == ("exploratory", True)
-    assert found.why == ("1 of the registered runs failed",)
+    assert found.why[0].startswith("1 of the registered runs")
     assert status_of(broken | {"failures": []}).kind == "confirmatory"
 
 
 def test_runs_that_took_too_long_are_others_on_another_machine():
     found = status_of({"status": {}, "failures": [{"error": "RunTooLong: took more than its 1 s"}]})
     assert (found.kind, found.reproducible) == ("declared", False)
-    assert found.why == ("1 of the runs met their limit of time; on another machine others may",)
+    assert unnamed(found.why, "1 of the runs", "another machine") == []
 
 
 def test_another_program_is_told_and_changes_nothing_else(tmp_path, monkeypatch):
@@ -204,7 +206,7 @@ def test_another_program_is_told_and_changes_nothing_else(tmp_path, monkeypatch)
     status = load_study(path).status
     assert status.kind == "confirmatory"
     (remark,) = status.why
-    assert remark.startswith("the program is another than when it was registered (")
+    assert remark.startswith("the program is another")
     assert remark.endswith("another)")
 
 
@@ -218,14 +220,14 @@ def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypa
     told = status_of(manifest)
     assert told.kind == "confirmatory"
     (remark,) = told.why
-    assert remark.startswith("what judges its hypotheses has changed since it was registered (")
+    assert remark.startswith("what judges its hypotheses")
     assert remark.endswith("now another)")
 
 
 def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):
     path = registered(tmp_path)
     first = load_registration(load_yaml(beside(path)))
-    with pytest.raises(ConfigError, match="is there already; --again replaces it"):
+    with pytest.raises(ConfigError, match="--again"):
         register(load_study(path))
     path.write_text(CLAIMED.replace("margin: 1.0", "margin: 0.5"))
     register(load_study(path), again=True)
@@ -234,7 +236,7 @@ def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):
     assert second.seed != first.seed
     status = load_study(path).status
     assert status.kind == "confirmatory"
-    assert status.why == ("it had been registered once before, otherwise",)
+    assert "registered once before" in status.why[0]
 
 
 def test_the_same_study_makes_the_same_registration(tmp_path):
@@ -246,7 +248,7 @@ def test_the_same_study_makes_the_same_registration(tmp_path):
 
 
 def test_nothing_is_registered_without_a_hypothesis(tmp_path):
-    with pytest.raises(ConfigError, match="nothing to register: no key 'hypotheses'"):
+    with pytest.raises(ConfigError, match="no key 'hypotheses'"):
         register(study_in(tmp_path))
 
 
@@ -256,7 +258,7 @@ def test_the_larger_version_is_registered_on_its_own(tmp_path):
     assert load_study(path, version="full").status.kind == "confirmatory"
     status = load_study(path).status
     assert status.kind == "exploratory"
-    assert status.why == ("6 persons were registered, not 3",)
+    assert unnamed(status.why, "6 persons", "not 3") == []
 
 
 @pytest.mark.parametrize("design_", ["{latin_hypercube: 4, ranges: {link.loss: [0, 0.1]}}"])
@@ -271,7 +273,7 @@ def test_points_of_a_registered_design_follow_from_the_registration(tmp_path, de
 def test_a_range_with_an_end_that_is_not_valid_cannot_be_registered(tmp_path):
     design_ = "design: {sobol: 2, ranges: {link.loss: [0, 0.95]}}\n"
     path = write_study(tmp_path, CLAIMED + design_)
-    with pytest.raises(ConfigError, match=r"link\.loss: should be at most"):
+    with pytest.raises(ConfigError, match=r"link\.loss: "):
         register(load_study(path))
     assert not beside(path).exists()
 
@@ -287,7 +289,7 @@ def test_a_registration_is_checked_with_the_study_beside_it(tmp_path):
     assert (problem.line, problem.text) == (9, "other than registered: hypotheses")
     path.unlink()
     (problem,) = check_file(beside(path)).problems
-    assert problem.text == "study.yaml, the study it is of, is not beside it"
+    assert problem.text.startswith("study.yaml, ")
 
 
 def test_a_registration_is_no_study_of_its_own(tmp_path, monkeypatch):

@@ -112,7 +112,7 @@ def test_repeats_that_cannot_be_meant_are_refused(tmp_path, old, new, told):
 def test_a_band_of_an_unknown_trait_is_refused(tmp_path):
     study = kit.study_in(tmp_path, text=kit.REPEATED)
     (tmp_path / "bands.yaml").write_text("bands: {patience: [1, 2]}\n")
-    with pytest.raises(ConfigError, match="no trait 'patience'; traits: perceptual_delay_s, "):
+    with pytest.raises(ConfigError, match="'patience'; traits: perceptual_delay_s, "):
         cell_grid.jobs(study)
 
 

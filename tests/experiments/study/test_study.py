@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 from helpers.studies.small_study import STUDY, study_in, write_study
+from helpers.wording import unnamed
 
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
@@ -23,14 +24,13 @@ def test_a_study_keeps_its_factors_and_levels_in_order(tmp_path):
 
 
 def test_a_mistyped_key_is_told_with_line_and_column(tmp_path):
-    assert complaint(tmp_path, "persons", "person") == (
-        "study:3:1: unknown key 'person'; did you mean 'persons'?"
-    )
+    told = complaint(tmp_path, "persons", "person")
+    assert unnamed(told, "study:3:1: ", "'person'", "'persons'") == []
 
 
 def test_a_factor_that_no_scenario_knows_is_told_where_the_study_names_it(tmp_path):
     told = complaint(tmp_path, "link.delay_s: [", "link.dely_s: [0, 1]\n  link.delay_s: [")
-    assert told.startswith("study:7:3: unknown key 'link.dely_s'; did you mean 'delay_s'?")
+    assert unnamed(told, "study:7:3: ", "'link.dely_s'", "'delay_s'") == []
 
 
 def test_an_impossible_level_is_told_where_the_study_names_it(tmp_path):
@@ -41,7 +41,7 @@ def test_an_impossible_level_is_told_where_the_study_names_it(tmp_path):
 
 def test_a_wrong_reference_is_told_where_the_study_makes_it(tmp_path):
     told = complaint(tmp_path, "strategy: oracle", "strategy: oracel")
-    assert told.startswith("study:11:17: operator 'oracel' is unknown")
+    assert unnamed(told, "study:11:17: ", "'oracel'") == []
 
 
 @pytest.mark.parametrize(
@@ -358,7 +358,7 @@ def test_the_small_version_leaves_out_what_was_claimed_of_levels_it_leaves_out(t
 
 def test_a_small_version_must_keep_the_answer(tmp_path):
     path = write_study(tmp_path, STUDY + "quick: {pattern: [pub-sub]}\n")
-    with pytest.raises(ConfigError, match="in the small version: 'req-rep' is not a level"):
+    with pytest.raises(ConfigError, match="small version: 'req-rep'"):
         load_study(path)
 
 
@@ -371,7 +371,7 @@ def test_the_small_version_of_the_main_study_asks_the_same_of_the_same_persons()
 
 
 def test_a_study_without_a_larger_version_says_so(tmp_path):
-    with pytest.raises(ConfigError, match=r"study\.yaml:1:1: has no larger version: no key 'full'"):
+    with pytest.raises(ConfigError, match=r"study\.yaml:1:1: .* 'full'"):
         load_study(write_study(tmp_path), version="full")
 
 

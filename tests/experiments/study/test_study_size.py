@@ -27,7 +27,7 @@ def test_more_runs_than_anybody_can_wait_for_are_refused_without_being_listed(
 
 
 def test_a_pilot_and_a_stopping_rule_and_a_tuning_are_no_way_round_it(tmp_path):
-    with pytest.raises(ConfigError, match="a pilot of 1000000 persons: there would be"):
+    with pytest.raises(ConfigError, match="pilot of 1000000 persons: "):
         load_study(write_study(tmp_path), pilot=1_000_000)
     stop = "stop: {half_width: 1, comparison: answer, batch_persons: 2, most_persons: 999999}\n"
     with pytest.raises(ConfigError, match=r"study\.yaml:22:\d+: there would be"):
@@ -54,6 +54,6 @@ def test_what_takes_a_while_is_told(tmp_path, monkeypatch, capsys):
     path = str(write_study(tmp_path))
     study_runs.plan(RunRequest(path, tmp_path / "out"))
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "Checking every configuration before the first run ..."
+    assert lines[1].startswith("Checking every configuration")
     assert lines[-4].startswith("9/9 configurations")
-    assert lines[-3] == "Making the list of up to 42 runs ..."
+    assert "up to 42 runs" in lines[-3]

