@@ -42,8 +42,8 @@ def stopped_at(module: str, words: list[str], ignored: bool = False) -> tuple[in
     [
         ("dva_sim.cli", ["list"]),
         ("dva_sim.kernel.rare_collection", LIVE),
-        ("dva_sim.live", LIVE),
-        ("zmq", LIVE),
+        pytest.param("dva_sim.live", LIVE, marks=pytest.mark.system),
+        pytest.param("zmq", LIVE, marks=pytest.mark.system),
     ],
 )
 def test_a_command_that_is_stopped_while_it_is_loaded_says_so_in_a_line(module, words):

@@ -229,6 +229,7 @@ print(seen.count("call"))
 """
 
 
+@pytest.mark.system
 def test_after_a_limit_in_a_thread_a_profiler_still_gets_on() -> None:
     """In a process of its own: it would not come back, and nothing after it either."""
     done = patience.run([sys.executable, "-c", LOOKED_AT], capture_output=True, text=True)

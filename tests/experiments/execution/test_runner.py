@@ -136,6 +136,7 @@ def test_a_runner_that_was_killed_goes_on_and_ends_with_the_same_bytes(tmp_path,
     assert "robustness.parquet" in again
 
 
+@pytest.mark.system
 def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, started):
     study, out = kit.write_study(tmp_path), tmp_path / "stopped"
     runner = started(study, out)
