@@ -5,8 +5,6 @@ from __future__ import annotations
 import inspect
 import json
 import re
-import subprocess
-import sys
 
 import pytest
 from helpers.paths import ROOT
@@ -87,14 +85,6 @@ def test_what_is_listed_of_plugins_is_what_is_there_though_nothing_is_loaded():
         for name, kind in plugins.shipped.items():
             if name not in plugins.hidden:
                 assert listed[name].split()[0] == inspect.getdoc(kind).split()[0]
-
-
-def test_a_list_loads_no_model_and_no_figure():
-    code = "import sys; from dva_sim.cli import call; call(['list']); print(*sys.modules)"
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = told.stdout.splitlines()[-1].split()
-    assert "dva_sim.cli.names" in loaded
-    assert not {"numpy", "dva_sim.simulation", "dva_sim.experiments", "dva_sim.core"} & {*loaded}
 
 
 def test_every_kind_that_is_listed_can_be_completed():

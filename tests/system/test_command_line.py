@@ -59,14 +59,8 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 HEAVY = {"matplotlib", "scipy", "numpy", "pymunk", "duckdb", "lxml", "shapely", "PIL", "pandas"}
-HEAVY |= {
-    "rich",
-    "distributed",
-    "dask",
-    "multiprocessing",
-    "pydantic",
-    "dva_sim.kernel.config",
-}  # of the models
+HEAVY |= {"rich", "distributed", "dask", "multiprocessing", "pydantic", "dva_sim.kernel.config"}
+HEAVY |= {"dva_sim.simulation", "dva_sim.experiments", "dva_sim.core"}
 
 
 def test_help_and_lists_import_nothing_heavy() -> None:

@@ -56,9 +56,3 @@ def test_a_study_is_registered_run_and_told_apart_from_what_was_only_tried(tmp_p
     assert refused.returncode == 2
     assert "holds another study" in refused.stderr
     assert call("check", "mine.registration.yaml", cwd=tmp_path).returncode == 1
-
-
-def test_a_new_study_is_valid_at_once(tmp_path: Path) -> None:
-    assert "dva-sim run mine.yaml" in call("new", "mine", cwd=tmp_path).stdout
-    assert call("check", "mine.yaml", cwd=tmp_path).stdout.startswith("mine.yaml: study: valid")
-    assert call("new", "mine", cwd=tmp_path).returncode == 2
