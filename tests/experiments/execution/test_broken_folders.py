@@ -126,6 +126,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> N
         "from dva_sim.experiments.execution.dry_run import dry_run\n"
         "print(dry_run(study, folder / 'out').done)\n"
     )
+    kit.write_study(tmp_path)
     (tmp_path / "empty").mkdir()
     can = shutil.which("unshare") and patience.run(
         [*words, "mount", "-t", "tmpfs", "none", tmp_path / "empty"], capture_output=True
