@@ -304,7 +304,7 @@ EXPECTED = {
     ),
     "dva-sim run req-rep-vs-pub-sub --scheduler tcp://HOST:8786": NOT_HERE,
     "dva-sim run req-rep-vs-pub-sub --set persons=4 --set replications=2 --jobs 2 -o small": (
-        Expected(planned(MAIN), DRY)
+        Expected(planned(MAIN), DRY, dear=True)
     ),
     "dva-sim report small --pdf": Expected(
         written("small/report.html", "small/report.pdf"), given=two_results, dear=True
@@ -328,7 +328,7 @@ EXPECTED = {
     ),
     "dva-sim run req-rep-vs-pub-sub --set site.map=map.yaml --set link.trace_up=drive.up "
     "--set link.trace_down=drive.down --set persons=4 --set replications=1 -o mine": Expected(
-        planned(MAIN), DRY, a_map_and_a_trace
+        planned(MAIN), DRY, a_map_and_a_trace, dear=True
     ),
     # Who should go?
     "dva-sim episode patrol-shift --set dispatch.policy=hazard_team": Expected(
@@ -378,13 +378,13 @@ EXPECTED = {
     ),
     "dva-sim validate operators -o evidence": NOT_HERE,
     "dva-sim run absolute-vs-differential": Expected(
-        planned("Should tilting set the turn rate"), DRY
+        planned("Should tilting set the turn rate"), DRY, dear=True
     ),
     "dva-sim check operator agents/operators/stepwise.py:Stepwise": Expected(
         told("1 operator: 1 valid")
     ),
     # The network
-    "dva-sim run what-delays-a-command": Expected(planned("What delays a command"), DRY),
+    "dva-sim run what-delays-a-command": Expected(planned("What delays a command"), DRY, dear=True),
     "dva-sim episode drive-to-event --set link.loss=0.05 --set link.delay_s=0.1 "
     "--set pattern=req-rep": Expected(told("req-rep, 100 ms each way", "confirmed by robot-1")),
     "dva-sim validate network --quick": NOT_HERE,
