@@ -15,8 +15,9 @@ export function RequestTable({ rows, chosen, onChoose, older }) {
   useEffect(() => {
     if (atEnd.current && box.current) box.current.scrollTop = box.current.scrollHeight;
   }, [rows]);
-  const onScroll = () => {
-    const { scrollTop, scrollHeight, clientHeight } = /** @type {HTMLDivElement} */ (box.current);
+  const onScroll = (/** @type {Event} */ event) => {
+    // Not the ref: the last scroll event may arrive after the page was left.
+    const { scrollTop, scrollHeight, clientHeight } = /** @type {HTMLDivElement} */ (event.target);
     atEnd.current = scrollHeight - scrollTop - clientHeight < NEAR_PX;
   };
   const reachable = rows.some((row) => row.n === chosen)

@@ -20,8 +20,9 @@ export function RobotLog({ robot }) {
   useEffect(() => {
     if (atEnd.current && box.current) box.current.scrollTop = box.current.scrollHeight;
   }, [shown]);
-  const onScroll = () => {
-    const { scrollTop, scrollHeight, clientHeight } = /** @type {HTMLDivElement} */ (box.current);
+  const onScroll = (/** @type {Event} */ event) => {
+    // Not the ref: the last scroll event may arrive after the page was left.
+    const { scrollTop, scrollHeight, clientHeight } = /** @type {HTMLDivElement} */ (event.target);
     atEnd.current = scrollHeight - scrollTop - clientHeight < NEAR_PX;
   };
   return html`<section class="panel robot-log" aria-label="Log">
