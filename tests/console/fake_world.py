@@ -35,6 +35,9 @@ from fake_scene import LINK, Scene, Walker  # noqa: E402
 from dva_sim.cameras.frames import ALIVE, Picture, pack  # noqa: E402
 
 STEP = 0.02  # [s]
+SILENT_S = (
+    5.0  # without input; longer than in the real world, for pages may be late on a busy machine
+)
 
 
 class Seat:
@@ -355,8 +358,8 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
     def _apply(self, seat: Seat, now: float) -> None:
         if seat.phase != "driving":
             return
-        if now - seat.heard > 0.3 and (seat.wanted != (0.0, 0.0)):
-            seat.alert = "stopped: no input for 300 ms"
+        if now - seat.heard > SILENT_S and (seat.wanted != (0.0, 0.0)):
+            seat.alert = "stopped: no input"
             self.halt(seat, "held")
             self.tell(seat)
             return

@@ -8,12 +8,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import pytest
 from helpers.console.chromium import chromium
 from helpers.processes.patience import PATIENCE_S, becomes
-from playwright.sync_api import Browser, BrowserContext, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Dialog, Page, expect
 
 ENDED = "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_REFUSED"  # with a page's world
 FAKE = Path(__file__).parents[1] / "fake_world.py"
@@ -101,9 +101,9 @@ def own_world(tmp_path: Path) -> Iterator[Callable[..., tuple[World, Callable[[]
         yield start
 
 
-@pytest.fixture(scope="module", name="browser")  # while it runs, no other test has asyncio
+@pytest.fixture(scope="session", name="browser")  # while it runs, no other test has asyncio
 def _browser() -> Iterator[Browser]:
-    """The system's own."""
+    """The system's own, one for all files: these tests have a process of their own."""
     with chromium() as browser:
         yield browser
 
@@ -117,6 +117,7 @@ class Visit:
 
     def __init__(self, context: BrowserContext) -> None:
         self.context = context
+        context.set_default_timeout(MOMENT_MS)
         self.errors: list[str] = []
 
     def open(self, address: str, page: str = "map") -> Page:
@@ -131,11 +132,90 @@ class Visit:
         tab = self.context.new_page()
         tab.on("pageerror", lambda error: self.errors.append(str(error)))
         tab.on("console", lambda said: self._note(said.type, said.text))
+        tab.on("dialog", self._refuse)
         return tab
+
+    def _refuse(self, dialog: Dialog) -> None:
+        """Nothing of ours opens one, so that a script in a label would be noticed."""
+        self.errors.append(f"a dialog: {dialog.message}")
+        dialog.dismiss()
 
     def _note(self, kind: str, text: str) -> None:
         if kind == "error" and not any(why in text for why in ENDED):
             self.errors.append(text)
+
+
+GO = """async (page) => {
+  const {selection} = await import('/static/js/store.js');
+  selection.value = null;
+  for (const name of [page === 'main' ? 'devices' : 'main', page]) {
+    location.hash = `#/${name}`;
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+  }
+  document.activeElement.blur(); }"""
+
+
+class Tabs:
+    """Pages that tests of a file share: loading one costs more than what most of them do with it.
+
+    Each test has its page built afresh, from what the browser has loaded already.
+    """
+
+    def __init__(self, browser: Browser) -> None:
+        self._browser = browser
+        self._known: dict[tuple[str, int], tuple[Visit, Page]] = {}
+
+    def open(
+        self,
+        address: str,
+        page: str = "map",
+        width: int = 1280,
+        height: int = 800,
+        scheme: Literal["light", "dark"] = "light",
+        person: int = 1,
+    ) -> Page:
+        """Show a page of the world at an address to somebody, in a window of a size."""
+        if (address, person) not in self._known:
+            visit = Visit(self._browser.new_context())
+            self._known[address, person] = visit, visit.open(address, page)
+        _, tab = self._known[address, person]
+        tab.set_viewport_size({"width": width, "height": height})
+        tab.emulate_media(color_scheme=scheme)
+        tab.evaluate(GO, page)
+        expect(tab.locator("main.page:not(.waiting)")).to_be_visible()
+        return tab
+
+    def take_errors(self) -> list[str]:
+        """Return what went wrong since the last call."""
+        found = [error for visit, _ in self._known.values() for error in visit.errors]
+        for visit, _ in self._known.values():
+            visit.errors.clear()
+        return found
+
+    def close(self) -> None:
+        """Load each page again when it is wanted next."""
+        for visit, _ in self._known.values():
+            visit.context.close()
+        self._known.clear()
+
+
+@pytest.fixture(scope="module")
+def _tabs(browser: Browser, fake: Callable[..., World]) -> Iterator[Tabs]:
+    """Closed before the worlds end."""
+    tabs = Tabs(browser)
+    yield tabs
+    tabs.close()
+
+
+@pytest.fixture
+def shared(_tabs: Tabs, request: pytest.FixtureRequest) -> Iterator[Callable[..., Page]]:
+    """Opens pages that are shared with the file's other tests; a failed test leaves none."""
+    failed = request.session.testsfailed
+    yield _tabs.open
+    errors = _tabs.take_errors()
+    if errors or request.session.testsfailed > failed:
+        _tabs.close()
+    assert errors == []
 
 
 @pytest.fixture
@@ -146,7 +226,6 @@ def visits(browser: Browser) -> Iterator[Callable[..., Visit]]:
     def visit(width: int = 1280, height: int = 800, **options: Any) -> Visit:
         size: Any = {"width": width, "height": height}
         made.append(Visit(browser.new_context(viewport=size, **options)))
-        made[-1].context.set_default_timeout(MOMENT_MS)
         return made[-1]
 
     yield visit

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import expect
 
-SMALL = ("--robots", "2", "--people", "3")
+SMALL = ("--robots", "2", "--people", "3", "--site", "office-block")
 
 
 @pytest.fixture

@@ -9,11 +9,13 @@ import pytest
 from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
+WORLD = ("--robots", "3", "--people", "4", "--site", "office-block")
+
 
 @pytest.fixture
-def page(fake, visit) -> Iterator[Page]:
+def page(fake, shared) -> Iterator[Page]:
     """The page for driving, its robot taken and started."""
-    page = visit.open(fake("--robots", "3", "--people", "4").drive, "drive")
+    page = shared(fake(*WORLD).drive, "drive")
     listen(page)
     take(page)
     yield page
@@ -24,7 +26,9 @@ def page(fake, visit) -> Iterator[Page]:
 def listen(page: Page) -> None:
     """Note what the page sends to steer by."""
     page.evaluate(
-        """() => { window.sent = []; const send = WebSocket.prototype.send;
+        """() => { const heard = window.sent; window.sent = [];
+        if (heard) return;
+        const send = WebSocket.prototype.send;
         WebSocket.prototype.send = function (text) {
           window.sent.push(JSON.parse(text)); return send.call(this, text); }; }"""
     )
@@ -180,7 +184,10 @@ def test_keys_of_a_slider_spring_back_too(page: Page) -> None:
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
 
 
-def test_a_second_key_does_not_wait_for_the_next_turn_to_send(page: Page) -> None:
+def test_a_second_key_does_not_wait_for_the_next_turn_to_send(fake, visit) -> None:
+    page = visit.open(fake(*WORLD).drive, "drive")
+    listen(page)
+    take(page)
     page.clock.install()
     page.clock.pause_at("2030-01-01")
     page.evaluate(
@@ -190,8 +197,9 @@ def test_a_second_key_does_not_wait_for_the_next_turn_to_send(page: Page) -> Non
     page.clock.run_for(15)  # a turn is 40 ms
 
     assert [(line["speed"], line["turn"]) for line in inputs(page)] == [(1, 0), (1, 1)]
-    page.evaluate("window.dispatchEvent(new Event('blur'))")
     page.clock.resume()
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
 
 
 PADS = "pad => { window.pad = pad; navigator.getGamepads = () => [window.pad]; }"
@@ -283,8 +291,8 @@ def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(p
     assert becomes(lambda: any(line["held"] for line in inputs(page)[count:]))
 
 
-def test_two_robots_get_the_same_hand_under_two_patterns(fake, visit) -> None:
-    page = visit.open(fake("--robots", "3", "--people", "4").drive, "drive")
+def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "drive")
     listen(page)
     page.get_by_role("button", name="robot-2 beside it").click()
     page.get_by_label("Pattern of robot-1").select_option("req-rep")

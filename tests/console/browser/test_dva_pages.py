@@ -149,6 +149,20 @@ def test_the_log_is_filtered_searched_paused_and_cleared(fake, visit) -> None:
     expect(page.get_by_role("button", name="Request 1", exact=True)).to_have_count(0)
 
 
+def test_leaving_the_log_while_it_scrolls_is_no_fault(fake, visits) -> None:
+    visit = visits(360, 500)
+    page = visit.open(fake().drive, "main")
+    expect(page.get_by_role("table", name="Requests").get_by_role("button")).not_to_have_count(0)
+
+    page.evaluate(
+        """async () => { for (let n = 0; n < 10; n += 1)
+        for (const name of ['devices', 'main']) {
+          location.hash = `#/${name}`;
+          await new Promise((done) => requestAnimationFrame(() => setTimeout(done))); } }"""
+    )
+    assert visit.errors == []
+
+
 def test_lines_are_chosen_by_keys_alone(fake, visit) -> None:
     page = visit.open(fake().drive, "main")
     page.get_by_role("button", name="Pause log").click()

@@ -9,7 +9,7 @@ import pytest
 from helpers.processes.patience import becomes
 from playwright.sync_api import Page, WebSocketRoute, expect
 
-SMALL = ("--robots", "2", "--people", "6")
+SMALL = ("--robots", "2", "--people", "3", "--site", "office-block")
 
 
 def change(page: Page, rewrite) -> None:
