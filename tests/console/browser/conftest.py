@@ -185,8 +185,10 @@ class Tabs:
         expect(tab.locator("main.page:not(.waiting)")).to_be_visible()
         return tab
 
-    def take_errors(self) -> list[str]:
-        """Return what went wrong since the last call."""
+    def rest(self) -> list[str]:
+        """Draw nothing until a page is wanted again; return what went wrong since the last time."""
+        for _, tab in self._known.values():
+            tab.evaluate("location.hash = '#/main'")
         found = [error for visit, _ in self._known.values() for error in visit.errors]
         for visit, _ in self._known.values():
             visit.errors.clear()
@@ -212,7 +214,7 @@ def shared(_tabs: Tabs, request: pytest.FixtureRequest) -> Iterator[Callable[...
     """Opens pages that are shared with the file's other tests; a failed test leaves none."""
     failed = request.session.testsfailed
     yield _tabs.open
-    errors = _tabs.take_errors()
+    errors = _tabs.rest()
     if errors or request.session.testsfailed > failed:
         _tabs.close()
     assert errors == []

@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from helpers.console.keyboard_driver import Driver
+from helpers.console.keyboard_driver import NEAR_FIRE, Driver
 from helpers.processes.patience import PATIENCE_S, becomes
 from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import Page, expect
@@ -45,9 +45,8 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
 
 def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
     """A console in which the policy asks first, and its address."""
-    console = programs.start(
-        *("console", "--no-open", "--port", "0", "--set", "dispatch.mode=ask_first", *words)
-    )
+    asks = ("--set", "dispatch.mode=ask_first", *NEAR_FIRE)
+    console = programs.start("console", "--no-open", "--port", "0", *asks, *words)
     console.wait_to_say("Console:")
     return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
 

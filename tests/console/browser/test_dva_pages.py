@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 import zmq
 from helpers.console.accessibility import faults
+from helpers.console.keyboard_driver import FIRE
 from helpers.network.free_ports import free_port
 from helpers.processes.patience import PATIENCE_S
 from helpers.processes.programs import Program, Programs, all_gone_after
@@ -30,6 +31,10 @@ from dva_sim.simulation.scenario import build, load
 DVA, STRANGER = "02:00:00:00:00:01", "02:00:00:0A:00:01"
 HOSTILE = "<img src=x onerror=alert(1)>"
 SLOW = 250 * PATIENCE_S
+
+
+WORLD = ("--robots", "3", "--people", "4", "--site", "office-block")
+QUICK = "--set", "request.timeout_s=0.5"
 
 
 @pytest.fixture
@@ -80,21 +85,22 @@ class Peer:
         self._context.destroy(linger=0)
 
 
-@pytest.fixture
-def joined(programs: Programs) -> Iterator[tuple[Peer, str]]:
+@pytest.fixture(scope="module")
+def joined(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Peer, str]]:
     """Somebody's program beside a console on real links, and the address of that."""
-    console, address = started(programs, "--links", "real")
-    peer = Peer(console)
-    yield peer, address
-    peer.close()
+    for programs in all_gone_after(tmp_path_factory.mktemp("joined")):
+        console, address = started(programs, "--links", "real")
+        peer = Peer(console)
+        yield peer, address
+        peer.close()
 
 
 def row(page: Page, text: str) -> object:
     return page.get_by_role("table", name="Requests").get_by_role("row").filter(has_text=text)
 
 
-def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, visit) -> None:
-    page = visit.open(fake().drive, "main")
+def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "main")
 
     page.get_by_role("button", name="Request 3", exact=True).click()
     message = page.get_by_role("region", name="Message")
@@ -105,8 +111,8 @@ def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, visit) -
     expect(row(page, "held by ana").first).to_have_class(re.compile("refused"))
 
 
-def test_what_was_no_message_is_shown_with_line_and_column(fake, visit) -> None:
-    page = visit.open(fake().drive, "main")
+def test_what_was_no_message_is_shown_with_line_and_column(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "main")
 
     page.get_by_role("button", name="Request 10", exact=True).click()
     message = page.get_by_role("region", name="Message")
@@ -114,8 +120,8 @@ def test_what_was_no_message_is_shown_with_line_and_column(fake, visit) -> None:
     expect(message.locator("mark")).to_have_text("<MessageID>x10</MessageID>")
 
 
-def test_a_hostile_label_is_text_in_log_and_table(fake, visit) -> None:
-    page = visit.open(fake().drive, "main")
+def test_a_hostile_label_is_text_in_log_and_table(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "main")
 
     expect(row(page, HOSTILE).first).to_be_visible()
     page.get_by_role("link", name="Devices").click()
@@ -123,8 +129,8 @@ def test_a_hostile_label_is_text_in_log_and_table(fake, visit) -> None:
     assert page.locator("table img").count() == 0
 
 
-def test_the_log_is_filtered_searched_paused_and_cleared(fake, visit) -> None:
-    page = visit.open(fake().drive, "main")
+def test_the_log_is_filtered_searched_paused_and_cleared(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "main")
     table = page.get_by_role("table", name="Requests")
     expect(table.get_by_role("button")).not_to_have_count(0)
 
@@ -151,7 +157,7 @@ def test_the_log_is_filtered_searched_paused_and_cleared(fake, visit) -> None:
 
 def test_leaving_the_log_while_it_scrolls_is_no_fault(fake, visits) -> None:
     visit = visits(360, 500)
-    page = visit.open(fake().drive, "main")
+    page = visit.open(fake(*WORLD).drive, "main")
     expect(page.get_by_role("table", name="Requests").get_by_role("button")).not_to_have_count(0)
 
     page.evaluate(
@@ -163,8 +169,8 @@ def test_leaving_the_log_while_it_scrolls_is_no_fault(fake, visits) -> None:
     assert visit.errors == []
 
 
-def test_lines_are_chosen_by_keys_alone(fake, visit) -> None:
-    page = visit.open(fake().drive, "main")
+def test_lines_are_chosen_by_keys_alone(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "main")
     page.get_by_role("button", name="Pause log").click()
     last = page.get_by_role("table", name="Requests").get_by_role("button").last
     number = int(last.inner_text())
@@ -177,7 +183,7 @@ def test_lines_are_chosen_by_keys_alone(fake, visit) -> None:
 
 
 def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit) -> None:
-    page = visit.open(fake().look, "main")
+    page = visit.open(fake(*WORLD).look, "main")
 
     expect(page.get_by_role("table", name="Requests").get_by_role("button")).not_to_have_count(0)
     expect(page.get_by_role("button", name="Stop server")).to_be_disabled()
@@ -188,8 +194,8 @@ def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit) -> No
     expect(page.get_by_role("button", name="Add fake device")).to_have_count(0)
 
 
-def test_a_fake_device_is_added_by_keys_alone(own_world, visit) -> None:
-    page = visit.open(own_world()[0].drive, "devices")
+def test_a_fake_device_is_added_by_keys_alone(fake, shared) -> None:
+    page = shared(fake(*WORLD).drive, "devices")
 
     page.get_by_role("button", name="Add fake device").press("Enter")
     page.get_by_label("Label", exact=True).focus()
@@ -201,10 +207,10 @@ def test_a_fake_device_is_added_by_keys_alone(own_world, visit) -> None:
     expect(page.get_by_role("row", name="ghost fake")).to_be_visible()
 
 
-def test_on_modelled_links_a_stopped_server_is_silent_and_starts_again(
+def test_on_modelled_links_a_stopped_server_is_silent_starts_again_and_permits_are_revoked(
     programs: Programs, visit
 ) -> None:
-    page = visit.open(started(programs)[1], "main")
+    page = visit.open(started(programs, *QUICK)[1], "main")
     state = page.get_by_role("status", name="Server state")
 
     expect(state).to_contain_text("Listens on")
@@ -220,9 +226,7 @@ def test_on_modelled_links_a_stopped_server_is_silent_and_starts_again(
     expect(state).to_contain_text(":5600")
     expect(row(page, "RegMsg").first).to_be_visible()
 
-
-def test_a_permission_is_revoked_from_the_table(programs: Programs, visit) -> None:
-    page = visit.open(started(programs)[1], "drive")
+    page.get_by_role("link", name="Drive").click()
     page.get_by_role("button", name="Take control").click()
     expect(page.get_by_role("button", name="Release control")).to_be_enabled()
 
@@ -286,7 +290,7 @@ def test_on_real_links_the_port_is_closed_and_opened(joined: tuple[Peer, str], v
 def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
     programs: Programs, visit
 ) -> None:
-    _, address = started(programs)
+    _, address = started(programs, *QUICK)
     page = visit.open(address, "devices")
     page.get_by_role("button", name="Add fake device").click()
     page.get_by_label("Label", exact=True).fill("ghost")
@@ -314,30 +318,46 @@ def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
 def elsewhere(programs: Programs) -> tuple[str, Program]:
     """The address of a DVA that runs elsewhere, and its program; robots and guards know it."""
     dva = f"127.0.0.1:{free_port()}"
-    first = programs.start("live", "hands-on", "--only", "dva", "--dva", dva, "--for", "1000")
-    programs.start("live", "hands-on", "--only", "world", "--dva", dva, "--for", "1000")
+    words = ("--dva", dva, "--for", "1000", "--set", FIRE)
+    first = programs.start("live", "hands-on", "--only", "dva", *words)
+    programs.start("live", "hands-on", "--only", "world", *words)
     return dva, first
 
 
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 360)])
-def test_an_attached_console_shows_what_messages_tell_and_the_rest_as_unknown(
-    programs: Programs, elsewhere: tuple[str, Program], visits, scheme: str, width: int
+def test_an_attached_console_shows_what_messages_tell_the_rest_as_unknown_and_offers_no_decision(
+    programs: Programs, elsewhere: tuple[str, Program], visit
 ) -> None:
     dva, first = elsewhere
-    _, address = started(programs, "--dva", dva)
-    page = visits(width, 800, color_scheme=scheme).open(address, "devices")
+    page = visit.open(started(programs, "--dva", dva)[1], "devices")
+
+    def is_fit_for_everybody() -> bool:
+        for scheme, width in (("light", 1280), ("dark", 360)):
+            page.emulate_media(color_scheme=scheme)
+            page.set_viewport_size({"width": width, "height": 800})
+            assert faults(page) == []
+        return True
 
     robot = page.get_by_role("row", name=re.compile("robot-1"))
     expect(robot).to_contain_text("Idle", timeout=SLOW)
     expect(robot).to_contain_text("unknown")
-    assert faults(page) == []
+    assert is_fit_for_everybody()
     expect(page.get_by_role("status", name="Link")).to_contain_text(f"attached to {dva}")
     for name in ("Drive", "Network", "Robots"):
         expect(page.get_by_role("link", name=name)).to_have_count(0)
     page.get_by_role("link", name="Main").click()
     expect(page.get_by_role("status", name="Server state")).to_contain_text("answers")
     expect(page.get_by_text("is unknown here", exact=False)).to_be_visible()
-    assert faults(page) == []
+    assert is_fit_for_everybody()
+
+    page.get_by_role("link", name="Events").click()
+    expect(page.get_by_text("The DVA lets this console look.")).to_be_visible(timeout=SLOW)
+    expect(page.get_by_role("region", name="Alarms")).to_contain_text("Fire", timeout=SLOW)
+    expect(page.get_by_role("button", name=re.compile("^Seen"))).to_have_count(0)
+    expect(page.get_by_role("button", name="Take over")).to_have_count(0)
+    page.get_by_role("link", name="Map").click()
+    page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
+    card = page.get_by_role("complementary", name="What is chosen")
+    expect(card).to_contain_text(re.compile(r"temperature \d"), timeout=SLOW)
 
     first.process.kill()
     expect(page.get_by_role("alert")).to_contain_text("does not answer", timeout=SLOW)
@@ -352,7 +372,7 @@ def supervised(programs: Programs, tmp_path: Path) -> tuple[str, Path]:
     """The address of a DVA elsewhere that lets a control room supervise, and the keys for it."""
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), id_of("control-room", 1)])
-    words = ("--dva", dva, "--keys", str(keys), "--for", "1000")
+    words = ("--dva", dva, "--keys", str(keys), "--for", "1000", "--set", FIRE)
     roles = ("--set", "dva.control_rooms={control-room-1: supervise}")
     asks = ("--set", "dispatch.mode=ask_first")
     programs.start("live", "hands-on", "--only", "dva", *words, *roles, *asks)
@@ -399,19 +419,3 @@ def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
     console.send(signal.SIGINT)
     assert console.ends() == 0
     assert verify(audit).is_ended
-
-
-def test_whom_the_dva_lets_look_alone_reads_sensors_and_is_offered_no_decision(
-    programs: Programs, elsewhere: tuple[str, Program], visit
-) -> None:
-    dva, _ = elsewhere
-    page = visit.open(started(programs, "--dva", dva)[1], "events")
-
-    expect(page.get_by_text("The DVA lets this console look.")).to_be_visible(timeout=SLOW)
-    expect(page.get_by_role("region", name="Alarms")).to_contain_text("Fire", timeout=SLOW)
-    expect(page.get_by_role("button", name=re.compile("^Seen"))).to_have_count(0)
-    expect(page.get_by_role("button", name="Take over")).to_have_count(0)
-    page.get_by_role("link", name="Map").click()
-    page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1").click()
-    card = page.get_by_role("complementary", name="What is chosen")
-    expect(card).to_contain_text(re.compile(r"temperature \d"), timeout=SLOW)

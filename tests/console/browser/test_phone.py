@@ -9,7 +9,7 @@ from helpers.console.browser_phone import FORWARDS, HIDE, LEFT_FORWARDS, Hand
 from helpers.processes.patience import becomes
 from playwright.sync_api import expect
 
-WORLD = ("--phones", "--robots", "3", "--people", "4")
+WORLD = ("--phones", "--robots", "3", "--people", "4", "--site", "office-block")
 SCREEN = {"width": 360, "height": 740, "has_touch": True, "is_mobile": True}
 
 
@@ -93,31 +93,31 @@ def test_samples_are_raw_numbered_and_bear_the_phones_own_times(hand) -> None:
     assert asked["ios"] is False
 
 
-@pytest.mark.parametrize(
-    ("interruption", "why"),
-    [
-        (HIDE, "hidden"),
-        ("window.dispatchEvent(new Event('pagehide'))", "left"),
-        ("document.dispatchEvent(new Event('freeze'))", "left"),
-        ("screen.orientation.dispatchEvent(new Event('change'))", "turned"),
-        ("window.dispatchEvent(new Event('orientationchange'))", "turned"),
-        ("window.dispatchEvent(new Event('blur'))", "focus"),
-    ],
+INTERRUPTIONS = (
+    (HIDE, "hidden"),
+    ("window.dispatchEvent(new Event('pagehide'))", "left"),
+    ("screen.orientation.dispatchEvent(new Event('change'))", "turned"),
+    ("document.dispatchEvent(new Event('freeze'))", "left"),
+    ("window.dispatchEvent(new Event('orientationchange'))", "turned"),
+    ("window.dispatchEvent(new Event('blur'))", "focus"),
 )
-def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(
-    hand, interruption, why
-) -> None:
+
+
+def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(hand) -> None:
     hand.drive()
-    hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
-    hand.page.evaluate(interruption)
-    expect(hand.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
-    hand.alert(why)
-    assert hand.sent("gone")
-    hand.page.wait_for_timeout(400)  # samples go on, and drive nothing
-    assert not driving(hand)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.00m/s")
-    assert len(hand.sent("start")) == 1
+    for count, (interruption, why) in enumerate(INTERRUPTIONS, start=1):
+        hand.tilt(FORWARDS)
+        expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
+        hand.page.evaluate(interruption)
+        expect(hand.page.get_by_role("button", name="Start", exact=True)).to_be_enabled()
+        hand.alert(why)
+        assert len(hand.sent("gone")) == count, interruption
+        hand.page.wait_for_timeout(400)  # samples go on, and drive nothing
+        assert not driving(hand)
+        expect(hand.status("Speed")).to_have_text("Speed: 0.00m/s")
+        assert len(hand.sent("start")) == count, interruption
+        hand.tap("Start")
+        expect(hand.page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
 
 
 def test_a_sensor_that_falls_silent_ends_the_drive(hand) -> None:
@@ -290,19 +290,19 @@ def test_of_two_phones_the_second_is_told_who_drives(hand, world, visits) -> Non
     other.leave()
 
 
-@pytest.mark.parametrize("screen", ["Main", "Authentication", "Calibration", "Instructions"])
-def test_emergency_stop_works_from_every_screen_once_a_robot_is_chosen(hand, screen) -> None:
+def test_emergency_stop_works_from_every_screen_once_a_robot_is_chosen(hand) -> None:
     stop = hand.page.get_by_role("button", name="Emergency stop")
     expect(stop).to_be_disabled()
     expect(hand.page.get_by_text("register first")).to_be_visible()
     hand.register()
     hand.take()
     expect(hand.page.get_by_text("is in your hands")).to_be_visible()
-    hand.go(screen)
-    with hand.page.expect_response("**/api/emergency") as answer:
-        stop.tap()
-    assert answer.value.json()["ok"]
-    assert '"robots":[0]' in (answer.value.request.post_data or "")
+    for screen in ("Main", "Authentication", "Calibration", "Instructions"):
+        hand.go(screen)
+        with hand.page.expect_response("**/api/emergency") as answer:
+            stop.tap()
+        assert answer.value.json()["ok"], screen
+        assert '"robots":[0]' in (answer.value.request.post_data or ""), screen
 
 
 def test_without_a_sensor_the_stick_keys_and_gamepad_steer(world, visits) -> None:

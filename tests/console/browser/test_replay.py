@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers.console.accessibility import faults
@@ -31,31 +33,54 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture
-def audited(folder: Path, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def audited(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording with an audit log, of which it holds the end alone."""
-    log = AuditLog(tmp_path / "audit.sqlite")
+    place = tmp_path_factory.mktemp("audited")
+    log = AuditLog(place / "audit.sqlite")
     actions = ("begin", "take", "acknowledge", "end")
     entries = [
         AuditEntry(time_s=t, at_utc="", author="ana", action=a) for t, a in enumerate(actions)
     ]
     rows = [(row.time_s, plain_row(row)) for row in log.append(entries)[1:]]
     log.close()
-    write_recording(drill(), tmp_path / "audited.mcap", audit=rows)
-    return tmp_path / "audited.mcap"
+    write_recording(drill(), place / "audited.mcap", audit=rows)
+    return place / "audited.mcap"
 
 
-@pytest.fixture
-def address(tmp_path: Path) -> Iterator[Callable[..., str]]:
-    """Starts a command and gives the address that it prints."""
-    for programs in all_gone_after(tmp_path):
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., str]]:
+    """Starts a command, once for all tests, and gives the address that it prints."""
+    for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
 
-        def start(programs: Programs, *words: str | Path) -> str:
+        @functools.cache
+        def start(*words: str | Path, programs: Programs = programs) -> str:
             console = programs.start(*words, "--no-open", "--port", "0")
             console.wait_to_say("Console:")
             return re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
 
-        yield lambda *words, programs=programs: start(programs, *words)
+        yield start
+
+
+@pytest.fixture
+def drilled(address, shared, folder: Path) -> Callable[..., Page]:
+    """Opens a page of the drill, which stands at its beginning."""
+
+    def opened(name: str = "map", **options: Any) -> Page:
+        page = shared(address("replay", folder / "drill.mcap", "--console"), name, **options)
+        expect(page.get_by_role("region", name="Replay")).to_be_visible()
+        pause, play = (
+            page.get_by_role("button", name=word, exact=True) for word in ("Pause", "Play")
+        )
+        expect(pause.or_(play)).to_be_visible()
+        if pause.is_visible():
+            pause.click()
+        expect(play).to_be_visible()
+        page.get_by_role("slider", name="Replay position").press("Home")
+        assert becomes(lambda: shown(page) == 0)
+        return page
+
+    return opened
 
 
 def shown(page: Page) -> float:
@@ -74,13 +99,13 @@ def choose(page: Page, name: str) -> None:
             return True
         return False
 
-    becomes(chosen)
+    assert becomes(chosen)
 
 
-def test_a_recording_plays_stands_and_jumps(address, visit, folder: Path) -> None:
-    page = visit.open(address("replay", folder / "drill.mcap", "--console"))
-    expect(page.get_by_role("region", name="Replay")).to_be_visible()
-    becomes(lambda: shown(page) >= 1)
+def test_a_recording_plays_stands_and_jumps(drilled) -> None:
+    page = drilled()
+    page.get_by_role("button", name="Play").click()
+    assert becomes(lambda: shown(page) >= 1)
 
     page.get_by_role("button", name="Pause").click()
     expect(page.get_by_role("button", name="Play")).to_be_visible()
@@ -89,45 +114,43 @@ def test_a_recording_plays_stands_and_jumps(address, visit, folder: Path) -> Non
         page.get_by_role("button", name="Next event").click()
         return shown(page) >= 70  # by then something has been reported
 
-    becomes(goes_on)
+    assert becomes(goes_on)
     there = shown(page)
     expect(page.get_by_role("region", name="Events").locator("li")).not_to_have_count(0)
 
     page.get_by_role("slider", name="Replay position").focus()
     page.keyboard.press("Home")
-    becomes(lambda: shown(page) == 0)
+    assert becomes(lambda: shown(page) == 0)
     expect(page.get_by_text("Nothing has been reported.")).to_be_visible()
     page.get_by_role("slider", name="Replay speed").focus()
     page.keyboard.press("End")
     page.get_by_role("button", name="Play").click()
-    becomes(lambda: shown(page) > there)
+    assert becomes(lambda: shown(page) > there)
 
 
-def test_nothing_in_it_can_be_told_to_act(address, visit, folder: Path) -> None:
-    page = visit.open(address("replay", folder / "drill.mcap", "--console"))
-    expect(page.get_by_role("region", name="Replay")).to_be_visible()
+def test_nothing_in_it_can_be_told_to_act(drilled) -> None:
+    page = drilled()
 
     expect(page.get_by_role("button", name="Emergency stop")).to_have_count(0)
-    expect(page.get_by_role("link", name="Drive")).to_have_count(0)
+    for name in ("Drive", "Audit"):  # it has no audit log
+        expect(page.get_by_role("link", name=name)).to_have_count(0)
     page.goto(page.url.partition("#")[0] + "#/drive")
     expect(page.get_by_role("button", name="Take control")).to_have_count(0)
     expect(page.get_by_role("region", name="Map")).to_be_visible()
 
 
-def test_two_people_see_the_same_moment(address, visits, folder: Path) -> None:
-    where = address("replay", folder / "drill.mcap", "--console")
-    one, two = visits().open(where), visits().open(where)
-    one.get_by_role("button", name="Pause").click()
+def test_two_people_see_the_same_moment(drilled) -> None:
+    one, two = drilled(person=1), drilled(person=2)
     one.get_by_role("button", name="Next event").click()
 
-    becomes(lambda: shown(one) == shown(two) > 0)
+    assert becomes(lambda: shown(one) == shown(two) > 0)
+    two.get_by_role("button", name="Play").click()
+    one.get_by_role("button", name="Pause").click()
     expect(two.get_by_role("button", name="Play")).to_be_visible()
 
 
-def test_a_line_of_the_story_leads_to_its_moment(address, visit, folder: Path) -> None:
-    page = visit.open(address("replay", folder / "drill.mcap", "--console"))
-    page.get_by_role("button", name="Pause").click()
-    page.get_by_role("link", name="Story").click()
+def test_a_line_of_the_story_leads_to_its_moment(drilled) -> None:
+    page = drilled("story")
     later = page.get_by_role("list", name="Still to come").get_by_role("button")
     text = later.nth(2).inner_text()
     later.nth(2).click()
@@ -135,13 +158,11 @@ def test_a_line_of_the_story_leads_to_its_moment(address, visit, folder: Path) -
     told = page.get_by_role("list", name="Told so far")
     expect(told.get_by_role("button").last).to_have_text("".join(text.split("\n")))
     minutes, seconds = map(int, re.search(r"0:(\d\d):(\d\d)", text).groups())
-    becomes(lambda: shown(page) == 60 * minutes + seconds)
+    assert becomes(lambda: shown(page) == 60 * minutes + seconds)
 
 
-def test_the_log_holds_what_was_asked_up_to_the_moment(address, visit, folder: Path) -> None:
-    page = visit.open(address("replay", folder / "drill.mcap", "--console"))
-    page.get_by_role("button", name="Pause").click()
-    page.get_by_role("link", name="Main").click()
+def test_the_log_holds_what_was_asked_up_to_the_moment(drilled) -> None:
+    page = drilled("main")
     rows = page.get_by_role("table", name="Requests").locator("tbody tr")
     position = page.get_by_role("slider", name="Replay position")
     position.focus()
@@ -153,10 +174,8 @@ def test_the_log_holds_what_was_asked_up_to_the_moment(address, visit, folder: P
 
 
 def test_the_camera_shows_a_picture_with_its_age(address, visit, folder: Path) -> None:
-    page = visit.open(address("replay", folder / "drive.mcap", "--console"))
+    page = visit.open(address("replay", folder / "drive.mcap", "--console"), "robots/robot-1")
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("link", name="Robots").click()
-    page.get_by_role("link", name="robot-1").click()
     page.get_by_role("slider", name="Replay position").focus()
     page.keyboard.press("End")
 
@@ -167,9 +186,8 @@ def test_the_camera_shows_a_picture_with_its_age(address, visit, folder: Path) -
 def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
     address, visit, folder: Path
 ) -> None:
-    where = address("console", "--results", folder)
     page = visit.tab()
-    page.goto(where)
+    page.goto(address("console", "--results", folder))
     rows = page.get_by_role("table", name="Recordings").locator("tbody tr")
     expect(rows).to_have_count(2)
     choose(page, "drill.mcap")
@@ -181,22 +199,17 @@ def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
         page.get_by_role("link", name="Report of the study").click()
     expect(opened.value.get_by_role("heading", name="The report")).to_be_visible()
     assert opened.value.title() == "R"
+    opened.value.close()
 
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious_and_all_fits(
-    address, visits, folder: Path, scheme: str, width: int
-) -> None:
-    page = visits(width, 800, color_scheme=scheme).tab()
-    page.goto(address("console", "--results", folder))
-    choose(page, "drill.mcap")
-    for name in ("Map", "Main", "Devices", "Robots", "Events", "Story", "Recordings"):
-        link = page.get_by_role("link", name=name, exact=True)
-        link.click()
-        expect(link).to_have_attribute("aria-current", "page")
-        assert faults(page) == []
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for scheme, width in (("light", 360), ("dark", 1280)):
+        page.set_viewport_size({"width": width, "height": 800})
+        page.emulate_media(color_scheme=scheme)
+        for name in ("Map", "Main", "Devices", "Robots", "Events", "Story", "Recordings"):
+            link = page.get_by_role("link", name=name, exact=True)
+            link.click()
+            expect(link).to_have_attribute("aria-current", "page")
+            assert faults(page) == [], (name, width)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, name
 
 
 def test_the_audit_log_of_a_recording_is_shown_with_its_chain(
@@ -211,10 +224,3 @@ def test_the_audit_log_of_a_recording_is_shown_with_its_chain(
     expect(state).to_contain_text("The chain holds")
     expect(page.get_by_text("It is kept in audited.mcap.")).to_be_visible()
     assert faults(page) == []
-
-
-def test_a_recording_without_an_audit_log_has_no_page_of_it(address, folder: Path, visit) -> None:
-    page = visit.open(address("replay", folder / "drill.mcap", "--console"), "events")
-
-    expect(page.get_by_role("link", name="Story")).to_be_visible()
-    expect(page.get_by_role("link", name="Audit")).to_have_count(0)

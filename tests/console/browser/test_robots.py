@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
 
 import pytest
 from helpers.console.accessibility import faults
@@ -20,6 +20,11 @@ QUIET = "--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operat
 @pytest.fixture(scope="module")
 def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Programs]:
     yield from all_gone_after(tmp_path_factory.mktemp("consoles"))
+
+
+@pytest.fixture
+def own_programs(tmp_path: Path) -> Iterator[Programs]:
+    yield from all_gone_after(tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +46,14 @@ def started(programs: Programs, *words: str) -> tuple[str, str]:
     return drive, look
 
 
-def opened(visit: Any, address: str, robot: str = "robot-1") -> Page:
-    """The windows of a robot, once the world is there."""
-    page = visit.tab()
-    page.goto(f"{address}#/robots/{robot}")
+@pytest.fixture
+def opened(shared, console: str) -> Callable[..., Page]:
+    """Opens the windows of a robot to somebody."""
+    return lambda **look: windows_of(shared(console, "robots/robot-1", **look))
+
+
+def windows_of(page: Page) -> Page:
+    """A robot's windows, once they are there."""
     expect(page.get_by_role("region", name="Manual control")).to_be_visible()
     expect(page.get_by_role("list", name="State")).to_be_visible()
     return page
@@ -104,8 +113,8 @@ def driving(page: Page) -> Iterator[None]:
     expect(page.get_by_role("button", name="Take control")).to_be_enabled()
 
 
-def test_the_list_leads_to_the_windows_of_each_robot(visit, console: str) -> None:
-    page = visit.open(console)
+def test_the_list_leads_to_the_windows_of_each_robot(shared, console: str) -> None:
+    page = shared(console)
     page.get_by_role("link", name="Robots").click()
     table = page.get_by_role("table", name="Robots")
     expect(table.get_by_role("row")).to_have_count(3)
@@ -118,10 +127,8 @@ def test_the_list_leads_to_the_windows_of_each_robot(visit, console: str) -> Non
     expect(page.get_by_role("heading", name="robot-2", level=1)).to_be_visible()
 
 
-def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(
-    visit, console
-) -> None:
-    page = opened(visit, console)
+def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(opened) -> None:
+    page = opened()
     with in_hand(page):
         before = spokes(page)
         with held(page, "ArrowUp", "ArrowRight"):
@@ -136,20 +143,20 @@ def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(
     expect(page.get_by_role("status", name="Mode")).to_contain_text("Idle")
 
 
-def test_wheels_stand_still_for_who_wants_no_motion_and_the_number_is_there(
-    visits, console
-) -> None:
-    page = opened(visits(reduced_motion="reduce"), console)
+def test_wheels_stand_still_for_who_wants_no_motion_and_the_number_is_there(opened) -> None:
+    page = opened()
+    page.emulate_media(reduced_motion="reduce")
     with in_hand(page):
         before = spokes(page)
         with held(page, "ArrowUp"):
             expect(page.get_by_role("region", name="Side view")).to_contain_text("5.00 rad/s")
             page.wait_for_timeout(300)
             assert spokes(page) == before
+    page.emulate_media(reduced_motion="no-preference")
 
 
-def test_the_slider_drives_by_keys_alone_and_springs_back(visit, console: str) -> None:
-    page = opened(visit, console)
+def test_the_slider_drives_by_keys_alone_and_springs_back(opened) -> None:
+    page = opened()
     button = page.get_by_role("button", name="Take manual control")
     assert becomes(lambda: button.is_disabled() or button.press("Enter") or button.is_disabled())
     speed = page.get_by_role("slider", name="Speed")
@@ -164,9 +171,9 @@ def test_the_slider_drives_by_keys_alone_and_springs_back(visit, console: str) -
 
 
 def test_a_page_that_is_closed_lets_the_robot_stand_and_another_one_sees_why(
-    visits, console
+    visit, opened, console: str
 ) -> None:
-    driver, other = opened(visits(), console), opened(visits(), console)
+    driver, other = windows_of(visit.open(console, "robots/robot-1")), opened()
     take(driver)
     driver.keyboard.down("ArrowUp")
     expect(other.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
@@ -183,9 +190,9 @@ def test_a_page_that_is_closed_lets_the_robot_stand_and_another_one_sees_why(
 
 
 def test_a_robot_in_a_hand_is_busy_for_a_driver_and_a_driven_one_goes_into_no_hand(
-    visits, console
+    opened, shared, console: str
 ) -> None:
-    hand, driver = opened(visits(), console), visits().open(console, "drive")
+    hand, driver = opened(), shared(console, "drive", person=2)
     with in_hand(hand):
         driver.get_by_role("button", name="Take control").click()
         driver.get_by_role("button", name="Start", exact=True).click()
@@ -197,8 +204,8 @@ def test_a_robot_in_a_hand_is_busy_for_a_driver_and_a_driven_one_goes_into_no_ha
     expect(driver.get_by_role("button", name="Take control")).to_be_enabled()
 
 
-def test_an_emergency_wins_over_the_hand_that_drives(visits, console: str) -> None:
-    hand, other = opened(visits(), console), visits().open(console)
+def test_an_emergency_wins_over_the_hand_that_drives(opened, shared, console: str) -> None:
+    hand, other = opened(), shared(console, "drive", person=2)
     take(hand)
     hand.keyboard.down("ArrowUp")
     expect(hand.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
@@ -209,8 +216,8 @@ def test_an_emergency_wins_over_the_hand_that_drives(visits, console: str) -> No
     hand.keyboard.up("ArrowUp")
 
 
-def test_the_log_and_the_latency_show_a_drive_in_its_order(visits, console: str) -> None:
-    windows, driver = opened(visits(), console), visits().open(console, "drive")
+def test_the_log_and_the_latency_show_a_drive_in_its_order(opened, shared, console: str) -> None:
+    windows, driver = opened(), shared(console, "drive", person=2)
     log = windows.get_by_role("table", name="Messages")
     with driving(driver), held(driver, "ArrowUp"):
         expect(log).to_contain_text("StartTeleOp")
@@ -225,8 +232,8 @@ def test_the_log_and_the_latency_show_a_drive_in_its_order(visits, console: str)
     assert "0 ok" in log.inner_text()
 
 
-def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(visit, console: str) -> None:
-    page = opened(visit, console)
+def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(opened) -> None:
+    page = opened()
     knobs = page.get_by_role("region", name="Faults")
     expect(knobs).to_contain_text("none")
     knobs.get_by_label("Lose the camera").check()
@@ -241,15 +248,15 @@ def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(visit, console:
 
 
 def test_who_may_look_only_sees_all_and_changes_nothing(visit, addresses) -> None:
-    page = opened(visit, addresses[1])
+    page = windows_of(visit.open(addresses[1], "robots/robot-1"))
     expect(page.get_by_role("button", name="Take manual control")).to_be_disabled()
     expect(page.get_by_label("Freeze")).to_be_disabled()
     expect(page.get_by_text("This address may only look.")).to_be_visible()
 
 
-def test_over_real_links_all_windows_are_the_same(visit, programs: Programs) -> None:
-    address, _ = started(programs, "--links", "real")
-    page = opened(visit, address)
+def test_over_real_links_all_windows_are_the_same(own_programs: Programs, visit) -> None:
+    address, _ = started(own_programs, "--links", "real")
+    page = windows_of(visit.open(address, "robots/robot-1"))
     for region in REGIONS:
         expect(page.get_by_role("region", name=region, exact=True)).to_have_count(1)
     with in_hand(page), held(page, "ArrowUp"):
@@ -261,8 +268,11 @@ def test_over_real_links_all_windows_are_the_same(visit, programs: Programs) -> 
     expect(page.get_by_role("table", name="Messages")).to_contain_text("SetTeleOp")
 
 
-def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(visit, programs) -> None:
-    page = opened(visit, started(programs, "--set", "robot.profile=pibot")[0])
+def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(
+    own_programs: Programs, visit
+) -> None:
+    address, _ = started(own_programs, "--set", "robot.profile=pibot")
+    page = windows_of(visit.open(address, "robots/robot-1"))
     with in_hand(page), held(page, "ArrowUp"):
         expect(page.get_by_role("region", name="Side view")).to_contain_text("motor 100 % PWM")
         expect(page.get_by_role("region", name="Top view")).to_contain_text("straight")
@@ -271,23 +281,26 @@ def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(visit, 
 
 
 def test_a_name_that_is_hostile_is_shown_as_text(fake, visit) -> None:
-    page = visit.tab()
-    page.goto(f"{fake('--hostile').drive}#/robots")
+    address = fake("--robots", "2", "--people", "3", "--site", "office-block", "--hostile").drive
+    page = visit.open(address, "robots")
     table = page.get_by_role("table", name="Robots")
     expect(table).to_contain_text("<")
     table.get_by_role("link").nth(1).click()
     expect(page.get_by_role("heading", level=1)).to_contain_text("<")
-    page.goto(f"{fake('--hostile').drive}#/robots/%3Cimg%20src=x%20onerror=alert(1)%3E")
+    page.evaluate(
+        "address => { location.hash = address; }", "#/robots/%3Cimg%20src=x%20onerror=alert(1)%3E"
+    )
     expect(page.get_by_text("There is no robot <img src=x onerror=alert(1)>")).to_be_visible()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious_and_nothing_is_too_wide(visits, console, scheme, width) -> None:
-    visit = visits(width, 800, color_scheme=scheme)
-    page = opened(visit, console)
+def test_axe_finds_nothing_serious_and_nothing_is_too_wide(
+    opened, shared, console, scheme, width
+) -> None:
+    page = opened(width=width, scheme=scheme)
     assert faults(page) == []
     assert page.evaluate("document.querySelector('.body').scrollWidth") <= width
-    page.goto(f"{console}#/robots")
+    page = shared(console, "robots", width=width, scheme=scheme)
     expect(page.get_by_role("table", name="Robots")).to_be_visible()
     assert faults(page) == []

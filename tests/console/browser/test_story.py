@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from helpers.console.keyboard_driver import Driver
+from helpers.console.keyboard_driver import NEAR_FIRE, Driver
 from helpers.processes.patience import PATIENCE_S, becomes
 from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import expect
@@ -50,7 +50,7 @@ def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(
     tmp_path: Path, visit, programs: Programs
 ) -> None:
     record = tmp_path / "drive.mcap"
-    console, address = started(programs, "--record", record)
+    console, address = started(programs, "--record", record, *NEAR_FIRE)
     page = visit.open(address, "drive")
     base = address.partition("?")[0]
     page.get_by_role("slider", name="Delay").fill(str(1000 * DELAY_S))

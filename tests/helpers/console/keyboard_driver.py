@@ -18,6 +18,9 @@ LONGEST_S = 4.0  # of going straight on, before one looks again
 ROOM = 0.8  # between a straight way and the nearest wall, where there is so much [m]
 STEP = 0.1  # [m]
 AHEAD = 0.12  # a heading that will do [rad]
+FIRE = "events=[{kind: fire, room: North office, at_s: 3, latest_s: 3, reported: true}]"
+NEAR_FIRE = "--set", "robot.way_m=6", "--set", FIRE
+"""Words for a console whose fire begins at once near its robots: driving takes real time."""
 SITE = "import('/static/js/store.js').then(store => store.scene.value.site.name)"
 
 
