@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-import signal
 from contextlib import nullcontext
 
 import pytest
-from helpers.network.free_ports import free_port
 
 from dva_sim.cli import call
 from dva_sim.kernel.errors import RunsFailed
@@ -64,15 +62,6 @@ class NotAsked:
     is_asked = False
 
 
-def test_a_dva_says_at_once_where_it_listens_also_to_a_pipe(programs):
-    port = free_port()
-    program = programs.start("live", "drive-to-event", "--only", "dva", "--port", port)
-    program.wait_to_say(f"DVA: 127.0.0.1:{port}\n")
-    program.send(signal.SIGTERM)
-    assert program.ends() == 0
-    assert program.said.startswith(f"DVA: 127.0.0.1:{port}\n")
-
-
 @pytest.mark.parametrize("words", ["foo", "foo:", "127.0.0.1", "127.0.0.1:x", ":5600", ""])
 def test_an_address_of_the_dva_has_a_host_and_a_port(capsys, words):
     assert call(["live", "drive-to-event", "--dva", words]) == 2
@@ -80,9 +69,8 @@ def test_an_address_of_the_dva_has_a_host_and_a_port(capsys, words):
     assert capsys.readouterr().err == told
 
 
-@pytest.mark.parametrize("only", [[], ["--only", "world"]])
-def test_what_the_site_has_no_place_for_is_told_at_its_setting_before_anything_starts(capsys, only):
-    assert call(["live", "drive-to-event", *only, "--set", "robot.count=900"]) == 2
+def test_what_the_site_has_no_place_for_is_told_at_its_setting_by_a_part_too(capsys):
+    assert call(["live", "drive-to-event", "--only", "world", "--set", "robot.count=900"]) == 2
     assert capsys.readouterr().err.startswith(
         "error: --set robot.count=900: site 'caparica' has room for 2"
     )

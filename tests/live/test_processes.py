@@ -31,7 +31,25 @@ SCRIPTED = (
 )
 
 
-NEAR = ("--set", "events=[{kind: fire, at_s: 0, reported: true, room: Robot bay}]")
+NEAR = (
+    *("--set", "events=[{kind: fire, at_s: 0, reported: true, room: Robot bay}]"),
+    *("--set", "robot.way_m=4"),
+)
+BRIEFLY = """
+from functools import partial
+
+from dva_sim.agents.operator.scripted import drill
+from dva_sim.live import parts
+
+parts.drill = partial(drill, commands=20)
+"""
+
+
+@pytest.fixture
+def briefly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The script drives for two seconds rather than for twenty."""
+    (tmp_path / "sitecustomize.py").write_text(BRIEFLY)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
 
 
 # --- a whole run ---------------------------------------------------------------------------
@@ -70,15 +88,10 @@ def all_held(run: Program) -> bool:
     return all(f"\n{rule} held: " in run.said for rule in RULES)
 
 
-DEAF = """
-from functools import partial
-
-from dva_sim.agents.operator.scripted import drill
+DEAF = f"""{BRIEFLY}
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.live import parts
 from dva_sim.protocol import messages as m
 
-parts.drill = partial(drill, commands=10)
 RobotController._emergency = lambda *_: Decision(m.OK, "stopped")
 """
 
@@ -111,6 +124,7 @@ def count_in(recording: Path, element: bytes) -> int:
     return sum(isinstance(sent.payload, bytes) and element in sent.payload for sent in traffic)
 
 
+@pytest.mark.usefixtures("briefly")
 def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
     programs: Programs, tmp_path: Path
 ) -> None:
@@ -119,7 +133,7 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
     assert all_held(run)
     assert "run.mcap written" in run.said
     file = tmp_path / "run.mcap"
-    assert count_in(file, b"<SetTeleOp>") == 200 + 1 + 10
+    assert count_in(file, b"<SetTeleOp>") == 20 + 1 + 10
     opened = read_recording(file)
     assert set(opened.traces) == {"dva", "robot-1"}
     assert "robot-1" in opened.playback.recorder.tracks
@@ -130,18 +144,17 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
     assert not list(tmp_path.glob("*.part"))
 
 
+@pytest.mark.usefixtures("briefly")
 def test_the_robots_go_on_when_the_disk_becomes_full(programs: Programs, tmp_path: Path) -> None:
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     run.wait_to_say("is now in mode Teleoperation")
     resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
     assert run.ends() == 2
-    assert "200 of 200 commands obeyed" in run.said
+    assert "20 of 20 commands obeyed" in run.said
     assert "The run ended (the script is done)" in run.said
     (complaint,) = run.complained
-    assert complaint == (
-        "error: run.mcap was not recorded: File too large; run.mcap.part is left; "
-        "dva-sim replay reads it"
-    )
+    assert complaint.startswith("error: run.mcap was not recorded: File too large")
+    assert "run.mcap.part" in complaint
     assert call("replay", tmp_path / "run.mcap.part").returncode == 0
 
 
@@ -168,11 +181,10 @@ def test_a_simulated_person_drives_to_the_fire_and_confirms_it(
 # --- how it ends ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_run_that_is_interrupted_ends_cleanly(programs: Programs, number: signal.Signals) -> None:
+def test_a_run_that_is_interrupted_ends_cleanly(programs: Programs) -> None:
     run = programs.start("live", "drive-to-event")
     run.wait_to_say("is now in mode Teleoperation")
-    run.send(number)
+    run.send(signal.SIGTERM)
     assert run.ends() == 0
     assert "The run ended (interrupted)" in run.said
     assert run.said.rindex("is now in mode Idle") > run.said.rindex("is now in mode Teleoperation")
@@ -189,15 +201,7 @@ def test_a_run_can_be_interrupted_before_anything_has_happened(programs: Program
     assert programs.processes() == {}
 
 
-def test_parts_whose_supervisor_is_killed_end_by_themselves(programs: Programs) -> None:
-    run = programs.start(*SCRIPTED)
-    run.wait_to_say("is now in mode Teleoperation")
-    run.send(signal.SIGKILL)
-    assert run.ends() == -signal.SIGKILL
-    programs.wait_for_none()
-
-
-def test_what_was_recorded_until_the_supervisor_is_killed_can_be_replayed(
+def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_replayed(
     programs: Programs, tmp_path: Path
 ) -> None:
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
@@ -207,7 +211,8 @@ def test_what_was_recorded_until_the_supervisor_is_killed_can_be_replayed(
     programs.wait_for_none()
     again = call(*SCRIPTED, "--record", "run.mcap", cwd=tmp_path)
     assert again.returncode == 2
-    assert "run.mcap.part would be replaced; dva-sim replay run.mcap.part --mcap" in again.stderr
+    assert "run.mcap.part" in again.stderr
+    assert "dva-sim replay" in again.stderr
     left = (tmp_path / "run.mcap.part").read_bytes()
     told = call("replay", tmp_path / "run.mcap.part", "--mcap", tmp_path / "run.mcap")
     assert told.returncode == 0, told.stderr
@@ -216,7 +221,7 @@ def test_what_was_recorded_until_the_supervisor_is_killed_can_be_replayed(
     assert (tmp_path / "run.mcap.part").read_bytes() == left
 
 
-@pytest.mark.parametrize("part", ["dva", "world", "operator"])
+@pytest.mark.parametrize("part", ["world", "operator"])
 def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(
     programs: Programs, tmp_path: Path, part: str
 ) -> None:
@@ -234,41 +239,28 @@ def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(
 # --- mistakes ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--keys", "no"], "there is no such folder; make keys with: dva-sim keys no NAME..."),
-        (["--keys", "."], "holds no keys"),
-    ],
-)
-def test_a_mistake_that_a_part_finds_ends_in_one_line_and_exit_code_2(
-    programs: Programs, words: list[str], said: str
-) -> None:
-    run = programs.start("live", "drive-to-event", "--for", "60", *words)
+def test_a_mistake_that_a_part_finds_ends_in_one_line_and_exit_code_2(programs: Programs) -> None:
+    run = programs.start("live", "drive-to-event", "--for", "60", "--keys", ".")
     assert run.ends() == 2
     (line,) = run.complained
     assert line.startswith("error: ")
-    assert said in line
+    assert "holds no keys" in line
     assert programs.processes() == {}
 
 
-@pytest.mark.parametrize("taken", [0, 1])
-def test_a_port_that_is_taken_ends_in_one_line(
-    programs: Programs, address: str, taken: int
-) -> None:
+def test_a_port_that_is_taken_ends_in_one_line(programs: Programs, address: str) -> None:
     port = int(address.partition(":")[2])
-    with socket.socket() as other:
-        other.bind(("127.0.0.1", port + taken))
-        other.listen()
-        runs = [
-            programs.start(*SCRIPTED, "--dva", address),
-            programs.start(*SCRIPTED, "--only", "world", "--port", str(port)),
-        ]
-        for run in runs:
+    whole = (*SCRIPTED, "--dva", address)
+    world = (*SCRIPTED, "--only", "world", "--port", str(port))
+    for taken, words in ((port, world), (port + 1, whole)):
+        with socket.socket() as other:
+            other.bind(("127.0.0.1", taken))
+            other.listen()
+            run = programs.start(*words)
             assert run.ends() == 2
-            (line,) = run.complained
-            assert f"cannot listen on 127.0.0.1, ports {port} and {port + 1}" in line
-            assert "Address already in use" in line
+        (line,) = run.complained
+        assert f"cannot listen on 127.0.0.1, ports {port} and {port + 1}" in line
+        assert "Address already in use" in line
     assert programs.processes() == {}
 
 
@@ -280,7 +272,7 @@ def test_three_parts_started_by_hand_work_together(programs: Programs, address: 
     parts = [programs.start(*SCRIPTED, "--only", part, *at) for part in ("dva", "world")]
     parts.append(programs.start(*SCRIPTED, "--only", "operator", *at))
     dva, world, operator = parts
-    dva.wait_to_say("event 1 (fire) is pending")
+    dva.wait_to_say(f"DVA: {address}\n", "event 1 (fire) is pending")
     world.wait_to_say("is now in mode Teleoperation", "is now in mode Idle")
     for part in reversed(parts):
         part.send(signal.SIGINT)

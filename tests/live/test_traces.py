@@ -108,7 +108,7 @@ def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path: Path) ->
     assert differences(path) == 0
 
 
-@pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
+@pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
 def test_a_simulated_operators_drive_is_decided_the_same_again(
     tmp_path: Path, pattern: str
 ) -> None:
