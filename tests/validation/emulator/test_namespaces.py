@@ -66,7 +66,8 @@ def run() -> Iterator[Run]:
 @pytest.mark.parametrize("rootless", [False, True], ids=["root or not", "user namespace"])
 def test_real_packets_are_lost_as_told(rootless: bool) -> None:
     need_link(rootless)
-    for probe, find in ((PROBES[2], find_loss), (PROBES[3], find_bursts)):
+    loss, bursts = (PROBES[2], find_loss), (PROBES[3], find_bursts)
+    for probe, find in (loss,) if rootless else (loss, bursts):
         outcome = run_job(probe.job(rootless))
         crossing = Crossing.of(probe, outcome)
         assert outcome.link["emu_lost_ab"] == crossing.lost.sum()
