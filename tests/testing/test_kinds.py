@@ -29,25 +29,25 @@ def test_every_kind_has_plugins_and_a_function_that_tries_it(kind):
     assert "2 " in trial.ways(testing.Outcome((), (), 2, 0.001))
 
 
-def test_what_keeps_its_promises_is_tried_by_its_name_or_its_class():
-    assert testing.check_policy("min_eta").tries == 200
-    assert testing.check_policy(MinEta).tries == 200
+def test_what_keeps_its_promises_is_tried_by_its_name_or_its_class(fewer):
+    assert testing.check_policy("min_eta", count=1).tries == 1
+    assert testing.check_policy(MinEta, count=2).tries == 2
     assert testing.check_filter(MovingMedian, {"window": 5}).broken == ()
     assert testing.check_operator(Pursuit).broken == ()
 
 
 def test_what_breaks_them_fails_the_test_with_a_line_for_each():
-    with pytest.raises(AssertionError, match=r"task 0 .*in situation 1") as failed:
-        testing.check_policy(Greedy)
+    with pytest.raises(AssertionError, match=r"task 0 .*situation 1") as failed:
+        testing.check_policy(Greedy, count=3)
     assert failed.value.outcome.broken == tuple(str(failed.value).splitlines())
 
 
 def test_what_cannot_be_had_is_a_mistake_in_the_call():
-    with pytest.raises(ConfigError, match="policy 'Greedy' has no option 'speed'"):
+    with pytest.raises(ConfigError, match=r"'Greedy' .* 'speed'"):
         testing.check_policy(Greedy, {"speed": 3})
-    with pytest.raises(ConfigError, match="filter 'mean' is unknown"):
+    with pytest.raises(ConfigError, match="'mean'"):
         testing.check_filter("mean")
-    with pytest.raises(ConfigError, match="'Pursuit' is not a policy; should be a class derived"):
+    with pytest.raises(ConfigError, match=r"'Pursuit' .*policy"):
         testing.check_policy(Pursuit)
     with pytest.raises(AttributeError, match="'check_car'"):
         _ = testing.check_car

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
@@ -90,11 +91,12 @@ def test_a_broken_promise_is_told_in_a_plain_line(tmp_path, old, new, said):
 
 def test_a_model_that_heeds_no_seed_earns_a_warning(tmp_path):
     outcome = tried(check_model, coin(tmp_path, ("Streams(seed)", "Streams(1)")), {})
-    assert outcome.warnings == ("comes to the same with every seed",)
+    (warning,) = outcome.warnings
+    assert not unnamed(warning, "same", "seed")
 
 
 def test_a_scenario_that_cannot_be_is_told_before_anything_is_tried(tmp_path):
-    with pytest.raises(ConfigError, match="nobody throws; --set gives keys of its scenario"):
+    with pytest.raises(ConfigError, match="nobody throws; --set"):
         tried(check_model, coin(tmp_path), {"throws": 0})
 
 
@@ -106,5 +108,5 @@ def test_the_example_waits_as_long_as_erlang_says():
     document = scenarios.load("alarm-queue")
     model = model_of(document)
     scenario = model.build(document, {"alarms": 100_000})
-    waits = [model.tables(scenario, s, False)["runs"][0]["wait_mean_s"] for s in range(4)]
-    assert math.isclose(sum(waits) / 4, 67.5, rel_tol=0.03)
+    waits = [model.tables(scenario, s, False)["runs"][0]["wait_mean_s"] for s in range(2)]
+    assert math.isclose(sum(waits) / 2, 67.5, rel_tol=0.03)

@@ -7,6 +7,8 @@ from itertools import count
 import numpy as np
 import pytest
 from helpers.paths import ROOT
+from helpers.processes.search_settings import LONGER
+from helpers.wording import unnamed
 
 from dva_sim.cli import checks
 from dva_sim.core.dispatch import (
@@ -21,6 +23,7 @@ from dva_sim.core.dispatch import (
     solve,
 )
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.testing import policies
 from dva_sim.testing.policies import check_policy
 from dva_sim.testing.promises import tried
 
@@ -28,12 +31,13 @@ EXAMPLES = [f"{path.name}:{path.stem.title()}" for path in (ROOT / "agents/polic
 
 
 @pytest.mark.parametrize("name", [*sorted(POLICIES.keys() - {"oracle"}), *EXAMPLES])
-def test_every_policy_that_is_shipped_keeps_its_promises(name):
-    outcome = tried(check_policy, name, slow=60.0)
-    assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), 200)
+def test_every_policy_that_is_shipped_keeps_its_promises(fewer, name):
+    count = min(41 * LONGER, 200)
+    outcome = tried(check_policy, name, count=count, slow=60.0)
+    assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), count)
 
 
-def test_the_oracle_keeps_them_too():
+def test_the_oracle_keeps_them_too(fewer):
     ways = np.array([[10.0, 20.0], [30.0, 5.0], [9.0, 9.0]])
     plan = solve(Instance(np.array([0.0, 10.0, 20.0]), ways, 2 * ways))
     devices = "02:00:00:01:00:00", "02:00:00:01:00:01"
@@ -110,51 +114,48 @@ def moves_all(self, situation, rng):
         (policy(moves_all, relocates=True, preempts=True), "relocates somebody who is under way"),
     ],
 )  # fmt: skip
-def test_a_broken_promise_is_told_in_a_plain_line(make, said):
+def test_a_broken_promise_is_told_in_a_plain_line(fewer, make, said):
     outcome = tried(check_policy, make, count=41)
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 
-def test_robots_beyond_the_operators_are_a_warning():
-    outcome = tried(check_policy, policy(every_robot_goes))
+def test_robots_beyond_the_operators_are_a_warning(fewer):
+    outcome = tried(check_policy, policy(every_robot_goes), count=21)
     assert outcome.broken == ()
-    assert outcome.warnings[0].startswith("sends more robots than operators are free; the core dr")
+    assert outcome.warnings[0].startswith(policies.TOO_MANY_ROBOTS)
 
 
 def test_a_slow_decision_is_a_warning(monkeypatch):
     seconds = count()
     monkeypatch.setattr(time, "perf_counter", lambda: float(next(seconds)))
-    outcome = tried(check_policy, MinEta, slow=0.5)
+    outcome = tried(check_policy, MinEta, count=19, slow=0.5)
     assert outcome.broken == ()
-    assert outcome.warnings == (
-        "is slow: 1 s in situation 99 (lists of preference); should be 0.5 s",
-    )
+    (warning,) = outcome.warnings
+    assert not unnamed(warning, "slow", "1 s", "situation 9 ", "0.5 s")
 
 
-def test_policies_are_checked_by_name_and_by_file(tmp_path, monkeypatch, capsys):
+def test_policies_are_checked_by_name_and_by_file(fewer, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     bad = "from dva_sim.core.dispatch import Policy\nclass Bad(Policy):\n"
     (tmp_path / "bad.py").write_text(bad + "    def advise(self, situation, rng): return 1 / 0\n")
     assert checks.check(["policy", "min_eta", "patrol.py:Patrol"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    said = "min_eta: policy: valid; 200 situations, slowest decision "
+    said = "min_eta: policy: valid; 200 situations, "
     assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 policies: 2 valid"
     assert checks.check(["policy", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == (
-        "bad.py:Bad: raises: ZeroDivisionError: division by zero (bad.py:3) in situation 1 "
-        "(an ordinary one); and 199 times more"
-    )
-    assert lines[1].startswith("bad.py:Bad: policy: invalid, breaks 1 of its promises; 200 situat")
+    assert lines[0].startswith("bad.py:Bad: raises: ZeroDivisionError: division by zero (bad.py:3)")
+    assert not unnamed(lines[0], "situation 1 ", "199 ")
+    assert not unnamed(lines[1], "bad.py:Bad: policy: invalid", " 1 ", "200 situations")
 
 
 def test_options_are_checked_with_the_policy(capsys):
     assert checks.check(["policy", "preemptive"], ["margin=0"]) == 1
-    assert "option 'margin' is 0; should be a number above 0" in capsys.readouterr().out
-    with pytest.raises(ConfigError, match="--set is for patterns, policies"):
+    assert not unnamed(capsys.readouterr().out, "option 'margin' is 0;", "above 0")
+    with pytest.raises(ConfigError, match=r"--set .*policies"):
         checks.check(["study.yaml"], ["margin=0"])
-    with pytest.raises(ConfigError, match=r"which one\? mine.py:Mine, or one of auction, "):
+    with pytest.raises(ConfigError, match=r"mine.py:Mine, .*auction, "):
         checks.check(["policy"])
 
 

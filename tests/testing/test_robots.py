@@ -1,9 +1,11 @@
 """What every robot's motors promise: kept by all that are shipped, missed by the bad ones here."""
 
+import itertools
 import math
 
 import pytest
 from helpers.paths import ROOT
+from helpers.wording import unnamed
 
 from dva_sim.cli import checks
 from dva_sim.kernel.errors import ConfigError
@@ -15,121 +17,93 @@ NAMES = sorted(path.stem for path in (ROOT / "agents/robots").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_robot_that_is_shipped_keeps_its_promises(name):
+def test_every_robot_that_is_shipped_keeps_its_promises(fewer, name):
     outcome = tried(check_robot, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), ())
-    assert outcome.tries > 100
+    assert outcome.tries >= 48
 
 
-class Reckless(Differential):
-    def set_point(self, speed, turn_rate):
-        return 2 * speed, turn_rate
+honest = Differential.accelerations
+count = itertools.count(1)
 
 
-class Spinner(Differential):
-    def set_point(self, speed, turn_rate):
-        return speed, 2 * turn_rate
+def aims(set_point):
+    """Motors that make something else of what they are asked for."""
+    return type("Bad", (Differential,), {"set_point": lambda self, *asked: set_point(*asked)})
 
 
-class Numberless(Differential):
-    def set_point(self, speed, turn_rate):
-        return speed / speed if speed else math.nan, turn_rate
+def answers(accelerations):
+    """Motors that answer otherwise; given the honest answer, the speed, and that asked for."""
 
+    def other(self, speed, turn_rate, now, now_turn_rate, dt):
+        fair = honest(self, speed, turn_rate, now, now_turn_rate, dt)
+        return accelerations(*fair, now, speed)
 
-class Dizzy(Differential):
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        return (math.inf, 0.0) if now_speed < 0 else super().accelerations(
-            speed, turn_rate, now_speed, now_turn_rate, dt)  # fmt: skip
-
-
-class Forgetless(Differential):
-    asked = 0
-
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        type(self).asked += 1  # shared by all of the class
-        return 0.001 * self.asked, 0.0
-
-
-class Overshooting(Differential):
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        return 0.5 if speed > 0 else -now_speed, (turn_rate - now_turn_rate) * 2
-
-
-class Whirling(Differential):
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        along, _ = super().accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)
-        return along, 1.0
-
-
-class Backwards(Differential):
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        _, turn = super().accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)
-        return (-0.5 if now_speed > -0.2 else 0.0), turn
-
-
-class Rolling(Differential):
-    """Hardly brakes."""
-
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        along, turn = super().accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)
-        return max(along, -0.1), turn
-
-
-class Endless(Differential):
-    """Does not brake at all."""
-
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        along, turn = super().accelerations(speed, turn_rate, now_speed, now_turn_rate, dt)
-        return max(along, 0.0), turn
-
-
-class Failing(Differential):
-    def accelerations(self, speed, turn_rate, now_speed, now_turn_rate, dt):
-        return 1 / 0, 0.0
+    return type("Bad", (Differential,), {"accelerations": other})
 
 
 @pytest.mark.parametrize(
     ("drive", "said"),
     [
-        (Reckless, "aims at a speed beyond the limits: ("),
-        (Spinner, "aims at a turn rate beyond the limit: ("),
-        (Numberless, "aims at what is no number: (nan, "),
-        (Dizzy, "answers what is no number: "),
-        (Forgetless, "remembers: a new copy answers differently: "),
-        (Overshooting, "drives faster than its limit: "),
-        (Whirling, "turns faster than its limit: "),
-        (Backwards, "drives backwards: "),
-        (Rolling, "stops too late: 1.25"),
-        (Endless, "does not stop within a minute: 0.5 m/s"),
-        (Failing, "raises: ZeroDivisionError: division by zero (test_robots.py:"),
+        (aims(lambda speed, turn: (2 * speed, turn)), "aims at a speed beyond the limits: ("),
+        (aims(lambda speed, turn: (speed, 2 * turn)), "aims at a turn rate beyond the limit: ("),
+        (
+            aims(lambda speed, turn: (speed / speed if speed else math.nan, turn)),
+            "aims at what is no number: (nan, ",
+        ),
+        (
+            answers(lambda along, turn, now, _: (math.inf if now < 0 else along, turn)),
+            "answers what is no number: ",
+        ),
+        (
+            answers(lambda *_: (0.001 * next(count), 0.0)),  # shared by all of them
+            "remembers: a new copy answers differently: ",
+        ),
+        (
+            answers(lambda _, turn, now, speed: (0.5 if speed > 0 else -now, turn)),
+            "drives faster than its limit: ",
+        ),
+        (answers(lambda along, *_: (along, 1.0)), "turns faster than its limit: "),
+        (
+            answers(lambda _, turn, now, __: (-0.5 if now > -0.2 else 0.0, turn)),
+            "drives backwards: ",
+        ),
+        (answers(lambda along, turn, *_: (max(along, -0.1), turn)), "stops too late: 1.25"),
+        (
+            answers(lambda along, turn, *_: (max(along, 0.0), turn)),
+            "does not stop within a minute: 0.5 m/s",
+        ),
+        (
+            answers(lambda *_: (1 / 0, 0.0)),
+            "raises: ZeroDivisionError: division by zero (test_robots.py:",
+        ),
     ],
 )
-def test_a_broken_promise_is_told_in_a_plain_line(drive, said):
+def test_a_broken_promise_is_told_in_a_plain_line(fewer, drive, said):
     outcome = tried(check_robot, drive)
     assert any(line.startswith(said) for line in outcome.broken), outcome.broken
 
 
-def test_robots_are_checked_by_profile_and_by_file(tmp_path, monkeypatch, capsys):
+def test_robots_are_checked_by_profile_and_by_file(fewer, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     bad = "from dva_sim.worlds.drives import Drive\nclass Bad(Drive):\n"
     (tmp_path / "bad.py").write_text(bad + "    def accelerations(self, *a): return 1 / 0\n")
     assert checks.check(["robot", "servrobot", "tracked.py:Tracked"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    said = "servrobot: robot: valid; 154 drives, "
+    said = "servrobot: robot: valid; 48 drives, "
     assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
     assert lines[-1] == "2 robots: 2 valid"
     assert checks.check(["robot", "bad.py:Bad"]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "bad.py:Bad: raises: ZeroDivisionError: division by zero (bad.py:3)"
-    assert lines[1].startswith("bad.py:Bad: robot: invalid, breaks 1 of its promises; ")
+    assert not unnamed(lines[0], "bad.py:Bad: raises: ZeroDivisionError: ", "(bad.py:3)")
+    assert not unnamed(lines[1], "bad.py:Bad: robot: invalid", " 1 ")
 
 
 @pytest.mark.parametrize(
     ("names", "options", "said"),
     [
         (["robot", "servrobut"], [], "did you mean 'servrobot'?"),
-        (["robot", "tracked"], ["scrub=2"], "drive '"),
-        (["robot", "tracked"], ["scrub=2"], "option 'scrub' is 2; should be from 0 to 1"),
+        (["robot", "tracked"], ["scrub=2"], "option 'scrub' is 2; "),
         (["robot", "tracked"], ["speed=2"], "has no option 'speed'; known: scrub"),
         (["robot", "pibot"], ["steering_deg=90"], "is 90; should be in (0, 80)"),
     ],
@@ -142,5 +116,5 @@ def test_a_mistake_is_one_line(names, options, said, capsys):
 
 
 def test_a_robot_has_to_be_named():
-    with pytest.raises(ConfigError, match=r"which one\? mine.py:Mine, or one of pibot, servrobot"):
+    with pytest.raises(ConfigError, match=r"mine.py:Mine, .*pibot, servrobot"):
         checks.check(["robot"])
