@@ -47,9 +47,9 @@ def test_controls_make_the_error_a_third():
 
 
 def test_estimates_with_controls_have_no_bias_and_their_errors_cover():
-    found = [estimate(v, np.ones(100), c) for v, c in map(some_batches, range(1000))]
+    found = [estimate(v, np.ones(100), c) for v, c in map(some_batches, range(400))]
     off = np.array([(f.value - 2) / f.error for f in found])
-    assert abs(np.mean([f.value for f in found]) - 2) < 3 * np.std([f.value for f in found]) / 31.6
+    assert abs(np.mean([f.value for f in found]) - 2) < 3 * np.std([f.value for f in found]) / 20
     assert 0.93 < np.mean(abs(off) < 1.96) < 0.97
     assert np.mean(abs(off) < 3) > 0.993
     assert 0.9 < off.std() < 1.1
@@ -59,7 +59,7 @@ def test_few_batches_with_skewed_values_still_have_no_bias():
     """Weights fitted to the same batches would make it 16 % too low here."""
     rng = np.random.default_rng(3)
     found = []
-    for _ in range(2000):
+    for _ in range(600):
         control = rng.exponential(size=(20, 1)) - 1
         values = control[:, 0] ** 2  # mean 1
         found.append(estimate(values, np.ones(20), control).value)

@@ -156,7 +156,7 @@ def test_priorities_share_out_the_wait_but_do_not_change_it():
 
 
 def test_two_priorities_agree_with_the_markov_chain():
-    first, second, c, most = 0.4, 0.5, 2, 40
+    first, second, c, most = 0.4, 0.5, 2, 28
     states = [(n, 0, 0) for n in range(c)]
     states += [(c, i, j) for i in range(most) for j in range(most)]
 
@@ -302,7 +302,7 @@ def test_the_nearest_of_one_is_the_mean_way_between_two_random_places():
 
 def test_the_nearest_of_many_is_as_far_as_in_an_endless_plane_plus_the_edge():
     """In the plane it is 1 / (2 sqrt k); near an edge there are fewer to choose from."""
-    for k in (300, 3000):
+    for k in (300, 1000):
         plane = 0.5 / math.sqrt(k)
         assert plane < exact.square_nearest(k)["distance_m"] < plane * (1 + 1.3 / math.sqrt(k))
 
@@ -320,7 +320,7 @@ def test_the_best_of_all_assignments_agrees_with_trying_them_all():
 
     rng = np.random.default_rng(5)
     totals, greedy = [], []
-    for costs in rng.exponential(size=(10_000, 3, 5)):
+    for costs in rng.exponential(size=(2500, 3, 5)):
         totals.append(costs[linear_sum_assignment(costs)].sum())
         total = 0.0
         for row in costs:  # one by one; who is taken is out of reach
@@ -328,8 +328,8 @@ def test_the_best_of_all_assignments_agrees_with_trying_them_all():
             costs[:, row.argmin()] = np.inf
         greedy.append(total)
     m = exact.assignment(3, 5)
-    assert abs(np.mean(totals) - m["optimal_s"]) < 3 * np.std(totals) / 100
-    assert abs(np.mean(greedy) - m["greedy_s"]) < 3 * np.std(greedy) / 100
+    assert abs(np.mean(totals) - m["optimal_s"]) < 3 * np.std(totals) / 50
+    assert abs(np.mean(greedy) - m["greedy_s"]) < 3 * np.std(greedy) / 50
 
 
 def test_a_load_beyond_the_servers_is_refused():

@@ -1,7 +1,7 @@
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator import measuring
@@ -41,22 +41,20 @@ def pretend(monkeypatch: pytest.MonkeyPatch, play: Play) -> list[tuple[str, int]
     return calls
 
 
-def test_every_condition_comes_once_before_any_comes_twice(
-    tmp_path: Path, played: list[tuple[str, int]]
-) -> None:
+def test_every_condition_comes_once_before_any_comes_twice(tmp_path, played):
     assert measure_all([SLOW, FAST], [1, 2], tmp_path / "own.csv") == []
     labels = [SLOW.label, FAST.label]
     assert played == [(label, seed) for seed in (1, 2) for label in labels]
 
 
-def test_a_row_says_what_it_is_of(tmp_path: Path, played: list[tuple[str, int]]) -> None:
+def test_a_row_says_what_it_is_of(tmp_path, played):
     measure_all([SLOW], [7], tmp_path / "own.csv", group="blind")
     header, row = (tmp_path / "own.csv").read_text().splitlines()
     assert header.startswith("cell,group,seed,cond_id,pattern,hz,")
     assert row.startswith(f"blind_pub10_d0_j0_l0_r0_p5_s7,blind,7,{SLOW.hash},pub,10,")
 
 
-def test_what_is_there_is_not_measured_again(tmp_path: Path, played: list[tuple[str, int]]) -> None:
+def test_what_is_there_is_not_measured_again(tmp_path, played):
     measure_all([SLOW], [1, 2], tmp_path / "own.csv")
     told: list[Progress] = []
     measure_all([SLOW, FAST], [1, 2], tmp_path / "own.csv", told.append)
@@ -65,9 +63,7 @@ def test_what_is_there_is_not_measured_again(tmp_path: Path, played: list[tuple[
     assert told[0].left_s > told[1].left_s > told[2].left_s == 0
 
 
-def test_a_campaign_that_is_stopped_goes_on_where_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_campaign_that_is_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     def stop_at_the_second(condition: Condition, seed: int) -> None:
         if seed == 2:
             raise KeyboardInterrupt
@@ -81,9 +77,7 @@ def test_a_campaign_that_is_stopped_goes_on_where_it_was(
     assert len((tmp_path / "own.csv").read_text().splitlines()) == 4
 
 
-def test_a_run_that_fails_is_told_and_the_others_go_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_fails_is_told_and_the_others_go_on(tmp_path, monkeypatch):
     def fail_once(condition: Condition, seed: int) -> None:
         if seed == 1:
             raise EmulatorError("there was no handshake within 60 s")
@@ -91,13 +85,12 @@ def test_a_run_that_fails_is_told_and_the_others_go_on(
     pretend(monkeypatch, fail_once)
     told: list[Progress] = []
     failures = measure_all([SLOW], [1, 2], tmp_path / "own.csv", told.append)
-    assert failures == [f"own_{SLOW.label}_s1: there was no handshake within 60 s"]
+    (failure,) = failures
+    assert not unnamed(failure, f"own_{SLOW.label}_s1: ", "60 s")
     assert (told[-1].done, told[-1].total) == (1, 2)
 
 
-def test_a_campaign_stops_when_nothing_works(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_campaign_stops_when_nothing_works(tmp_path, monkeypatch):
     def fail(condition: Condition, seed: int) -> None:
         raise EmulatorError("the robot failed")
 
@@ -108,11 +101,11 @@ def test_a_campaign_stops_when_nothing_works(
     assert len(told) == 3
 
 
-def test_two_conditions_with_one_seed_do_not_share_their_luck() -> None:
+def test_two_conditions_with_one_seed_do_not_share_their_luck():
     assert job_of(SLOW, 1).seed != job_of(FAST, 1).seed != job_of(FAST, 2).seed
 
 
-def test_the_description_of_a_machine_names_nobody(played: list[tuple[str, int]]) -> None:
+def test_the_description_of_a_machine_names_nobody(played):
     machine = describe_machine("packets")
     text = " ".join(str(value) for value in machine.values())
     assert "/" not in text

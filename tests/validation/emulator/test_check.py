@@ -32,13 +32,13 @@ def late(of: Crossing, by_s: float) -> Crossing:
     return Crossing(of.wire, of.size, of.sent, of.numbers, of.arrived + by_s)
 
 
-def test_a_link_that_keeps_its_laws_passes_every_probe() -> None:
+def test_a_link_that_keeps_its_laws_passes_every_probe():
     for probe in PROBES:
         found = probe.find(crossing(probe.wire, probe.count, probe.interval_s, probe.size))
         assert [str(finding) for finding in found if not finding.passed] == []
 
 
-def test_a_link_that_is_two_milliseconds_late_is_found_out() -> None:
+def test_a_link_that_is_two_milliseconds_late_is_found_out():
     right = crossing(WireConfig(delay_s=0.05), 100, 0.01)
     assert all(finding.passed for finding in find_delay(late(right, 0.0005)))
     assert not any(finding.passed for finding in find_delay(late(right, 0.002)))
@@ -49,37 +49,35 @@ def told(other: WireConfig, by: Crossing) -> Crossing:
     return Crossing(other, by.size, by.sent, by.numbers, by.arrived)
 
 
-def test_a_link_that_loses_too_few_is_found_out() -> None:
+def test_a_link_that_loses_too_few_is_found_out():
     few = crossing(WireConfig(loss=0.07), 4000, 5e-4)
     assert find_loss(few)[0].passed
     assert not find_loss(told(WireConfig(loss=0.1), few))[0].passed
 
 
-def test_single_losses_are_not_taken_for_bursts() -> None:
+def test_single_losses_are_not_taken_for_bursts():
     single = crossing(WireConfig(loss=0.1), 4000, 5e-4)
     assert not find_bursts(told(WireConfig(loss=0.1, burst_pkts=4), single))[0].passed
 
 
-def test_a_line_that_is_three_percent_slow_is_found_out() -> None:
+def test_a_line_that_is_three_percent_slow_is_found_out():
     slow = crossing(WireConfig(rate_bps=0.97e6, queue_pkts=400), 250, 4e-3, 1000)
     assert find_rate(slow)[0].passed
     assert not find_rate(told(WireConfig(rate_bps=1e6), slow))[0].passed
 
 
-def test_jitter_that_keeps_the_order_is_not_taken_for_free_jitter() -> None:
+def test_jitter_that_keeps_the_order_is_not_taken_for_free_jitter():
     ordered = crossing(WireConfig(delay_s=0.05, jitter_s=0.02), 1500, 1e-3)
     assert not find_jitter(ordered)[1].passed
 
 
-def test_a_finding_says_what_was_wanted_and_whether_it_passed() -> None:
+def test_a_finding_says_what_was_wanted_and_whether_it_passed():
     line = str(LinkFinding("rate", "kbit/s", 1000.0, 975.0, 20.0))
     words = " ".join(line.split())
     assert words == "rate 975.000 wanted 1000.000 within 20.000 kbit/s MISSED"
 
 
-def test_a_missed_finding_is_the_exit_code(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_missed_finding_is_the_exit_code(monkeypatch, capsys):
     monkeypatch.setattr(cell, "why_no_packets", lambda: "")
     for found, code in ((50.5, 0), (52.0, 1)):
         findings = [LinkFinding("delay, median", "ms", 50.0, found, 1.0)]
@@ -88,9 +86,7 @@ def test_a_missed_finding_is_the_exit_code(
     assert "a quiet machine helps" in capsys.readouterr().out
 
 
-def test_where_there_is_no_link_the_check_says_why_and_offers_the_relay(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_where_there_is_no_link_the_check_says_why_and_offers_the_relay(monkeypatch):
     monkeypatch.setattr(cell, "why_no_packets", lambda: "the emulated link needs Linux")
-    with pytest.raises(EmulatorError, match="needs Linux; a relay of TCP over the loopback can"):
+    with pytest.raises(EmulatorError, match="Linux; a relay"):
         check(["link"])

@@ -13,6 +13,7 @@ from typing import IO
 import pytest
 from helpers.network.emulated_link import all_end, need_link, networks, wait_for_children
 from helpers.processes.patience import becomes
+from helpers.wording import unnamed
 
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.emulator.cell import (
@@ -64,7 +65,7 @@ def run() -> Iterator[Run]:
 
 
 @pytest.mark.parametrize("rootless", [False, True], ids=["root or not", "user namespace"])
-def test_real_packets_are_lost_as_told(rootless: bool) -> None:
+def test_real_packets_are_lost_as_told(rootless):
     need_link(rootless)
     loss, bursts = (PROBES[2], find_loss), (PROBES[3], find_bursts)
     for probe, find in (loss,) if rootless else (loss, bursts):
@@ -74,7 +75,7 @@ def test_real_packets_are_lost_as_told(rootless: bool) -> None:
         assert [str(finding) for finding in find(crossing) if not finding.passed] == []
 
 
-def test_no_real_packet_is_early_or_faster_than_the_line() -> None:
+def test_no_real_packet_is_early_or_faster_than_the_line():
     """It may be late on a busy machine: how late is what the link's own check asks."""
     need_link()
     delay, rate = PROBES[0], PROBES[-1]
@@ -85,7 +86,7 @@ def test_no_real_packet_is_early_or_faster_than_the_line() -> None:
     assert queued.delays[-1] >= rate.count * (8e-3 - rate.interval_s) - 1e-3
 
 
-def test_a_condition_is_measured_with_all_its_columns() -> None:
+def test_a_condition_is_measured_with_all_its_columns():
     """A hundred milliseconds away and five of service: a command is at least 105 old."""
     need_link()
     condition = Condition("req", 10, timeout_ms=2500, attempts=3, delay_ms=100, dur_s=2)
@@ -98,7 +99,7 @@ def test_a_condition_is_measured_with_all_its_columns() -> None:
     assert (row["first_seq"], row["dup"], row["timeouts"], row["alerts"]) == ("0", "0", "0", "0")
 
 
-def test_a_publisher_that_does_not_wait_loses_its_first_commands() -> None:
+def test_a_publisher_that_does_not_wait_loses_its_first_commands():
     """Four round trips of 0.2 s at 50 a second: the first forty and one at least."""
     need_link()
     row = measure(Condition("pub", 50, delay_ms=100, wait_hs=False, warm_s=0, dur_s=2), 1)
@@ -106,14 +107,14 @@ def test_a_publisher_that_does_not_wait_loses_its_first_commands() -> None:
     assert row["t_hs_ms"] == row["rtt_p50"] == row["timeouts"] == ""
 
 
-def test_a_dealer_hears_replies_while_it_sends() -> None:
+def test_a_dealer_hears_replies_while_it_sends():
     need_link()
     row = measure(Condition("dealer", 50, delay_ms=50, dur_s=1), 1)
     assert float(row["rtt_p50"]) >= 105
     assert int(row["n_sent"]) == 50
 
 
-def test_a_robot_that_is_too_slow_makes_requests_time_out_and_commands_repeat() -> None:
+def test_a_robot_that_is_too_slow_makes_requests_time_out_and_commands_repeat():
     """300 ms of service, 100 ms of patience, two attempts: alerts, and nothing else."""
     need_link()
     condition = Condition("req", 10, 300, 100, 2, warm_s=0, dur_s=2)
@@ -123,20 +124,20 @@ def test_a_robot_that_is_too_slow_makes_requests_time_out_and_commands_repeat() 
     assert int(row["dup"]) > 0
 
 
-def test_each_end_has_a_network_of_its_own_and_this_one_is_not_touched(run: Run) -> None:
+def test_each_end_has_a_network_of_its_own_and_this_one_is_not_touched(run):
     devices = socket.if_nameindex()
     ends = wait_for_children(run.pid, 2)
     assert becomes(lambda: len(networks(os.getpid(), run.pid, *ends)) == 4)
     assert socket.if_nameindex() == devices
 
 
-def test_a_killed_forwarder_leaves_nothing(run: Run) -> None:
+def test_a_killed_forwarder_leaves_nothing(run):
     ends = [os.pidfd_open(pid) for pid in wait_for_children(run.pid, 2)]
     run.process.kill()
     assert all_end(ends)
 
 
-def test_a_killed_parent_leaves_nothing() -> None:
+def test_a_killed_parent_leaves_nothing():
     need_link()
     parent = subprocess.Popen([sys.executable, "-c", WAITING], stderr=subprocess.DEVNULL)
     try:
@@ -149,13 +150,13 @@ def test_a_killed_parent_leaves_nothing() -> None:
     assert all_end(handles)
 
 
-def test_a_run_ends_when_nobody_waits_for_it(run: Run) -> None:
+def test_a_run_ends_when_nobody_waits_for_it(run):
     ends = [os.pidfd_open(pid) for pid in wait_for_children(run.pid, 2)]
     run.leave()
     assert all_end([os.pidfd_open(run.pid), *ends])
 
 
-def test_a_killed_robot_ends_the_run_and_is_named(run: Run) -> None:
+def test_a_killed_robot_ends_the_run_and_is_named(run):
     operator, robot = wait_for_children(run.pid, 2)
     assert becomes(lambda: len(networks(run.pid, operator, robot)) == 3)
     handles = [os.pidfd_open(pid) for pid in (run.pid, operator)]
@@ -165,33 +166,30 @@ def test_a_killed_robot_ends_the_run_and_is_named(run: Run) -> None:
     assert EmulatedOutcome.from_json(run.out.read().decode()).problem.startswith("the robot")
 
 
-def test_a_run_that_takes_too_long_is_ended() -> None:
+def test_a_run_that_takes_too_long_is_ended():
     need_link()
     job = job_of(LONG, 1)
     short = EmulatedJob("commands", bound_s=0.1, arguments=job.arguments, room=job.room)
-    with pytest.raises(EmulatorError, match=r"did not come to an end within 0\.1 s"):
+    with pytest.raises(EmulatorError, match=r"within 0\.1 s"):
         run_job(short)
 
 
-def test_a_congestion_control_that_the_kernel_does_not_have_is_told_in_one_line() -> None:
+def test_a_congestion_control_that_the_kernel_does_not_have_is_told_in_one_line():
     need_link()
     with pytest.raises(EmulatorError, match="congestion control 'none-such' is refused") as told:
         run_job(EmulatedJob("nothing", congestion="none-such"))
     assert "\n" not in str(told.value)
 
 
-def test_where_packets_can_be_emulated_nothing_is_missing() -> None:
+def test_where_packets_can_be_emulated_nothing_is_missing():
     need_link()
     assert why_no_packets() == ""
 
 
-def test_where_devices_are_forbidden_one_line_says_what_is_needed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_where_devices_are_forbidden_one_line_says_what_is_needed(monkeypatch):
     def refuse(job: EmulatedJob) -> None:
         raise EmulatorError("a user namespace is refused: Operation not permitted")
 
     monkeypatch.setattr("dva_sim.validation.network.emulator.cell.run_job", refuse)
     told = why_no_packets()
-    assert told.startswith("the emulated link needs Linux, /dev/net/tun open for reading")
-    assert told.endswith("here a user namespace is refused: Operation not permitted")
+    assert not unnamed(told, "Linux", "/dev/net/tun", "Operation not permitted")

@@ -28,6 +28,6 @@ def test_notes_of_a_process_are_read_after_it_ended() -> None:
 def test_there_is_no_note_without_room() -> None:
     notes = Notes(1)
     notes.add(NoteKind.ALERT, 1, 1.0)
-    with pytest.raises(MemoryError, match="no room for more than 1 notes"):
+    with pytest.raises(MemoryError, match="more than 1 notes"):
         notes.add(NoteKind.ALERT, 2, 2.0)
     assert notes.read() == [(NoteKind.ALERT, 1, 1.0)]

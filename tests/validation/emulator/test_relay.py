@@ -89,5 +89,5 @@ def test_programs_are_measured_through_the_relay() -> None:
 
 @pytest.mark.parametrize("asked", [{"loss": 0.01}, {"reorder": True}])
 def test_a_relay_does_not_pretend_what_it_cannot_do(asked: dict[str, object]) -> None:
-    with pytest.raises(EmulatorError, match="can neither lose nor reorder packets"):
+    with pytest.raises(EmulatorError, match="lose nor reorder"):
         measure(dataclasses.replace(CONDITION, **asked), 1, "proxy")  # type: ignore[arg-type]

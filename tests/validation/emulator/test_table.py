@@ -48,7 +48,7 @@ def test_two_campaigns_cannot_write_to_one_table(path: Path) -> None:
 
 
 def test_another_table_is_not_written_to(path: Path) -> None:
-    with pytest.raises(ConfigError, match="is not a table of measurements: other columns"):
+    with pytest.raises(ConfigError, match="other columns"):
         Table(path, ("cell", "length"))
 
 

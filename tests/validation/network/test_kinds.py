@@ -36,7 +36,7 @@ def test_runs_that_share_their_luck_are_set_aside_where_others_do_not():
 def test_under_loss_shared_luck_alone_says_nothing():
     lossy = Condition("pub", 10, loss=0.05)
     [group] = grouped([run(lossy, 1, "D", independent=False)])
-    assert group.left_out == "shares its luck with other conditions"
+    assert "shares its luck" in group.left_out
     [group] = grouped([run(Condition("pub", 10), 1, "D", independent=False)])
     assert not group.left_out
 
@@ -53,9 +53,8 @@ def test_a_requester_asks_too_much_only_of_a_robot_slower_than_its_timeout():
 
 
 def test_the_phase_of_a_robot_in_step_with_its_commands_is_not_judged():
-    assert why_not_judged(Condition("pub", 10, proc_ms=100)) == "the service time equals the period"
-    latest = Condition("pub", 50, proc_ms=100, conflate="both")
-    assert why_not_judged(latest) == "microseconds decide which command is the latest"
+    assert "period" in why_not_judged(Condition("pub", 10, proc_ms=100))
+    assert "latest" in why_not_judged(Condition("pub", 50, proc_ms=100, conflate="both"))
     assert not why_not_judged(Condition("pub", 50, proc_ms=100))
 
 

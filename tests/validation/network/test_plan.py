@@ -55,14 +55,14 @@ def test_every_link_meets_every_pair_of_programs():
 
 def test_a_setting_that_no_condition_has_is_refused():
     block = BlockConfig(group="x", links={"a": {"delay": 3}}, programs={"p": {"pattern": "pub"}})
-    with pytest.raises(ConfigError, match="setting 'delay' is unknown; did you mean 'delay_ms'"):
+    with pytest.raises(ConfigError, match=r"'delay' .*'delay_ms'"):
         conditions_of(block)
 
 
 def test_a_table_that_is_not_one_of_measurements_is_refused(tmp_path):
     path = tmp_path / "other.csv"
     path.write_text("a,b\n1,2\n")
-    with pytest.raises(ConfigError, match="has no column group, seed, n_sent"):
+    with pytest.raises(ConfigError, match="group, seed, n_sent"):
         read_runs("own", SourceConfig(file=str(path), made_with={}))
 
 

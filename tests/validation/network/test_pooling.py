@@ -37,9 +37,9 @@ def test_z_is_the_difference_over_the_spread_scaled_to_both_numbers_of_runs():
 
 def test_a_right_model_passes_and_one_that_is_a_quarter_off_does_not(monkeypatch):
     monkeypatch.setattr(pooling, "DRAWS", 150)
-    passed = [pool(cells(1.0, seed), RNG(0)).passes for seed in range(20)]
-    assert sum(passed) >= 14
-    assert not any(pool(cells(1.25, seed), RNG(0)).passes for seed in range(5))
+    passed = [pool(cells(1.0, seed), RNG(0)).passes for seed in range(8)]
+    assert sum(passed) >= 5
+    assert not any(pool(cells(1.25, seed), RNG(0)).passes for seed in range(3))
 
 
 def test_a_model_that_is_a_little_off_everywhere_is_biased():

@@ -101,7 +101,7 @@ def test_datagrams_neither_wait_nor_come_again():
 def test_a_mechanism_is_left_out_by_its_name():
     lossy = Condition("pub", 50, loss=0.05, delay_ms=50, dur_s=12)
     assert predict(lossy, 1, without=["RACK"]) != predict(lossy, 1)
-    with pytest.raises(ConfigError, match="mechanism 'FRTO' is unknown; known: send buffer"):
+    with pytest.raises(ConfigError, match=r"'FRTO' .*known: send buffer"):
         predict(lossy, 1, without=["FRTO"])
 
 

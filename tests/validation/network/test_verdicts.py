@@ -44,7 +44,8 @@ def test_a_tail_has_10_ms_more_where_the_link_had_no_priority():
 
 def test_no_tail_is_judged_where_the_link_itself_was_late():
     verdict = judge(cell("lossless", "age_p95", 100.0, 500.0, late=5.1))
-    assert (verdict.word, verdict.why) == ("shown only", "the emulated link was late")
+    assert verdict.word == "shown only"
+    assert "late" in verdict.why
     assert judge(cell("lossless", "age_p50", 100.0, 500.0, late=5.1)).word == "outside"
 
 

