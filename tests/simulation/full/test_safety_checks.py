@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from helpers.dva.permissions import enter
+from helpers.wording import counted
 
 from dva_sim.agents.device import command_topic
 from dva_sim.agents.operator.drive import Teleoperation
@@ -96,19 +97,160 @@ def recorded(fact: Any) -> Any:
     return of_plain(word, time, json.loads(json.dumps(told, allow_nan=False)))
 
 
-def test_what_the_audit_checks_is_said_of_every_rule_it_can_find_broken() -> None:
+def test_what_the_audit_checks_is_said_of_every_rule_it_can_find_broken():
     assert list(CHECKED) == list(RULES) == [f"S{number}" for number in range(1, 8)]
     assert all("slack" in said for said in CHECKED.values())
 
 
-def test_an_honest_drive_breaks_no_rule() -> None:
+def test_an_honest_drive_breaks_no_rule():
     assert played().recorder.violations == {}
 
 
+# --- robots with a planted bug ------------------------------------------------------------
+
+Plan = tuple[float, m.Body]
+TURN = m.SetTeleOp(0.1, 0.3)
+
+
+def asked(until: float, *plans: Plan, source: str = DVA, **changes: object) -> Run:
+    """A robot that somebody asks for something at some times."""
+    run = staged(**changes)
+    for time, body in plans:
+        ask(run, time, body, 0 if isinstance(body, m.Emergency) else 5, source)
+    run.clock.run(until)
+    return run
+
+
+def driven(until: float, *plans: Plan, **changes: object) -> Run:
+    """The DVA drives it from 11 s on."""
+    begins = (10.0, m.PermissionGrant(DVA, "both", 5)), (11.0, m.StartTeleOp())
+    return asked(until, *begins, *plans, **changes)
+
+
+def sent(word: m.Body) -> Run:
+    """It is sent to a place 12 s after the start, and is told something 2 s later."""
+    goal = m.Position(*made(EARLY).stage.site.frame.to_latlon(30.0, 12.0))
+    begins = (10.0, m.PermissionGrant(DVA, "missions", 5)), (12.0, m.GoTo((goal,)))
+    return asked(20.0, *begins, (14.0, word))
+
+
+def every_second(first: float, last: float, body: m.Body) -> list[Plan]:
+    return [(first + n, body) for n in range(int(last - first) + 1)]
+
+
+def ok(*_: Any) -> Decision:
+    return Decision(m.OK, "stopped")
+
+
+def deaf(self: RobotController, now: float) -> Decision:
+    """It says that it has heard of an emergency, or even does not remember one."""
+    self.emergency_at = now
+    return ok()
+
+
+def sets(**changed: Callable[[TimedSetPoint], float]) -> Callable[..., Decision]:
+    """A robot that makes something else of the set points that it is given."""
+    honest = RobotController._set
+
+    def other(self: RobotController, *args: Any) -> Decision:
+        decision = honest(self, *args)
+        wanted = decision.set_point
+        assert wanted is not None
+        new = {name: value(wanted) for name, value in changed.items()}
+        return decision._replace(set_point=wanted._replace(**new))
+
+    return other
+
+
+def asks_for(speed: float) -> Callable[..., None]:
+    """Motors that are asked for a speed beyond their limits."""
+
+    def unlimited(self: RobotBody, wanted: float, turn_rate: float, until: float) -> None:
+        target = TickTarget(speed if wanted else 0.0, turn_rate, self._world.tick_at(until))
+        self._asked.put(self._world.next_tick(), target)
+
+    return unlimited
+
+
+READS = m.DevSub("temperature", 1.0)
+MAY_READ = m.PermissionGrant(DVA, "sensors", 5, None, ("temperature",))
+OVER = m.PermissionRevocation(ROBOT, DVA, 5)
+FAST = (12.0, m.SetTeleOp(0.5, 0.0))
+AFTER_AN_EMERGENCY = (*every_second(12, 39, m.SetTeleOp(0.1, 0.4)), (20.5, m.Emergency()))
+LEFT_TO_THE_WATCHDOG = (12.0, TURN), (12.1, m.Emergency())
+PLANTED: dict[str, tuple[Callable[[], Run], str, Callable[..., Any], set[str]]] = {
+    "a stranger drives": (
+        lambda: asked(25, (10, m.StartTeleOp()), *every_second(11, 19, TURN), source=STRANGER),
+        *("_refusal", lambda *_: None, {"S5"}),
+    ),
+    "a stranger reads": (
+        lambda: asked(12, (10.0, READS), source=STRANGER),
+        *("_subscription", ok, {"S5"}),
+    ),
+    "one whose permission is over reads": (
+        lambda: asked(14, (10.0, MAY_READ), (11.0, OVER), (12.0, READS)),
+        *("_subscription", ok, {"S5"}),
+    ),
+    "it does not hear that a session is over": (
+        lambda: driven(45, (15.0, OVER), *every_second(12.5, 39.5, TURN)),
+        *("_revoked", ok, {"S2"}),
+    ),
+    "a silent driver keeps it": (
+        lambda: driven(50, (12.0, TURN)),
+        *("expire", lambda *_: False, {"S2"}),
+    ),
+    "a driver keeps it who speaks again": (
+        lambda: driven(50, (12.0, TURN), (47.0, TURN)),
+        *("expire", lambda *_: False, {"S1", "S2"}),
+    ),
+    "it forgets an emergency": (lambda: driven(45, *AFTER_AN_EMERGENCY), "_emergency", ok, {"S3"}),
+    "it lies about an emergency": (
+        lambda: driven(45, *AFTER_AN_EMERGENCY),
+        *("_emergency", deaf, {"S3"}),
+    ),
+    "the watchdog ends an emergency": (
+        lambda: driven(15, *LEFT_TO_THE_WATCHDOG, **{"robot.watchdog_s": 1.0}),
+        *("_emergency", ok, {"S3"}),
+    ),
+    "too fast": (lambda: driven(13, FAST), "drive", asks_for(0.6), {"S4"}),
+    "no number": (lambda: driven(13, FAST), "drive", asks_for(float("nan")), {"S4"}),
+    "backwards": (lambda: driven(13, FAST), "drive", asks_for(-0.2), {"S4"}),
+    "a set point that never expires": (
+        lambda: driven(30, (12.0, m.SetTeleOp(0.1, 0.4))),
+        *("_set", sets(until=lambda _: 1e6), {"S1"}),
+    ),
+    "it is told to stop once": (
+        lambda: driven(20, (12.0, TURN), (12.1, m.StopTeleOp())),
+        *("_stop", ok, {"S1"}),
+    ),
+    "it is told to stop and driven on": (
+        lambda: driven(20, (12.0, TURN), (12.1, m.StopTeleOp()), *every_second(14, 16, TURN)),
+        *("_stop", ok, {"S1"}),
+    ),
+    "a watchdog a second too long": (
+        lambda: played(horizon_s=20),
+        *("_set", sets(until=lambda wanted: wanted.until + 1.0), {"S1"}),
+    ),
+    "a watchdog a tenth too long": (
+        lambda: played(horizon_s=20),
+        *("_set", sets(until=lambda wanted: wanted.until + 0.1), {"S1"}),
+    ),
+    "a mission outlives its session": (lambda: sent(OVER), "_revoked", ok, {"S1"}),
+    "a mission outlives its end": (lambda: sent(m.CancelMission()), "_cancel", ok, {"S1"}),
+}
+
+
+@pytest.mark.invariant("S1", "S2", "S3", "S4", "S5")
+@pytest.mark.parametrize("what", PLANTED)
+def test_a_robot_with_a_planted_bug_breaks_its_rule_and_an_honest_one_none(monkeypatch, what):
+    play, method, bug, rules = PLANTED[what]
+    assert broken(play()) == set()
+    monkeypatch.setattr(RobotBody if method == "drive" else RobotController, method, bug)
+    assert broken(play()) == rules
+
+
 @pytest.mark.invariant("S1")
-def test_a_robot_that_does_not_mind_how_old_the_picture_is_breaks_s1(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_robot_that_does_not_mind_how_old_the_picture_is_breaks_s1(monkeypatch):
     """The phone has just issued the command; the picture behind it is seconds old."""
     honest = RobotController._set
 
@@ -139,63 +281,8 @@ def test_a_robot_that_does_not_mind_how_old_the_picture_is_breaks_s1(
     assert broken(drive()) == {"S1"}
 
 
-def obeys_anybody(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RobotController, "_refusal", lambda *_: None)
-
-
-@pytest.mark.invariant("S5")
-def test_a_robot_that_obeys_a_stranger_breaks_s5(monkeypatch: pytest.MonkeyPatch) -> None:
-    def attacked() -> Run:
-        run = staged()
-        ask(run, 10.0, m.StartTeleOp(), source=STRANGER)
-        for second in range(11, 20):
-            ask(run, second, m.SetTeleOp(0.3, 0.0), source=STRANGER)
-        run.clock.run(25.0)
-        return run
-
-    assert broken(attacked()) == set()
-    obeys_anybody(monkeypatch)
-    assert "S5" in broken(attacked())
-
-
-@pytest.mark.invariant("S5")
-def test_a_robot_that_lets_anybody_read_its_sensors_breaks_s5(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def read() -> Run:
-        run = staged()
-        ask(run, 10.0, m.DevSub("temperature", 1.0), source=STRANGER)
-        run.clock.run(12.0)
-        return run
-
-    assert broken(read()) == set()
-    monkeypatch.setattr(RobotController, "_subscription", lambda *_: Decision(m.OK))
-    assert broken(read()) == {"S5"}
-
-
 @pytest.mark.invariant("S2")
-def test_a_robot_that_does_not_hear_that_a_session_is_over_breaks_s2(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def revoked() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        ask(run, 15.0, m.PermissionRevocation(ROBOT, DVA, 5))
-        for second in range(12, 40):
-            ask(run, second + 0.5, m.SetTeleOp(0.1, 0.3))
-        run.clock.run(45.0)
-        return run
-
-    assert broken(revoked()) == set()
-    monkeypatch.setattr(RobotController, "_revoked", lambda *_: Decision(m.OK))
-    assert "S2" in broken(revoked())
-
-
-@pytest.mark.invariant("S2")
-def test_a_robot_that_changes_hands_while_it_moves_breaks_s2(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_robot_that_changes_hands_while_it_moves_breaks_s2(monkeypatch):
     other = id_of("operator", 1)
 
     def handed_over() -> Run:
@@ -221,35 +308,13 @@ def test_a_robot_that_changes_hands_while_it_moves_breaks_s2(
     assert "S2" in broken(handed_over())
 
 
-def test_the_limits_of_silence_are_those_of_robots_and_the_dva() -> None:
+def test_the_limits_of_silence_are_those_of_robots_and_the_dva():
     """The audit has its own: one that is changed by mistake is to be found out."""
     assert (LEASE_S, Registry().silent_after) == (LEASE, SILENT_AFTER)
 
 
 @pytest.mark.invariant("S2")
-@pytest.mark.parametrize("again", [False, True], ids=["silent", "speaks again"])
-def test_a_robot_that_is_kept_by_a_silent_driver_for_ever_breaks_s2(
-    monkeypatch: pytest.MonkeyPatch, again: bool
-) -> None:
-    def kept() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        ask(run, 12.0, m.SetTeleOp(0.1, 0.3))
-        if again:
-            ask(run, 47.0, m.SetTeleOp(0.1, 0.3))
-        run.clock.run(50.0)
-        return run
-
-    assert broken(kept()) == set()
-    monkeypatch.setattr(RobotController, "expire", lambda *_: False)
-    assert broken(kept()) == ({"S1", "S2"} if again else {"S2"})
-
-
-@pytest.mark.invariant("S2")
-def test_a_dva_that_never_takes_back_the_permission_of_a_silent_device_breaks_s2(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_dva_that_never_takes_back_the_permission_of_a_silent_device_breaks_s2(monkeypatch):
     def falls_silent() -> Run:
         run = made({"horizon_s": 60})
         run.clock.run(15.0)
@@ -268,7 +333,7 @@ def test_a_dva_that_never_takes_back_the_permission_of_a_silent_device_breaks_s2
     assert broken(falls_silent()) == {"S2"}
 
 
-def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule() -> None:
+def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule():
     """Its first page has events that others have confirmed, and one that somebody is sent to."""
     run = made({"horizon_s": 60})
     run.run()
@@ -290,7 +355,7 @@ def test_what_a_dva_remembers_of_an_earlier_life_breaks_no_rule() -> None:
     assert (found["S6"], found["S7"]) == ("held", "held")
 
 
-def test_a_dva_that_was_silenced_is_late_with_nothing() -> None:
+def test_a_dva_that_was_silenced_is_late_with_nothing():
     """Somebody has stopped it at a console: what waits for it waits no longer by the rules."""
     run = made({"dispatch.escalate_after_s": 20})
     run.dva.desk.dispatcher.decide = lambda _: []  # type: ignore[method-assign]
@@ -303,53 +368,7 @@ def test_a_dva_that_was_silenced_is_late_with_nothing() -> None:
 
 
 @pytest.mark.invariant("S3")
-@pytest.mark.parametrize("lies", [False, True])
-def test_a_robot_that_drives_on_after_an_emergency_breaks_s3_whatever_it_says(
-    monkeypatch: pytest.MonkeyPatch, lies: bool
-) -> None:
-    def stopped() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        for second in range(12, 40):
-            ask(run, second, m.SetTeleOp(0.1, 0.4))
-        ask(run, 20.5, m.Emergency(), session=0)
-        run.clock.run(45.0)
-        return run
-
-    def deaf(self: RobotController, now: float) -> Decision:
-        self.emergency_at = now if lies else -1.0
-        return Decision(m.OK, "stopped")
-
-    assert broken(stopped()) == set()
-    monkeypatch.setattr(RobotController, "_emergency", deaf)
-    assert "S3" in broken(stopped())
-
-
-@pytest.mark.invariant("S3")
-def test_an_emergency_that_is_answered_and_left_to_the_watchdog_breaks_s3(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The driver falls silent, so that the robot stands soon anyway: its motors give it away."""
-
-    def stopped() -> Run:
-        run = staged(**{"robot.watchdog_s": 1.0})
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        ask(run, 12.0, m.SetTeleOp(0.1, 0.4))
-        ask(run, 12.1, m.Emergency(), session=0)
-        run.clock.run(15.0)
-        return run
-
-    assert broken(stopped()) == set()
-    monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
-    assert broken(stopped()) == {"S3"}
-
-
-@pytest.mark.invariant("S3")
-def test_a_robot_that_moves_by_itself_after_an_emergency_breaks_s3(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_robot_that_moves_by_itself_after_an_emergency_breaks_s3(monkeypatch):
     """Its mode says Mission, so that no command is looked for; its body gives it away."""
     run = staged()
     ask(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
@@ -368,37 +387,13 @@ def test_a_robot_that_moves_by_itself_after_an_emergency_breaks_s3(
 
 
 @pytest.mark.invariant("S4")
-def test_motors_that_ignore_their_limit_break_s4(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_motors_that_ignore_their_limit_break_s4(monkeypatch):
     run = staged()
     run.clock.run(10.0)
     body = run.field.robots[ROBOT].body
     body.body.angular_velocity = 2.0
     run._watch()
     assert "S4" in broken(run)
-
-
-@pytest.mark.invariant("S4")
-@pytest.mark.parametrize("speed", [0.6, float("nan"), -0.2])
-def test_motors_that_are_asked_for_more_than_they_may_break_s4(
-    monkeypatch: pytest.MonkeyPatch, speed: float
-) -> None:
-    """They are so for half a second, which a heavy body does not show."""
-
-    def driven() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        ask(run, 12.0, m.SetTeleOp(0.5, 0.0))
-        run.clock.run(13.0)
-        return run
-
-    def unlimited(self: RobotBody, wanted: float, turn_rate: float, until: float) -> None:
-        asked = TickTarget(speed if wanted else 0.0, turn_rate, self._world.tick_at(until))
-        self._asked.put(self._world.next_tick(), asked)
-
-    assert broken(driven()) == set()
-    monkeypatch.setattr(RobotBody, "drive", unlimited)
-    assert broken(driven()) == {"S4"}
 
 
 @pytest.mark.invariant("S6")
@@ -412,9 +407,7 @@ def test_motors_that_are_asked_for_more_than_they_may_break_s4(
     ],
     ids=["lost", "counted twice", "open and closed", "in a state nobody counted"],
 )
-def test_a_book_that_loses_or_doubles_an_event_breaks_s6(
-    lose: Callable[[EventBook, Any], object],
-) -> None:
+def test_a_book_that_loses_or_doubles_an_event_breaks_s6(lose):
     run = made(EARLY)
     run.clock.run(10.0)
     assert broken(run) == set()
@@ -425,9 +418,7 @@ def test_a_book_that_loses_or_doubles_an_event_breaks_s6(
 
 
 @pytest.mark.invariant("S6")
-def test_a_report_that_the_dva_thanks_for_and_forgets_breaks_s6(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_report_that_the_dva_thanks_for_and_forgets_breaks_s6(monkeypatch):
     def forgetful(self: EventBook, *args: Any, **more: Any) -> Any:
         event = honest(self, *args, **more)
         del self.open[event.number], self.waiting[event.number]
@@ -443,7 +434,7 @@ def test_a_report_that_the_dva_thanks_for_and_forgets_breaks_s6(
 
 
 @pytest.mark.invariant("S6")
-def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch):
     def kept() -> Run:
         """A drive takes 40 s, an order may take 20."""
         return played(**{"dispatch.order_limit_s": 20})
@@ -454,7 +445,7 @@ def test_an_order_that_is_kept_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.invariant("S7")
-def test_times_out_of_order_break_s7() -> None:
+def test_times_out_of_order_break_s7():
     run = made(EARLY)
     run.clock.run(10.0)
     event = next(iter(run.dva.desk.book.open.values()))
@@ -463,7 +454,7 @@ def test_times_out_of_order_break_s7() -> None:
     assert broken(run) == {"S7"}
 
 
-def test_time_that_runs_back_breaks_s7() -> None:
+def test_time_that_runs_back_breaks_s7():
     run = staged()
     run.clock.run(10.0)
     for observer in run._observers:
@@ -471,32 +462,8 @@ def test_time_that_runs_back_breaks_s7() -> None:
     assert broken(run) == {"S7"}
 
 
-def test_a_set_point_that_never_expires_breaks_s1(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A robot is told once to turn on the spot, slowly forward, and never again."""
-
-    def told_once() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        ask(run, 12.0, m.SetTeleOp(0.1, 0.4))
-        run.clock.run(30.0)
-        return run
-
-    honest = RobotController._set
-
-    def trusting(self: RobotController, *args: Any) -> Decision:
-        decision = honest(self, *args)
-        return decision._replace(set_point=TimedSetPoint(0.1, 0.4, 1e6))
-
-    assert broken(told_once()) == set()
-    monkeypatch.setattr(RobotController, "_set", trusting)
-    assert broken(told_once()) == {"S1"}
-
-
 @pytest.mark.invariant("S1")
-def test_a_robot_that_obeys_a_tick_from_the_future_breaks_s1(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_robot_that_obeys_a_tick_from_the_future_breaks_s1(monkeypatch):
     def ahead() -> Run:
         run = staged()
         run.network.subscribe(DVA, ROBOT, "frame|", lambda _: None)
@@ -517,25 +484,8 @@ def test_a_robot_that_obeys_a_tick_from_the_future_breaks_s1(
     assert broken(ahead()) == {"S1"}
 
 
-@pytest.mark.invariant("S5")
-def test_a_robot_whose_permission_to_read_is_over_breaks_s5_if_it_lets_one_read(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def read() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "sensors", 5, None, ("temperature",)))
-        ask(run, 11.0, m.PermissionRevocation(ROBOT, DVA, 5))
-        ask(run, 12.0, m.DevSub("temperature", 1.0))
-        run.clock.run(14.0)
-        return run
-
-    assert broken(read()) == set()
-    monkeypatch.setattr(RobotController, "_subscription", lambda *_: Decision(m.OK))
-    assert broken(read()) == {"S5"}
-
-
 @pytest.mark.parametrize("forged", ["revocation", "grant"])
-def test_a_forgery_makes_no_honest_robot_a_breaker_of_rules(forged: str) -> None:
+def test_a_forgery_makes_no_honest_robot_a_breaker_of_rules(forged):
     """Somebody speaks in the DVA's name; the robot asks the DVA, and is driven on."""
     run = made({"horizon_s": 90})
     run.clock.run(25.0)
@@ -554,7 +504,7 @@ def test_a_forgery_makes_no_honest_robot_a_breaker_of_rules(forged: str) -> None
     assert broken(run) == set()
 
 
-def test_a_count_below_zero_breaks_s6() -> None:
+def test_a_count_below_zero_breaks_s6():
     run = staged()
     run.clock.run(10.0)
     counts = run.dva.desk.book.counts
@@ -567,70 +517,9 @@ def test_a_count_below_zero_breaks_s6() -> None:
 # --- what others say of themselves -------------------------------------------------------
 
 
-def ends_its_session(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RobotController, "_revoked", lambda *_: Decision(m.OK))
-
-
-def cancels_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RobotController, "_cancel", lambda *_: Decision(m.OK))
-
-
-@pytest.mark.invariant("S1")
-@pytest.mark.parametrize(
-    ("word", "deaf"),
-    [
-        (m.PermissionRevocation(ROBOT, DVA, 5), ends_its_session),
-        (m.CancelMission(), cancels_nothing),
-    ],
-    ids=["its session", "its cancelling"],
-)
-def test_a_mission_that_outlives_what_ends_it_breaks_s1(
-    monkeypatch: pytest.MonkeyPatch, word: m.Body, deaf: Callable[[pytest.MonkeyPatch], None]
-) -> None:
-    """The robot says that it is on a mission, and so it is."""
-
-    def sent() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
-        goal = m.Position(*run.stage.site.frame.to_latlon(30.0, 12.0))
-        ask(run, 12.0, m.GoTo((goal,)))
-        ask(run, 14.0, word)
-        run.clock.run(20.0)
-        return run
-
-    assert broken(sent()) == set()
-    deaf(monkeypatch)
-    run = sent()
-    assert run.field.robots[ROBOT].controller.mode is Mode.MISSION
-    assert broken(run) == {"S1"}
-
-
-@pytest.mark.invariant("S1")
-@pytest.mark.parametrize("commands", [0, 3], ids=["no more commands", "more commands"])
-def test_a_robot_that_says_ok_to_a_stop_and_drives_on_breaks_s1(
-    monkeypatch: pytest.MonkeyPatch, commands: int
-) -> None:
-    def stopped() -> Run:
-        run = staged()
-        ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
-        ask(run, 11.0, m.StartTeleOp())
-        ask(run, 12.0, m.SetTeleOp(0.1, 0.3))
-        ask(run, 12.1, m.StopTeleOp())
-        for second in range(commands):
-            ask(run, 14.0 + second, m.SetTeleOp(0.1, 0.3))
-        run.clock.run(20.0)
-        return run
-
-    assert broken(stopped()) == set()
-    monkeypatch.setattr(RobotController, "_stop", lambda *_: Decision(m.OK))
-    assert broken(stopped()) == {"S1"}
-
-
 @pytest.mark.invariant("S1")
 @pytest.mark.parametrize("numbers", [(51, 50), (50, 50)], ids=["out of order", "twice"])
-def test_commands_that_act_out_of_order_or_twice_break_s1(
-    monkeypatch: pytest.MonkeyPatch, numbers: tuple[int, int]
-) -> None:
+def test_commands_that_act_out_of_order_or_twice_break_s1(monkeypatch, numbers):
     def driven() -> Run:
         run = staged(pattern="pub-sub")
         ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
@@ -655,28 +544,7 @@ def test_commands_that_act_out_of_order_or_twice_break_s1(
 
 
 @pytest.mark.invariant("S1")
-@pytest.mark.parametrize("longer", [1.0, 0.1])
-def test_a_watchdog_that_is_too_long_breaks_s1(
-    monkeypatch: pytest.MonkeyPatch, longer: float
-) -> None:
-    """The robot brakes in time all the same: it is what the motors are asked for that tells."""
-    honest = RobotController._set
-
-    def patient(self: RobotController, *args: Any) -> Decision:
-        decision = honest(self, *args)
-        wanted = decision.set_point
-        assert wanted is not None
-        return decision._replace(set_point=wanted._replace(until=wanted.until + longer))
-
-    assert broken(played(horizon_s=20)) == set()
-    monkeypatch.setattr(RobotController, "_set", patient)
-    assert broken(played(horizon_s=20)) == {"S1"}
-
-
-@pytest.mark.invariant("S1")
-def test_the_age_of_a_command_is_known_though_nobody_watches_the_camera(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_age_of_a_command_is_known_though_nobody_watches_the_camera(monkeypatch):
     def late() -> Run:
         run = staged()
         ask(run, 10.0, m.PermissionGrant(DVA, "both", 5))
@@ -700,7 +568,7 @@ def test_the_age_of_a_command_is_known_though_nobody_watches_the_camera(
 
 
 @pytest.mark.invariant("S6")
-def test_a_wait_that_begins_anew_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wait_that_begins_anew_for_ever_breaks_s6(monkeypatch):
     """Nobody is sent; the DVA sets back what it escalates by."""
     alone = {"dispatch.escalate_after_s": 20}
     monkeypatch.setattr(Dispatcher, "_decide", lambda *_: [])
@@ -717,7 +585,7 @@ def test_a_wait_that_begins_anew_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.invariant("S6")
-def test_an_order_that_begins_anew_for_ever_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_order_that_begins_anew_for_ever_breaks_s6(monkeypatch):
     honest = Orders.take_back
 
     def patient(self: Orders, now: float) -> Any:
@@ -732,7 +600,7 @@ def test_an_order_that_begins_anew_for_ever_breaks_s6(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.invariant("S6")
-def test_an_event_that_nobody_has_confirmed_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_event_that_nobody_has_confirmed_breaks_s6(monkeypatch):
     honest = Orders.departed
 
     def hasty(self: Orders, event: Any, device: str, now: float) -> None:
@@ -746,7 +614,7 @@ def test_an_event_that_nobody_has_confirmed_breaks_s6(monkeypatch: pytest.Monkey
 
 
 @pytest.mark.invariant("S6")
-def test_an_event_that_is_confirmed_from_afar_breaks_s6(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_event_that_is_confirmed_from_afar_breaks_s6(monkeypatch):
     """The operator says so as soon as the drive begins."""
 
     monkeypatch.setattr(Teleoperation, "begin", lambda self: self.end("confirmed"))
@@ -757,8 +625,8 @@ def test_an_event_that_is_confirmed_from_afar_breaks_s6(monkeypatch: pytest.Monk
 
 
 def test_a_guard_that_says_from_its_post_that_it_has_arrived_is_replaced_after_a_minute(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     honest = GuardAgent._depart
 
     def lazy(self: GuardAgent, errand: Any) -> None:
@@ -772,7 +640,8 @@ def test_a_guard_that_says_from_its_post_that_it_has_arrived_is_replaced_after_a
     alone = {"robot.count": 0, "operator.count": 0, "guard.count": 2}
     run = played(**alone, **{"dispatch.merge_distance_m": 0, "horizon_s": 150})
     told = {moment.what: moment.time for moment in run.recorder.timeline}
-    assert told["is told that the order is over"] == pytest.approx(141.0, abs=2.0)
-    assert run.dva.desk.counters["said from afar to have arrived"] == 1
+    (over,) = (time for what, time in told.items() if "order is over" in what)
+    assert over == pytest.approx(141.0, abs=2.0)
+    assert counted(run.dva.desk.counters, "from afar") == 1
     assert run.dva.events[1].responder == id_of("guard", 2)
     assert broken(run) == set()

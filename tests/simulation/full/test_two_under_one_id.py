@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from helpers.wording import counted
+
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import id_of
@@ -22,4 +24,4 @@ def test_the_second_robot_of_an_id_is_refused_and_that_is_told_once_at_each_side
     assert all(f"{ELSEWHERE}" in s.what or "under this id" in s.what for s in said)
     assert run.dva.desk.registry.entries[ROBOT].device.address != ELSEWHERE
     assert run.recorder.drives[0].outcome == "confirmed"
-    assert run.dva.desk.counters["registration of an id in use"] > 10
+    assert counted(run.dva.desk.counters, "id in use") > 10

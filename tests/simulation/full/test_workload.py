@@ -22,7 +22,7 @@ def log(ordered: float = 0.0, ended: float | None = None, **more: object) -> Dri
 # --- spans of time -----------------------------------------------------------------------------
 
 
-def test_what_overlaps_is_covered_once() -> None:
+def test_what_overlaps_is_covered_once():
     spans = [(0.0, 10.0), (5.0, 12.0), (20.0, 21.0), (6.0, 7.0)]
     assert workload.covered(spans) == 13.0
     assert workload.most_at_once(spans) == 3
@@ -30,23 +30,23 @@ def test_what_overlaps_is_covered_once() -> None:
     assert (workload.covered([]), workload.most_at_once([])) == (0.0, 0)
 
 
-def test_a_robot_waits_for_its_turn_and_then_for_the_eyes() -> None:
+def test_a_robot_waits_for_its_turn_and_then_for_the_eyes():
     """Ordered at 10 s, taken up at 40 s; there at 100 s, and looked at from 125 s on."""
     attended = [(50.0, 60.0), (125.0, 140.0)]
     made = log(10.0, 150.0, taken_up=40.0, waits_from=100.0, attended=attended)
     assert workload.waits(made, 200.0) == [(10.0, 40.0), (100.0, 125.0)]
 
 
-def test_who_looks_already_keeps_nobody_waiting() -> None:
+def test_who_looks_already_keeps_nobody_waiting():
     made = log(10.0, 150.0, taken_up=10.0, waits_from=100.0, attended=[(90.0, 140.0)])
     assert workload.waits(made, 200.0) == []
 
 
-def test_a_robot_that_nobody_looked_at_waited_to_the_end() -> None:
+def test_a_robot_that_nobody_looked_at_waited_to_the_end():
     assert workload.waits(log(0.0, None, taken_up=0.0, waits_from=30.0), 90.0) == [(30.0, 90.0)]
 
 
-def test_a_look_that_goes_on_lasts_to_the_end_of_the_run() -> None:
+def test_a_look_that_goes_on_lasts_to_the_end_of_the_run():
     assert workload.attended(log(looks_since=7.0, attended=[(1.0, 2.0)]), 9.0) == [
         (1.0, 2.0),
         (7.0, 9.0),
@@ -66,25 +66,23 @@ def test_a_look_that_goes_on_lasts_to_the_end_of_the_run() -> None:
         ([], 0),
     ],
 )
-def test_a_reversal_is_a_turn_round_of_at_least_a_tenth_of_a_radian_a_second(
-    values: list[float], times: int
-) -> None:
+def test_a_reversal_is_a_turn_round_of_at_least_a_tenth_of_a_radian_a_second(values, times):
     assert workload.reversals(values) == times
 
 
-def test_ten_periods_of_a_sine_have_twenty_turning_points() -> None:
+def test_ten_periods_of_a_sine_have_twenty_turning_points():
     sine = 0.3 * np.sin(np.linspace(0.0, 20.0 * math.pi, 1000))
     assert workload.reversals(sine) == 20
 
 
-def test_who_steers_evenly_has_no_steering_entropy() -> None:
+def test_who_steers_evenly_has_no_steering_entropy():
     """A steady value, a ramp and a parabola are predicted exactly."""
     t = np.arange(100) * 0.15
     for signal in (0.0 * t, 0.1 * t, 0.01 * t**2 / 2.0):
         assert workload.steering_entropy(signal) == 0.0
 
 
-def test_errors_that_fill_all_nine_bins_alike_have_a_steering_entropy_of_1() -> None:
+def test_errors_that_fill_all_nine_bins_alike_have_a_steering_entropy_of_1():
     """Prediction errors in bands, each nine times: -6, -3, -2, -0.7, 0, 0.7, 2, 3, 6."""
     errors = np.tile([-6.0, -3.0, -2.0, -0.7, 0.0, 0.7, 2.0, 3.0, 6.0], 9) * 0.05
     signal = [0.0, 0.0, 0.0]
@@ -94,14 +92,14 @@ def test_errors_that_fill_all_nine_bins_alike_have_a_steering_entropy_of_1() -> 
     assert workload.steering_entropy(np.array(signal)) == pytest.approx(1.0)
 
 
-def test_twice_the_noise_makes_more_entropy_and_less_than_3_s_none() -> None:
+def test_twice_the_noise_makes_more_entropy_and_less_than_3_s_none():
     noise = np.random.default_rng(1).normal(size=2000)
     little, much = (workload.steering_entropy(s * noise) for s in (0.01, 0.02))
     assert 0.2 < little < much < 1.0
     assert math.isnan(workload.steering_entropy(noise[:19]))
 
 
-def test_half_a_minute_of_standing_in_a_minute_of_driving_is_half_of_the_time() -> None:
+def test_half_a_minute_of_standing_in_a_minute_of_driving_is_half_of_the_time():
     made = log(0.0, 60.0, commands=[(0.0, 0.0, 0.0), (30.0, 0.4, 0.0)])
     row = workload.steering([made], 60.0)
     assert row["waiting_share"] == pytest.approx(0.5)
@@ -109,20 +107,20 @@ def test_half_a_minute_of_standing_in_a_minute_of_driving_is_half_of_the_time() 
     assert (row["reversals_per_min"], row["steering_entropy"]) == (0.0, 0.0)
 
 
-def test_commands_that_hardly_differ_are_the_same_command() -> None:
+def test_commands_that_hardly_differ_are_the_same_command():
     assert workload.changes([(0.4, 0.0), (0.41, 0.01), (0.42, 0.0), (0.45, 0.0)]) == 1
     assert workload.changes([(0.4, 0.0), (0.4, 0.1), (0.4, 0.0)]) == 2
     assert workload.changes([]) == 0
 
 
-def test_where_nobody_steered_nothing_is_known_of_it() -> None:
+def test_where_nobody_steered_nothing_is_known_of_it():
     assert all(math.isnan(value) for value in workload.steering([log(0.0, 9.0)], 9.0).values())
 
 
 # --- the way -----------------------------------------------------------------------------------
 
 
-def test_the_path_error_is_the_distance_from_the_way_that_held_at_the_time() -> None:
+def test_the_path_error_is_the_distance_from_the_way_that_held_at_the_time():
     along, across = np.array([[0.0, 0.0], [10.0, 0.0]]), np.array([[0.0, 3.0], [10.0, 3.0]])
     made = log(0.0, 10.0, started=1.0, ways=[(1.0, along), (5.0, across)])
     times = (0.5, 2.0, 2.1, 4.0, 6.0, 11.0)  # before, too closely filmed, and after
@@ -130,7 +128,7 @@ def test_the_path_error_is_the_distance_from_the_way_that_held_at_the_time() -> 
     assert workload.off_the_way(made, track, 20.0).tolist() == [1.0, 1.0, 2.0]
 
 
-def test_who_planned_nothing_has_no_path_error() -> None:
+def test_who_planned_nothing_has_no_path_error():
     assert len(workload.off_the_way(log(0.0, 10.0, started=1.0), [], 20.0)) == 0
 
 
@@ -141,7 +139,7 @@ def run(name: str = "drive-to-event", **changes: object) -> Recording:
     return simulate(scenarios.build(scenarios.load(name), changes), 1)
 
 
-def test_an_operator_with_one_drive_is_busy_from_the_order_to_the_confirmation() -> None:
+def test_an_operator_with_one_drive_is_busy_from_the_order_to_the_confirmation():
     recording = run()
     (row,) = workload.operator_rows(recording)
     (made,) = recording.recorder.drives
@@ -155,7 +153,7 @@ def test_an_operator_with_one_drive_is_busy_from_the_order_to_the_confirmation()
     assert (whole["missed"], whole["false_confirmations"]) == (0, 0)
 
 
-def test_who_believes_in_a_false_alarm_is_counted() -> None:
+def test_who_believes_in_a_false_alarm_is_counted():
     """A person in such haste, and so hard to tell anything from nothing by, believes anything."""
     hasty = {"confirm_look_s": 0.1, "sensitivity": 0.5}
     events = [{"kind": "fire", "at_s": 0, "reported": True, "false_alarm": True}]
@@ -169,7 +167,7 @@ def test_who_believes_in_a_false_alarm_is_counted() -> None:
     )
 
 
-def test_who_hardly_looks_misses_what_is_there() -> None:
+def test_who_hardly_looks_misses_what_is_there():
     """Half a second of search, by a person who needs minutes to be sure."""
     blind = {"confirm_look_s": 200.0, "sensitivity": 0.5, "search_s": 0.5}
     recording = run(**{"operator.traits": blind})

@@ -27,7 +27,7 @@ LAWS = [
 
 
 @pytest.mark.parametrize(("config", "mean", "second"), LAWS)
-def test_a_law_knows_its_first_two_moments(config: dict, mean: float, second: float) -> None:
+def test_a_law_knows_its_first_two_moments(config, mean, second):
     law = ADAPTER.validate_python(config)
     assert law.mean == pytest.approx(mean)
     assert law.second == pytest.approx(second)
@@ -35,9 +35,7 @@ def test_a_law_knows_its_first_two_moments(config: dict, mean: float, second: fl
 
 
 @pytest.mark.parametrize(("config", "mean", "second"), LAWS)
-def test_a_hundred_thousand_draws_have_these_moments_within_five_errors(
-    config: dict, mean: float, second: float
-) -> None:
+def test_a_hundred_thousand_draws_have_these_moments_within_five_errors(config, mean, second):
     law = ADAPTER.validate_python(config)
     draws = law.sample(np.random.default_rng(1), 100_000)
     for values, expected in ((draws, mean), (draws**2, second)):
@@ -46,7 +44,7 @@ def test_a_hundred_thousand_draws_have_these_moments_within_five_errors(
 
 
 @pytest.mark.parametrize("config", [law for law, _, _ in LAWS])
-def test_twice_the_scale_gives_twice_each_draw(config: dict) -> None:
+def test_twice_the_scale_gives_twice_each_draw(config):
     double = {k: 2 * v if k.endswith("_s") else v for k, v in config.items()}
     one, two = (
         ADAPTER.validate_python(c).sample(np.random.default_rng(5), 100) for c in (config, double)
@@ -54,7 +52,7 @@ def test_twice_the_scale_gives_twice_each_draw(config: dict) -> None:
     assert two == pytest.approx(2 * one, rel=1e-12)
 
 
-def test_a_bare_number_is_a_constant_of_so_many_seconds() -> None:
+def test_a_bare_number_is_a_constant_of_so_many_seconds():
     assert ADAPTER.validate_python(12.5).mean == 12.5
 
 
@@ -72,12 +70,12 @@ def test_a_bare_number_is_a_constant_of_so_many_seconds() -> None:
         -1,
     ],
 )
-def test_what_is_no_law_is_refused(config: object) -> None:
+def test_what_is_no_law_is_refused(config):
     with pytest.raises(ValidationError):
         ADAPTER.validate_python(config)
 
 
-def test_draw_1000_is_the_same_whether_or_not_others_were_asked_for_before() -> None:
+def test_draw_1000_is_the_same_whether_or_not_others_were_asked_for_before():
     law = ADAPTER.validate_python({"law": "exponential", "mean_s": 1})
     asked = times(Streams(3), "a", law)
     everything = [asked[k] for k in range(20 * BLOCK)]

@@ -72,7 +72,7 @@ def test_with_containment_it_is_measured_until_somebody_has_dealt_with_it():
 
 
 def test_a_run_too_short_to_follow_anything_is_refused():
-    with pytest.raises(ConfigError, match="leaves nothing to follow for 600 s"):
+    with pytest.raises(ConfigError, match="600 s"):
         measures.tables(play(horizon_s=1200))
 
 

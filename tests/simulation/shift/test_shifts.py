@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -57,9 +58,15 @@ MIXED: dict[str, Any] = {
         "merge_distance_m": 8,
         "stations": [{"name": "west", "at": [10, 10]}, {"name": "east", "at": [90, 50]}],
     },
-    "horizon_s": 9000,
+    "horizon_s": 5000,
     "drain": True,
 }
+
+
+@functools.cache
+def mixed() -> TimedRecording:
+    """The usual policy's."""
+    return play(MIXED)
 
 
 def play(scenario: dict[str, Any], seed: int = 1, **changes: Any) -> TimedRecording:
@@ -317,8 +324,8 @@ def test_lists_of_preference_decide_by_zone() -> None:
 @pytest.mark.parametrize("policy", known_policies())
 def test_every_policy_meets_the_same_events_and_breaks_no_rule(policy: str) -> None:
     recording = play(MIXED, dispatch__policy=policy)
-    same = play(MIXED)
-    assert recording.events > 100
+    same = mixed()
+    assert recording.events > 45
     for name in ("occurred", "detected", "x", "y", "true", "severity", "stream", "index"):
         assert recording.columns[name].tolist() == same.columns[name].tolist()
     assert not recording.counters["policy failed"]
@@ -336,7 +343,7 @@ def test_a_look_takes_as_long_whoever_looks_and_whenever() -> None:
     looks = [r.columns["confirmed"] - r.columns["arrived"] for r in (one, other)]
     alone = [r.columns["shared"] == 0 for r in (one, other)]
     both = ~np.isnan(looks[0]) & ~np.isnan(looks[1]) & alone[0] & alone[1]
-    assert both.sum() > 50
+    assert both.sum() > 15
     assert looks[0][both] == pytest.approx(looks[1][both], abs=1e-5)
     assert (one.columns["responder"] != other.columns["responder"])[both].any()
 
@@ -393,7 +400,7 @@ def test_who_knows_the_future_needs_no_more_time_in_sum_than_who_does_not() -> N
         "drain": True,
     }
     gains = []
-    for seed in range(1, 11):
+    for seed in range(1, 6):
         best = play(scenario, seed, dispatch__policy="oracle").mean("response")
         greedy = play(scenario, seed).mean("response")
         gains.append(greedy - best)

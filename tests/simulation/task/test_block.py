@@ -216,7 +216,7 @@ def test_a_tilted_device_brings_the_ball_to_its_target(kind):
     assert all(0.0 < row["tilt_max_rad"] < math.radians(46) for row in rows)
 
 
-@pytest.mark.parametrize("shape", ["straight", "circular"])
+@pytest.mark.parametrize("shape", ["circular", pytest.param("straight", marks=pytest.mark.soak)])
 def test_a_narrower_tunnel_takes_longer_and_delay_more_so(shape):
     task = {"kind": "tunnel", "shape": shape, "length_m": 0.3, "width_m": [0.02, 0.01]}
     scenario = {"model": "task", "task": task, "horizon_s": 200}
@@ -252,7 +252,7 @@ def test_who_is_led_through_a_tunnel_leaves_its_middle_less():
 
 
 def test_tracking_tells_crossover_and_margin_of_a_stable_loop():
-    task = {"kind": "tracking", "record_s": 60, "warm_up_s": 5}
+    task = {"kind": "tracking", "record_s": 30, "warm_up_s": 5}
     device = {"kind": "joystick", "gain": 1.0}
     scenario = build({"model": "task", "task": task, "device": device, "horizon_s": 100})
     row = play(scenario, 1)[0]
@@ -264,14 +264,14 @@ def test_tracking_tells_crossover_and_margin_of_a_stable_loop():
     "task",
     [
         {"kind": "corner", "leg_m": 3.0, "width_m": 2.0},
-        {"kind": "slalom", "cones": 3, "spacing_m": 4.0, "swing_m": 1.0, "width_m": 2.0},
+        {"kind": "slalom", "cones": 2, "spacing_m": 4.0, "swing_m": 1.0, "width_m": 2.0},
         {"kind": "course", "points_m": [[0, 0], [4, 0], [8, 4]], "width_m": 2.0},
     ],
 )
 def test_a_vehicle_gets_there_and_delay_slows_it(task):
     scenario = {"model": "task", "task": task, **DRIVEN}
     row = play(build(scenario), 1)[0]
-    late = play(build(scenario, {"link.down.delay_s": 3.0}), 1)[0]
+    late = play(build(scenario, {"link.down.delay_s": 2.0}), 1)[0]
     assert row["completed"] == 1.0
     assert row["movement_time_s"] >= row["path_m"] / 0.5
     assert late["movement_time_s"] > row["movement_time_s"]

@@ -71,10 +71,10 @@ def test_more_frames_a_second_do_not_slow_who_has_no_noise():
     task = {"width_m": [0.01, 0.02, 0.04], "selection": "dwell", "dwell_s": 0.3}
     who = {"traits": {"motor_noise": 1e-9}, "strategy": "pursuit"}
     mouse = {"kind": "mouse", "rate_hz": 100}
-    scenario = pointing(task=task, operator=who, device=mouse, trials=2, practice=10)
+    scenario = pointing(task=task, operator=who, device=mouse, trials=1, practice=5)
     few, *more = (
         sum(row["movement_time_s"] for row in play(build(scenario, {"frames.rate_hz": rate}), 1))
-        for rate in (30, 50, 60, 75, 100)
+        for rate in (30, 60, 100)
     )
     assert max(more) < 1.04 * few
 
