@@ -107,7 +107,7 @@ def test_the_time_to_get_out_of_an_empty_corridor_is_premovement_and_distance_by
     """The bound of hand calculation, for twenty people who each walk alone."""
     rng, profile = np.random.default_rng(5), BystanderProfile()
     late = []
-    for _ in range(20):
+    for _ in range(8):
         who = Occupant.draw(profile, rng)
         building = Building()
         one = building.bystander((15.0, 1.5), speed=who.speed, premovement=who.premovement)
@@ -128,20 +128,20 @@ def test_a_second_alarm_makes_nobody_later_or_earlier():
     assert one.leaves_at == 20.0
 
 
-def test_forty_people_in_a_room_need_the_time_that_its_door_takes_and_no_less():
-    """1.2 m: SFPE's 1.3 persons/s per metre of 0.9 m would be 34 s, 1.9 per metre of 1.2 m 18 s."""
+def test_25_people_in_a_room_need_the_time_that_its_door_takes_and_no_less():
+    """1.2 m: SFPE's 1.3 persons/s per metre of 0.9 m would be 21 s, 1.9 per metre of 1.2 m 11 s."""
     building = Building(two_rooms(1.2, width=9.0, height=7.0), refuges=[(8.0, 3.5)])
     rng = np.random.default_rng(3)
     spots = [(x, y) for x in np.arange(0.5, 4.2, 0.6) for y in np.arange(0.5, 6.6, 0.6)]
     people = [
         building.bystander(spots[i], premovement=1.0, speed=float(rng.normal(1.34, 0.2)))
-        for i in rng.permutation(len(spots))[:40]
+        for i in rng.permutation(len(spots))[:25]
     ]
     for one in people:
         one.alarm(0.0)
     building.run_until(lambda: all(p.activity == "safe" for p in people), 120.0)
     last = max(p.out_at for p in people)
-    assert 18.0 < last < 34.0 + 10.0
+    assert 11.0 < last < 21.0 + 10.0
 
 
 # --- what they notice themselves -------------------------------------------------------
@@ -460,14 +460,15 @@ def test_one_more_bystander_changes_nobody_elses_place():
     assert places(5) == places(9)[:5]
 
 
-OFFICES = [("office-block", {"seed": seed}) for seed in range(1, 5)]
+LARGE = [("office-block", {"seed": 1}), pytest.param("campus", {}, marks=pytest.mark.soak)]
+LARGE += [pytest.param("office-block", {"seed": n}, marks=pytest.mark.soak) for n in (2, 3)]
 
 
-@pytest.mark.parametrize(("name", "overrides"), [("caparica", {}), ("campus", {}), *OFFICES])
+@pytest.mark.parametrize(("name", "overrides"), [("caparica", {}), *LARGE])
 def test_every_exit_is_reached_from_the_largest_free_floor(name, overrides):
     site = load_site(name, overrides)
     planner = Planner(site, 0.3)
-    starts = [site.sample_free(np.random.default_rng(n), 0.3) for n in range(5)]
+    starts = [site.sample_free(np.random.default_rng(n), 0.3) for n in range(3)]
     refuges = refuges_of(site)
     reached = [[planner.distance(start, r) < math.inf for r in refuges] for start in starts]
     assert len(refuges) == len(site.exits) >= 2

@@ -61,7 +61,7 @@ class Bench:
     [EMERGENCY, EMERGENCY.replace(b"<EmergencyMsg>", b"<EmergencyMsg >")],
     ids=["as we write it", "as others may"],
 )
-def test_an_emergency_overtakes_all_that_waits(emergency: bytes) -> None:
+def test_an_emergency_overtakes_all_that_waits(emergency):
     bench = Bench()
     for number in range(200):
         bench.ask(b"%d" % number)
@@ -70,7 +70,7 @@ def test_an_emergency_overtakes_all_that_waits(emergency: bytes) -> None:
     assert bench.done == [b"0", emergency]
 
 
-def test_what_only_calls_itself_an_emergency_overtakes_nothing_and_keeps_none_out() -> None:
+def test_what_only_calls_itself_an_emergency_overtakes_nothing_and_keeps_none_out():
     bench = Bench()
     for number in range(LIMIT + 1):
         bench.ask(b"<EmergencyMsg>%d" % number)
@@ -79,7 +79,7 @@ def test_what_only_calls_itself_an_emergency_overtakes_nothing_and_keeps_none_ou
     assert bench.done == [b"<EmergencyMsg>0", EMERGENCY]
 
 
-def test_where_processing_takes_no_time_nothing_waits() -> None:
+def test_where_processing_takes_no_time_nothing_waits():
     bench = Bench(processing=0.0)
     bench.ask(b"now")
     assert bench.done == [b"now"]
@@ -91,7 +91,7 @@ class Noted(NamedTuple):
     body: m.Body
 
 
-def test_who_sends_much_waits_for_itself_and_not_the_others() -> None:
+def test_who_sends_much_waits_for_itself_and_not_the_others():
     bench = Bench()
     for number in range(50):
         bench.ask(b"<SetTeleOp>flood %d" % number, peer="h flood")
@@ -100,7 +100,7 @@ def test_who_sends_much_waits_for_itself_and_not_the_others() -> None:
     assert bench.done[:3] == [b"<SetTeleOp>flood 0", b"<SetTeleOp>flood 1", b"<SetTeleOp>holder"]
 
 
-def test_a_queue_that_one_peer_has_filled_takes_what_another_sends() -> None:
+def test_a_queue_that_one_peer_has_filled_takes_what_another_sends():
     bench = Bench()
     for number in range(LIMIT + 50):
         bench.ask(b"<SetTeleOp>%d" % number, peer="h flood")
@@ -111,7 +111,7 @@ def test_a_queue_that_one_peer_has_filled_takes_what_another_sends() -> None:
     assert b"<SetTeleOp>holder" in bench.done
 
 
-def test_what_is_refused_when_it_arrives_takes_no_time_and_no_place() -> None:
+def test_what_is_refused_when_it_arrives_takes_no_time_and_no_place():
     read = lambda request: Noted(m.StartTeleOp()) if request.data == b"good" else None  # noqa: E731
     bench = Bench(read=read)
     for _ in range(5 * LIMIT):
@@ -125,12 +125,10 @@ def test_what_is_refused_when_it_arrives_takes_no_time_and_no_place() -> None:
 SERVICE = 0.05
 
 
-@pytest.mark.parametrize("others", [1, 5, 20])
-@pytest.mark.parametrize("of", ["s", "d", "sd"])
+@pytest.mark.parametrize("others", [1, 20])
+@pytest.mark.parametrize("of", ["s", "sd"])
 @pytest.mark.parametrize("urgent", [0, 20])
-def test_how_long_the_holder_waits_does_not_depend_on_how_many_send_how_much(
-    others: int, of: str, urgent: int
-) -> None:
+def test_how_long_the_holder_waits_does_not_depend_on_how_many_send_how_much(others, of, urgent):
     bench = Bench()
     bench.flood([f"{of[n % len(of)]} {n}" for n in range(others)])
     bench.flood([f"s urgent {n}" for n in range(urgent)], EMERGENCY)
@@ -143,11 +141,9 @@ def test_how_long_the_holder_waits_does_not_depend_on_how_many_send_how_much(
     assert max(waits) < (4 if urgent else 1) * SERVICE + 1e-4
 
 
-@pytest.mark.parametrize("others", [1, 5, 20])
+@pytest.mark.parametrize("others", [1, 20])
 @pytest.mark.parametrize("flood", [b"%d of %d", b"<SetTeleOp>%d of %d", EMERGENCY])
-def test_an_emergency_is_done_after_two_services_whoever_sends_what(
-    others: int, flood: bytes
-) -> None:
+def test_an_emergency_is_done_after_two_services_whoever_sends_what(others, flood):
     bench = Bench()
     bench.flood([f"{'sdh'[n % 3]} {n}" for n in range(others)], flood)
     sent = {EMERGENCY + b" " * n: 1.0 + 0.2037 * n for n in range(1, 15)}
@@ -157,7 +153,7 @@ def test_an_emergency_is_done_after_two_services_whoever_sends_what(
     assert max(bench.times[data] - when for data, when in sent.items()) < 2 * SERVICE + 1e-4
 
 
-def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog() -> None:
+def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog():
     bench = Bench()
     bench.flood([f"s {n}" for n in range(20)], EMERGENCY, rate=500.0)
     bench.clock.call_at(1.0, bench.ask, b"start", "h")
@@ -168,7 +164,7 @@ def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog() -> Non
     assert set(bench.busy) == {EMERGENCY}
 
 
-def test_strangers_take_a_fifth_of_a_robot_that_is_driven_and_all_of_one_that_is_not() -> None:
+def test_strangers_take_a_fifth_of_a_robot_that_is_driven_and_all_of_one_that_is_not():
     taken = []
     for driven in (True, False):
         bench = Bench(driven=driven)
@@ -183,7 +179,7 @@ def test_strangers_take_a_fifth_of_a_robot_that_is_driven_and_all_of_one_that_is
     assert taken == [pytest.approx(0.17, abs=0.03), pytest.approx(1.0, abs=0.01)]
 
 
-def test_who_holds_a_robot_and_says_nothing_does_not_silence_strangers() -> None:
+def test_who_holds_a_robot_and_says_nothing_does_not_silence_strangers():
     bench = Bench(driven=True)
     for number in range(4):
         bench.ask(b"%d" % number, peer=f"s {number}")
@@ -191,7 +187,7 @@ def test_who_holds_a_robot_and_says_nothing_does_not_silence_strangers() -> None
     assert len(bench.done) == 4
 
 
-def test_strangers_have_their_turns_however_much_the_holder_sends() -> None:
+def test_strangers_have_their_turns_however_much_the_holder_sends():
     bench = Bench()
     bench.flood(["h"], b"<SetTeleOp>%d of %d", rate=200.0)
     bench.flood(["s a", "s b"], b"%d of %d")
@@ -205,7 +201,7 @@ def test_strangers_have_their_turns_however_much_the_holder_sends() -> None:
     assert min(of[0] - commands, of[1]) > 15
 
 
-def test_commands_of_strangers_have_their_turns_among_what_others_ask() -> None:
+def test_commands_of_strangers_have_their_turns_among_what_others_ask():
     bench = Bench(driven=False)
     bench.flood([f"s {n}" for n in range(20)])
     bench.clock.call_at(1.0, bench.ask, b"<SetTeleOp>", "s who held it")
@@ -213,7 +209,7 @@ def test_commands_of_strangers_have_their_turns_among_what_others_ask() -> None:
     assert bench.times[b"<SetTeleOp>"] < 1.0 + 22 * SERVICE
 
 
-def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so() -> None:
+def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so():
     bench = Bench()
     for number in range(EACH + 4):
         bench.ask(b"%d" % number, peer="s")
@@ -224,7 +220,7 @@ def test_a_connection_that_is_not_the_holders_has_so_many_places_and_is_told_so(
     assert len(bench.done) == 2 * (EACH + 4) - 3
 
 
-def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out() -> None:
+def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out():
     bench = Bench()
     for number in range(2 * LIMIT):
         bench.ask(b"%d" % number, peer=f"s {number}")
@@ -236,7 +232,7 @@ def test_a_thousand_connections_keep_neither_the_holder_nor_the_dva_out() -> Non
     assert bench.done == [b"0", b"start", b"grant"]
 
 
-def test_who_becomes_the_holder_while_it_waits_has_the_holders_turn() -> None:
+def test_who_becomes_the_holder_while_it_waits_has_the_holders_turn():
     bench = Bench()
     for number in range(20):
         bench.ask(b"%d" % number, peer=f"s {number}")

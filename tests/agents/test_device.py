@@ -39,7 +39,7 @@ def code(reply: bytes) -> int:
     return body.code
 
 
-def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device: AgentDevice) -> None:
+def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device):
     acted: list[m.Message] = []
 
     def act(message: m.Message) -> m.Reply:
@@ -64,7 +64,7 @@ def test_what_an_impostor_was_told_is_not_for_the_one_it_played(device: AgentDev
     ],
     ids=["garbage", "of another device", "no reply", "to another request"],
 )
-def test_a_request_with_a_bad_answer_has_failed(device: AgentDevice, answer: bytes) -> None:
+def test_a_request_with_a_bad_answer_has_failed(device, answer):
     """Else whoever asked would wait for ever, and a device would never register."""
     device.network.serve(DVA, lambda request: request.answer(answer))
     ended: list[str] = []
@@ -73,7 +73,7 @@ def test_a_request_with_a_bad_answer_has_failed(device: AgentDevice, answer: byt
     assert ended == ["no"]
 
 
-def test_an_answer_to_what_could_not_be_read_is_taken(device: AgentDevice) -> None:
+def test_an_answer_to_what_could_not_be_read_is_taken(device):
     def refuse(request: Request) -> None:
         request.answer(
             encode(m.Message(ME, 1, DVA, "12:00:00", 0, m.Reply(0, m.BAD_MESSAGE, "cannot")))
@@ -86,9 +86,7 @@ def test_an_answer_to_what_could_not_be_read_is_taken(device: AgentDevice) -> No
     assert codes == [m.BAD_MESSAGE]
 
 
-def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(
-    device: AgentDevice,
-) -> None:
+def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(device):
     acted: list[m.Body] = []
 
     def act(message: m.Message) -> m.Reply:
@@ -101,13 +99,13 @@ def test_a_message_to_another_device_is_refused_unless_it_is_an_emergency(
     assert acted == [m.Emergency()]
 
 
-def test_a_reason_too_long_for_a_reply_leaves_its_code(device: AgentDevice) -> None:
+def test_a_reason_too_long_for_a_reply_leaves_its_code(device):
     """Else whoever finds a way to make one could end the receiver."""
     refuse = lambda message: m.Reply(message.message_id, m.BUSY, "x" * 300)  # noqa: E731
     assert code(answer(device, request(m.GetDeviceList()), refuse)) == m.BUSY
 
 
-def test_the_requests_of_others_do_not_make_a_reply_forgotten(device: AgentDevice) -> None:
+def test_the_requests_of_others_do_not_make_a_reply_forgotten(device):
     acted: list[str] = []
 
     def act(message: m.Message) -> m.Reply:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from helpers.wording import counted
 
 from dva_sim.agents.device import HEARTBEAT
 from dva_sim.agents.dva_watch import SILENT_AFTER, DvaWatch
@@ -109,9 +110,9 @@ def test_everybody_says_that_the_dva_is_silent_and_that_it_is_back() -> None:
     for who in ("robot-1", "robot-2", "guard-1", "guard-2", "operator-1", "operator-2"):
         (noticed,) = drill.told(who, "the DVA is silent for 1")
         assert 28.0 <= noticed <= 33.0
-    assert drill.told("robot-1", "it obeys its driver as before")
-    assert drill.told("guard-1", "an order in hand goes on")
-    assert drill.run.recorder.counters["the DVA was silent to a device"] == 6
+    assert drill.told("robot-1", "obeys its driver")
+    assert drill.told("guard-1", "order in hand")
+    assert counted(drill.run.recorder.counters, "silent") == 6
     drill.plug_in()
     drill.until(50.0)
     for who in ("robot-1", "guard-1", "operator-1"):

@@ -39,9 +39,7 @@ def at(guard: GuardAgent) -> tuple[float, float]:
 # --- confirm ---------------------------------------------------------------------------
 
 
-def test_a_guard_goes_there_looks_and_says_what_it_saw_before_it_says_done(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_a_guard_goes_there_looks_and_says_what_it_saw_before_it_says_done(dva, guard):
     for event, there, finding in ((1, {"fire"}, "confirmed"), (2, set(), "refuted")):
         dva.there = there
         assert dva.order(event, FAR) == m.OK
@@ -49,9 +47,7 @@ def test_a_guard_goes_there_looks_and_says_what_it_saw_before_it_says_done(
         assert dva.progress(event) == ["departed", "arrived", finding, "done"]
 
 
-def test_a_guard_sets_out_10_s_after_the_order_and_sees_a_place_from_2_m(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_a_guard_sets_out_10_s_after_the_order_and_sees_a_place_from_2_m(dva, guard):
     start = dva.now
     dva.order(1, FAR)
     dva.run_for(60.0)
@@ -60,16 +56,14 @@ def test_a_guard_sets_out_10_s_after_the_order_and_sees_a_place_from_2_m(
     assert dva.when(1, "refuted") - dva.when(1, "arrived") == pytest.approx(3.0, abs=0.1)
 
 
-def test_who_finds_no_way_says_so_and_waits(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_who_finds_no_way_says_so_and_waits(dva, guard):
     dva.order(1, WALLED_IN)
     dva.run_for(11.0)
     assert dva.progress(1) == ["failed"]
     assert guard.activity == "waiting"
 
 
-def test_who_cannot_get_past_what_is_in_the_way_says_so_in_the_story_too(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_cannot_get_past_what_is_in_the_way_says_so_in_the_story_too(dva, guard):
     dva.order(1, FAR)
     dva.run_for(15.0)
     walk = guard.walking._walk
@@ -78,10 +72,10 @@ def test_who_cannot_get_past_what_is_in_the_way_says_so_in_the_story_too(
     dva.run_for(1.0)
     assert dva.progress(1) == ["departed", "failed"]
     told = [moment.what for moment in dva.stage.recorder.timeline]
-    assert "cannot get past what is in the way, and gives up" in told
+    assert any("gives up" in what for what in told)
 
 
-def test_only_the_dva_gives_orders(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_only_the_dva_gives_orders(dva, guard):
     codes = []
     stranger = dva.stage.device("operator", 1)
     place = dva.position(FAR)
@@ -99,7 +93,7 @@ def test_only_the_dva_gives_orders(dva: PretendedDva, guard: GuardAgent) -> None
     assert dva.told == []
 
 
-def test_a_guard_drives_no_robots(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_a_guard_drives_no_robots(dva, guard):
     body = m.Order(1, "fire", dva.position(FAR), "02:00:00:01:00:01")
     assert dva.say(GUARD, body) == m.NOT_SUPPORTED
 
@@ -107,9 +101,7 @@ def test_a_guard_drives_no_robots(dva: PretendedDva, guard: GuardAgent) -> None:
 # --- the newest order holds ------------------------------------------------------------
 
 
-def test_a_newer_order_takes_the_place_of_the_older_of_which_nothing_more_is_said(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_a_newer_order_takes_the_place_of_the_older_of_which_nothing_more_is_said(dva, guard):
     dva.order(1, FARTHER)
     dva.run_for(20.0)
     assert dva.order(2, NEAR) == m.OK
@@ -118,9 +110,7 @@ def test_a_newer_order_takes_the_place_of_the_older_of_which_nothing_more_is_sai
     assert dva.progress(2) == ["departed", "arrived", "refuted", "done"]
 
 
-def test_who_is_under_way_already_need_not_get_ready_again(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_is_under_way_already_need_not_get_ready_again(dva, guard):
     dva.order(1, FARTHER)
     dva.run_for(20.0)
     start = dva.now
@@ -129,9 +119,7 @@ def test_who_is_under_way_already_need_not_get_ready_again(
     assert dva.when(2, "departed") - start < 0.1
 
 
-def test_who_is_getting_ready_when_a_newer_order_comes_goes_on_getting_ready(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_is_getting_ready_when_a_newer_order_comes_goes_on_getting_ready(dva, guard):
     start = dva.now
     dva.order(1, FARTHER)
     dva.run_for(6.0)
@@ -141,9 +129,7 @@ def test_who_is_getting_ready_when_a_newer_order_comes_goes_on_getting_ready(
     assert dva.progress(1) == []
 
 
-def test_the_same_order_again_is_answered_ok_and_changes_nothing(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_the_same_order_again_is_answered_ok_and_changes_nothing(dva, guard):
     dva.order(1, FAR)
     for _ in range(5):
         dva.run_for(4.0)
@@ -153,9 +139,7 @@ def test_the_same_order_again_is_answered_ok_and_changes_nothing(
     assert dva.when(1, "departed") < 12.0
 
 
-def test_the_newest_order_holds_even_for_who_is_at_work_at_an_event(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_the_newest_order_holds_even_for_who_is_at_work_at_an_event(dva, guard):
     dva.there = {"fire"}
     dva.order(1, NEAR, "contain")
     dva.run_until(lambda: guard.activity == "containing")
@@ -166,9 +150,7 @@ def test_the_newest_order_holds_even_for_who_is_at_work_at_an_event(
     assert dva.progress(2) == ["departed", "arrived", "confirmed", "done"]
 
 
-def test_who_is_called_away_while_looking_says_nothing_of_what_it_sees(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_is_called_away_while_looking_says_nothing_of_what_it_sees(dva, guard):
     dva.order(1, NEAR)
     dva.run_until(lambda: guard.activity == "looking")
     dva.order(2, FAR)
@@ -177,9 +159,7 @@ def test_who_is_called_away_while_looking_says_nothing_of_what_it_sees(
     assert dva.progress(2) == ["departed", "arrived", "refuted", "done"]
 
 
-def test_an_order_that_the_dva_calls_over_is_given_up_without_a_word(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_an_order_that_the_dva_calls_over_is_given_up_without_a_word(dva, guard):
     dva.order(1, FARTHER)
     dva.run_for(20.0)
     assert dva.say(GUARD, m.OrderProgress(2, "done")) == m.OK
@@ -192,9 +172,7 @@ def test_an_order_that_the_dva_calls_over_is_given_up_without_a_word(
     assert dva.progress(1) == ["departed"]
 
 
-def test_a_guard_can_do_the_same_again_once_it_is_done(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_a_guard_can_do_the_same_again_once_it_is_done(dva, guard):
     for _ in range(2):
         dva.order(1, NEAR)
         dva.run_for(60.0)
@@ -205,14 +183,12 @@ def test_a_guard_can_do_the_same_again_once_it_is_done(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_nobody_who_stands_by_is_in_danger_a_metre_and_a_half_too_near(kind: str) -> None:
+def test_nobody_who_stands_by_is_in_danger_a_metre_and_a_half_too_near(kind):
     hazard = make_hazard(kind, (0.0, 0.0), 0.0)
     assert max(hazard.danger_radius(10.0 * t) for t in range(720)) + 1.5 < STAND_OFF == 10.0
 
 
-def test_who_stands_by_stops_10_m_before_the_place_and_reports_its_departure_only(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_stands_by_stops_10_m_before_the_place_and_reports_its_departure_only(dva, guard):
     dva.order(1, FARTHER, "stand_by")
     dva.run_for(120.0)
     assert guard.activity == "standing by"
@@ -220,9 +196,7 @@ def test_who_stands_by_stops_10_m_before_the_place_and_reports_its_departure_onl
     assert dva.progress(1) == ["departed"]
 
 
-def test_who_has_looked_from_near_and_shall_stand_by_goes_back_the_way_to_its_post(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_has_looked_from_near_and_shall_stand_by_goes_back_the_way_to_its_post(dva, guard):
     dva.order(1, FARTHER)
     dva.run_for(60.0)
     dva.order(1, FARTHER, "stand_by")
@@ -231,7 +205,7 @@ def test_who_has_looked_from_near_and_shall_stand_by_goes_back_the_way_to_its_po
     assert STAND_OFF <= math.dist(at(guard), FARTHER) < STAND_OFF + 1.0
 
 
-def test_who_stands_by_and_shall_contain_goes_at_once(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_who_stands_by_and_shall_contain_goes_at_once(dva, guard):
     dva.there = {"fire"}
     dva.order(1, FARTHER, "stand_by")
     dva.run_for(60.0)
@@ -244,9 +218,7 @@ def test_who_stands_by_and_shall_contain_goes_at_once(dva: PretendedDva, guard: 
     assert dva.contained == [("fire", pytest.approx(FARTHER, abs=1e-6))]
 
 
-def test_who_has_confirmed_and_shall_contain_stands_there_already(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_has_confirmed_and_shall_contain_stands_there_already(dva, guard):
     dva.there = {"fire"}
     dva.order(1, FAR)
     dva.run_until(lambda: "done" in dva.progress(1))
@@ -256,9 +228,7 @@ def test_who_has_confirmed_and_shall_contain_stands_there_already(
     assert dva.when(1, "contained") - start == pytest.approx(20.0, abs=0.1)
 
 
-def test_who_has_confirmed_and_shall_go_elsewhere_gets_ready_again(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_has_confirmed_and_shall_go_elsewhere_gets_ready_again(dva, guard):
     dva.order(1, FAR)
     dva.run_until(lambda: "done" in dva.progress(1))
     start = dva.now
@@ -267,9 +237,7 @@ def test_who_has_confirmed_and_shall_go_elsewhere_gets_ready_again(
     assert dva.when(2, "departed") - start == pytest.approx(10.0, abs=0.1)
 
 
-def test_who_finds_nothing_to_contain_looks_and_refutes(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_finds_nothing_to_contain_looks_and_refutes(dva, guard):
     dva.order(1, FAR, "contain")
     dva.run_for(60.0)
     assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
@@ -277,9 +245,7 @@ def test_who_finds_nothing_to_contain_looks_and_refutes(
     assert dva.contained == []
 
 
-def test_who_stands_by_for_a_quarter_of_an_hour_without_a_word_gives_up(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_stands_by_for_a_quarter_of_an_hour_without_a_word_gives_up(dva, guard):
     dva.order(1, FAR, "stand_by")
     dva.run_for(30.0 + STAND_BY_FOR)
     assert STAND_BY_FOR == 900.0
@@ -287,9 +253,7 @@ def test_who_stands_by_for_a_quarter_of_an_hour_without_a_word_gives_up(
     assert guard.activity == "waiting"
 
 
-def test_who_has_stood_by_once_does_not_give_up_what_it_does_later(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_has_stood_by_once_does_not_give_up_what_it_does_later(dva, guard):
     dva.order(1, FARTHER, "stand_by")
     dva.run_for(60.0)
     dva.order(1, FARTHER, "contain")
@@ -303,9 +267,7 @@ def test_who_has_stood_by_once_does_not_give_up_what_it_does_later(
 # --- wait elsewhere --------------------------------------------------------------------
 
 
-def test_an_idle_guard_that_is_relocated_walks_there_and_waits(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_an_idle_guard_that_is_relocated_walks_there_and_waits(dva, guard):
     place = dva.position(FAR)
     assert dva.say(GUARD, m.Relocation(place)) == m.OK
     assert guard.activity == "getting ready"
@@ -315,7 +277,7 @@ def test_an_idle_guard_that_is_relocated_walks_there_and_waits(
     assert dva.told == []
 
 
-def test_a_guard_tells_where_it_is_while_it_moves(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_a_guard_tells_where_it_is_while_it_moves(dva, guard):
     seen = []
     hear = lambda data: seen.append(dva.device.read(data).body.activity)  # noqa: E731
     dva.network.subscribe(dva.device.id_tag, GUARD, "status|", hear)
@@ -324,23 +286,19 @@ def test_a_guard_tells_where_it_is_while_it_moves(dva: PretendedDva, guard: Guar
     assert list(dict.fromkeys(seen)) == ["getting ready", "walking", "waiting"]
 
 
-def test_who_stands_there_already_does_not_even_get_ready(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_stands_there_already_does_not_even_get_ready(dva, guard):
     assert dva.say(GUARD, m.Relocation(dva.position((POST[0] + 0.9, POST[1])))) == m.OK
     assert guard.activity == "waiting"
     assert dva.say(GUARD, m.Relocation(dva.position((POST[0] + 1.1, POST[1])))) == m.OK
     assert guard.activity == "getting ready"
 
 
-def test_a_guard_with_an_order_is_not_relocated(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_a_guard_with_an_order_is_not_relocated(dva, guard):
     dva.order(1, FAR, "stand_by")
     assert dva.say(GUARD, m.Relocation(dva.position(NEAR))) == m.BUSY
 
 
-def test_an_order_interrupts_a_relocation_and_the_newest_relocation_holds(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_an_order_interrupts_a_relocation_and_the_newest_relocation_holds(dva, guard):
     dva.say(GUARD, m.Relocation(dva.position(FARTHER)))
     dva.run_for(15.0)
     assert dva.say(GUARD, m.Relocation(dva.position(FAR))) == m.OK
@@ -356,17 +314,13 @@ def test_an_order_interrupts_a_relocation_and_the_newest_relocation_holds(
 # --- auctions --------------------------------------------------------------------------
 
 
-def test_an_idle_guard_bids_what_guards_usually_need_to_get_ready_and_its_own_way(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_an_idle_guard_bids_what_guards_usually_need_to_get_ready_and_its_own_way(dva, guard):
     assert dva.announce(7, FAR) == m.OK
     [bid] = dva.bids()
     assert (bid.event_id, bid.arrival_in) == (7, pytest.approx(12.0 + 20.0, abs=0.5))
 
 
-def test_who_is_under_way_to_another_post_bids_the_way_alone(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_is_under_way_to_another_post_bids_the_way_alone(dva, guard):
     dva.say(GUARD, m.Relocation(dva.position(FARTHER)))
     dva.run_for(20.0)
     dva.announce(7, FARTHER)
@@ -374,18 +328,14 @@ def test_who_is_under_way_to_another_post_bids_the_way_alone(
     assert dva.bids()[0].arrival_in == pytest.approx(left, abs=0.7)
 
 
-def test_who_has_an_order_or_no_way_hears_of_an_auction_and_bids_nothing(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_who_has_an_order_or_no_way_hears_of_an_auction_and_bids_nothing(dva, guard):
     assert dva.announce(7, WALLED_IN) == m.OK
     dva.order(1, FARTHER)
     assert dva.announce(8, FAR) == m.OK
     assert dva.bids() == []
 
 
-def test_an_award_is_an_order_to_look_at_what_was_announced(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_an_award_is_an_order_to_look_at_what_was_announced(dva, guard):
     dva.announce(7, FAR)
     assert dva.say(GUARD, m.TaskAward(7)) == m.OK
     assert dva.say(GUARD, m.TaskAward(7)) == m.OK  # said again
@@ -393,14 +343,12 @@ def test_an_award_is_an_order_to_look_at_what_was_announced(
     assert dva.progress(7) == ["departed", "arrived", "refuted", "done"]
 
 
-def test_an_award_of_what_was_never_announced_is_refused(
-    dva: PretendedDva, guard: GuardAgent
-) -> None:
+def test_an_award_of_what_was_never_announced_is_refused(dva, guard):
     assert dva.say(GUARD, m.TaskAward(7)) == m.UNKNOWN_EVENT
     assert guard.activity == "waiting"
 
 
-def test_an_award_is_no_reason_to_leave_an_order(dva: PretendedDva, guard: GuardAgent) -> None:
+def test_an_award_is_no_reason_to_leave_an_order(dva, guard):
     dva.announce(7, FAR)
     dva.order(1, NEAR)
     assert dva.say(GUARD, m.TaskAward(7)) == m.BUSY
@@ -417,7 +365,7 @@ def hot(x: float, y: float, now: float) -> Conditions:
     return CLEAR._replace(heat_flux=4.0) if x > 15.0 and now > FIRE_AT else CLEAR
 
 
-def test_who_comes_into_heat_tells_failed_and_goes_back_to_its_post(dva: PretendedDva) -> None:
+def test_who_comes_into_heat_tells_failed_and_goes_back_to_its_post(dva):
     guard = dva.guard(air=hot)
     dva.order(1, FARTHER, "contain")
     dva.run_until(lambda: guard.activity == "withdrawing")
@@ -430,9 +378,7 @@ def test_who_comes_into_heat_tells_failed_and_goes_back_to_its_post(dva: Pretend
     assert 0.0 < guard.dose.heat < 0.3
 
 
-def test_who_was_to_look_and_is_driven_back_in_sight_of_it_has_seen_enough(
-    dva: PretendedDva,
-) -> None:
+def test_who_was_to_look_and_is_driven_back_in_sight_of_it_has_seen_enough(dva):
     guard = dva.guard(air=hot)
     dva.there = {"fire"}
     dva.order(1, FAR)
@@ -441,7 +387,7 @@ def test_who_was_to_look_and_is_driven_back_in_sight_of_it_has_seen_enough(
     assert math.dist(at(guard), POST) < 1.0
 
 
-def test_who_was_to_look_and_sees_nothing_there_has_failed(dva: PretendedDva) -> None:
+def test_who_was_to_look_and_sees_nothing_there_has_failed(dva):
     dva.guard(air=hot)
     dva.order(1, FAR)
     dva.run_for(60.0)
@@ -458,8 +404,8 @@ def test_who_was_to_look_and_sees_nothing_there_has_failed(dva: PretendedDva) ->
     ],
 )
 def test_who_is_driven_back_has_seen_a_fire_by_its_smoke_and_nothing_else_through_it(
-    dva: PretendedDva, kind: str, depth: float, said: list[str]
-) -> None:
+    dva, kind, depth, said
+):
     dva.guard(air=hot, smoke=lambda a, b: depth)
     dva.there = {kind}
     dva.say(GUARD, m.Order(1, kind, dva.position(FAR), None))
@@ -467,7 +413,7 @@ def test_who_is_driven_back_has_seen_a_fire_by_its_smoke_and_nothing_else_throug
     assert dva.progress(1) == said
 
 
-def test_no_guard_walks_through_a_door_behind_which_nobody_survives(dva: PretendedDva) -> None:
+def test_no_guard_walks_through_a_door_behind_which_nobody_survives(dva):
     def furnace(x: float, y: float, now: float) -> Conditions:
         return CLEAR._replace(temperature=300.0) if x > 15.0 else CLEAR
 
@@ -480,7 +426,7 @@ def test_no_guard_walks_through_a_door_behind_which_nobody_survives(dva: Pretend
     assert dva.progress(1) == ["departed", "failed"]
 
 
-def test_flames_keep_no_guard_from_where_the_stream_reaches_them(dva: PretendedDva) -> None:
+def test_flames_keep_no_guard_from_where_the_stream_reaches_them(dva):
     """Within 2 m of a fire it is deadly; an extinguisher carries 3 m, half a metre is braking."""
 
     def flames(x: float, y: float, now: float) -> Conditions:
@@ -493,7 +439,7 @@ def test_flames_keep_no_guard_from_where_the_stream_reaches_them(dva: PretendedD
     assert dva.progress(1) == ["departed", "arrived", "contained", "done"]
 
 
-def test_a_guard_whose_way_out_turns_bad_turns_round(dva: PretendedDva) -> None:
+def test_a_guard_whose_way_out_turns_bad_turns_round(dva):
     """Its post, in the west, becomes unbearable when it is half way back to it."""
 
     def air(x: float, y: float, now: float) -> Conditions:
@@ -509,7 +455,7 @@ def test_a_guard_whose_way_out_turns_bad_turns_round(dva: PretendedDva) -> None:
     assert guard.dose.heat < 0.3
 
 
-def test_an_exit_in_smoke_is_a_way_out_beyond_which_the_air_is_clean(dva: PretendedDva) -> None:
+def test_an_exit_in_smoke_is_a_way_out_beyond_which_the_air_is_clean(dva):
     smoky = CLEAR._replace(extinction=3.0, co=1000.0)
     guard = dva.guard(air=lambda x, y, now: smoky if now > FIRE_AT else CLEAR, refuges=[NEAR])
     dva.run_for(60.0)
@@ -520,14 +466,14 @@ def test_an_exit_in_smoke_is_a_way_out_beyond_which_the_air_is_clean(dva: Preten
     assert guard.dose.toxic == breathed > 0.0
 
 
-def test_a_guard_whose_post_burns_goes_to_another_refuge(dva: PretendedDva) -> None:
+def test_a_guard_whose_post_burns_goes_to_another_refuge(dva):
     guard = dva.guard(air=lambda x, y, now: hot(20.0 - x, y, now), refuges=[POST, (38.0, 12.0)])
     dva.run_for(90.0)
     assert guard.activity == "waiting"
     assert math.dist(at(guard), (38.0, 12.0)) < 1.0
 
 
-def test_who_is_hurt_takes_no_order_any_more_and_offers_nothing(dva: PretendedDva) -> None:
+def test_who_is_hurt_takes_no_order_any_more_and_offers_nothing(dva):
     guard = dva.guard(air=lambda x, y, now: CLEAR._replace(co=4000.0 if x > 5.0 else 0.0))
     guard.dose.toxic = 0.299
     dva.order(1, FARTHER)
@@ -539,9 +485,7 @@ def test_who_is_hurt_takes_no_order_any_more_and_offers_nothing(dva: PretendedDv
     assert dva.bids() == []
 
 
-def test_who_is_incapacitated_stays_where_it_is_and_its_order_has_failed(
-    dva: PretendedDva,
-) -> None:
+def test_who_is_incapacitated_stays_where_it_is_and_its_order_has_failed(dva):
     guard = dva.guard(air=lambda x, y, now: CLEAR._replace(heat_flux=80.0 if now > 20.0 else 0.0))
     dva.order(1, FARTHER)
     dva.run_for(40.0)
@@ -554,7 +498,7 @@ def test_who_is_incapacitated_stays_where_it_is_and_its_order_has_failed(
     assert dva.order(2, NEAR) == m.BUSY
 
 
-def test_the_end_of_an_order_is_heard_by_who_takes_none(dva: PretendedDva) -> None:
+def test_the_end_of_an_order_is_heard_by_who_takes_none(dva):
     dva.guard(air=hot)
     dva.order(1, FARTHER, "contain")
     dva.run_for(30.0)
@@ -564,7 +508,7 @@ def test_the_end_of_an_order_is_heard_by_who_takes_none(dva: PretendedDva) -> No
 # --- who they are ----------------------------------------------------------------------
 
 
-def test_nine_guards_in_ten_have_set_out_after_80_s() -> None:
+def test_nine_guards_in_ten_have_set_out_after_80_s():
     """NFPA 1710: turnout within 80 s in 90 % of all cases; within 3 %."""
     file = load_yaml(find("guard", "agents/people"))
     profile = validate(GuardProfile, file.data, file.error)
@@ -573,7 +517,7 @@ def test_nine_guards_in_ten_have_set_out_after_80_s() -> None:
     assert np.quantile(drawn, 0.9) == pytest.approx(80.0, rel=0.03)
 
 
-def test_guards_walk_as_fast_as_weidmann_found_within_three_per_cent() -> None:
+def test_guards_walk_as_fast_as_weidmann_found_within_three_per_cent():
     rng = np.random.default_rng(1)
     speeds = [Walker.draw(GuardProfile(), rng).speed for _ in range(20_000)]
     assert np.mean(speeds) == pytest.approx(1.34, rel=0.03)
@@ -591,14 +535,14 @@ def announcement(event: int) -> m.TaskAnnouncement:
     return m.TaskAnnouncement(event, "fire", m.Position(0.0, 0.0), 0.5, 2.0)
 
 
-def test_an_announcement_is_forgotten_a_minute_after_the_time_for_bids() -> None:
+def test_an_announcement_is_forgotten_a_minute_after_the_time_for_bids():
     for wait, code in ((2.0 + AWARD_WITHIN, m.OK), (2.1 + AWARD_WITHIN, m.UNKNOWN_EVENT)):
         duty = GuardProtocol("02:00:00:00:00:01", 10.0)
         decide(duty, announcement(7))
         assert decide(duty, m.TaskAward(7), wait) == code
 
 
-def test_of_many_announcements_the_newest_32_are_remembered() -> None:
+def test_of_many_announcements_the_newest_32_are_remembered():
     duty = GuardProtocol("02:00:00:00:00:01", 10.0)
     for event in range(1, 1001):
         decide(duty, announcement(event))
@@ -607,7 +551,7 @@ def test_of_many_announcements_the_newest_32_are_remembered() -> None:
     assert decide(duty, m.TaskAward(969)) == m.OK
 
 
-def test_how_a_guard_walks_and_looks_does_not_depend_on_how_long_it_would_contain() -> None:
+def test_how_a_guard_walks_and_looks_does_not_depend_on_how_long_it_would_contain():
     usual = GuardProfile()
     slow = usual.model_copy(
         update={"extinguish_s": usual.contain_s.model_copy(update={"median": 9e9})}

@@ -15,7 +15,7 @@ NOBODY = m.Reply(1, m.NOT_PERMITTED, "")
 HOLDS = m.Reply(1, m.OK, "", m.Permission(ANA, "both", 7))
 
 
-def test_one_question_is_under_way_at_a_time_and_claims_meanwhile_make_one_more() -> None:
+def test_one_question_is_under_way_at_a_time_and_claims_meanwhile_make_one_more():
     inquiry = Inquiry()
     for _ in range(1000):
         inquiry.about_holder(RUI)
@@ -30,7 +30,7 @@ def test_one_question_is_under_way_at_a_time_and_claims_meanwhile_make_one_more(
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_question_may_be_asked_at_the_time_that_was_told_to_the_microsecond(seed: int) -> None:
+def test_a_question_may_be_asked_at_the_time_that_was_told_to_the_microsecond(seed):
     """Else whoever asks when it is due is told the same time again, for ever."""
     rng, inquiry, now, asked = random.Random(seed), Inquiry(), 0.0, 0
     while now < 30.0:
@@ -49,7 +49,7 @@ def test_a_question_may_be_asked_at_the_time_that_was_told_to_the_microsecond(se
     assert asked <= BURST + RATE * now + 1
 
 
-def test_readers_and_the_holder_take_turns_and_readers_are_bounded() -> None:
+def test_readers_and_the_holder_take_turns_and_readers_are_bounded():
     inquiry, asked = Inquiry(), list[m.GetGrant | None]()
     for number in range(2 * MOST_READERS):
         inquiry.about_reader(f"02:00:00:0F:00:{number:02X}")
@@ -63,7 +63,7 @@ def test_readers_and_the_holder_take_turns_and_readers_are_bounded() -> None:
     ] * 3
 
 
-def test_a_dva_of_1_4_is_asked_about_the_device_that_was_named_last() -> None:
+def test_a_dva_of_1_4_is_asked_about_the_device_that_was_named_last():
     inquiry = Inquiry()
     inquiry.about_holder(RUI)
     inquiry.about_holder(ANA)
@@ -73,7 +73,7 @@ def test_a_dva_of_1_4_is_asked_about_the_device_that_was_named_last() -> None:
     assert inquiry.answered(HOLDS) == m.GetGrant(ANA)
 
 
-def test_a_dva_before_1_4_settles_nothing_and_is_not_asked_on_and_on() -> None:
+def test_a_dva_before_1_4_settles_nothing_and_is_not_asked_on_and_on():
     inquiry = Inquiry()
     inquiry.about_holder(ANA)
     for _ in range(2):
@@ -83,9 +83,7 @@ def test_a_dva_before_1_4_settles_nothing_and_is_not_asked_on_and_on() -> None:
 
 
 @pytest.mark.parametrize("code", [m.NOT_REGISTERED, None])
-def test_a_dva_that_does_not_answer_or_does_not_know_the_robot_is_asked_again(
-    code: int | None,
-) -> None:
+def test_a_dva_that_does_not_answer_or_does_not_know_the_robot_is_asked_again(code):
     inquiry = Inquiry()
     inquiry.about_holder(ANA)
     inquiry.next(0.0)
@@ -96,5 +94,5 @@ def test_a_dva_that_does_not_answer_or_does_not_know_the_robot_is_asked_again(
     assert inquiry.next(0.0) == m.GetGrant()
 
 
-def test_an_answer_to_no_question_settles_nothing() -> None:
+def test_an_answer_to_no_question_settles_nothing():
     assert Inquiry().answered(HOLDS) is None

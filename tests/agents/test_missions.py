@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.wording import unnamed
 from helpers.worlds.robot_fleet import Fleet, Robot, caparica
 
 from dva_sim.agents.robot.collision_guard import PERSONAL
@@ -43,7 +44,7 @@ def untouched(*robots: Robot) -> bool:
 # --- getting there ------------------------------------------------------------------------
 
 
-def test_a_robot_visits_its_waypoints_in_order_and_is_done() -> None:
+def test_a_robot_visits_its_waypoints_in_order_and_is_done():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to((13.1, 12.0), (13.1, 20.0)))
     fleet.run(120.0)
@@ -53,7 +54,7 @@ def test_a_robot_visits_its_waypoints_in_order_and_is_done() -> None:
     assert untouched(robot)
 
 
-def test_a_patrol_goes_round_as_often_as_it_was_told() -> None:
+def test_a_patrol_goes_round_as_often_as_it_was_told():
     fleet = Fleet()
     beat = ((9.0, 12.0), WEST)
     robot = fleet.robot(1, (*WEST, EASTWARD), to(*beat, laps=3))
@@ -64,7 +65,7 @@ def test_a_patrol_goes_round_as_often_as_it_was_told() -> None:
     assert robot.body.distance == pytest.approx(legs - 6 * 2 * NEAR + NEAR, abs=1.0)
 
 
-def test_a_patrol_without_a_number_of_laps_does_not_end() -> None:
+def test_a_patrol_without_a_number_of_laps_does_not_end():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to((8.0, 12.0), WEST, laps=0))
     fleet.run(300.0)
@@ -72,7 +73,7 @@ def test_a_patrol_without_a_number_of_laps_does_not_end() -> None:
     assert len(robot.told) > 8
 
 
-def test_there_is_no_way_into_a_wall_block_and_the_robot_says_so_at_once() -> None:
+def test_there_is_no_way_into_a_wall_block_and_the_robot_says_so_at_once():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to((100.0, 100.0)))
     fleet.run(10.0)
@@ -80,7 +81,7 @@ def test_there_is_no_way_into_a_wall_block_and_the_robot_says_so_at_once() -> No
     assert fleet.now < 0.5
 
 
-def test_a_message_becomes_an_errand() -> None:
+def test_a_message_becomes_an_errand():
     to_xy = lambda latitude, longitude: (10 * latitude, 10 * longitude)  # noqa: E731
     one, two = m.Position(1.0, 2.0), m.Position(3.0, 4.0)
     base = (5.0, 6.0)
@@ -99,7 +100,7 @@ CAR = RobotProfile(
 
 
 @pytest.mark.parametrize("heading", [EASTWARD, WESTWARD])
-def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading: float) -> None:
+def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading):
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, heading), to((13.1, 12.0), (13.1, 20.0)), CAR)
     assert robot.body.motors.turning_radius > 0.3
@@ -111,11 +112,10 @@ def test_a_car_that_cannot_turn_on_the_spot_turns_in_the_corridor(heading: float
 # --- other robots -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("one", "two"), [(1, 2), (2, 1)])
-def test_two_that_meet_head_on_in_a_corridor_get_past_each_other(one: int, two: int) -> None:
+def test_two_that_meet_head_on_in_a_corridor_get_past_each_other():
     fleet = Fleet()
-    east = fleet.robot(one, (*WEST, EASTWARD), to(EAST))
-    west = fleet.robot(two, (*EAST, WESTWARD), to(WEST))
+    east = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
+    west = fleet.robot(2, (*EAST, WESTWARD), to(WEST))
     fleet.run(120.0)
     assert east.end == west.end == ("done", "")
     assert untouched(east, west)
@@ -125,9 +125,7 @@ def test_two_that_meet_head_on_in_a_corridor_get_past_each_other(one: int, two: 
 
 
 @pytest.mark.parametrize(("south", "north"), [(1, 2), (2, 1)])
-def test_at_a_door_that_lets_one_through_the_lower_number_goes_first(
-    south: int, north: int
-) -> None:
+def test_at_a_door_that_lets_one_through_the_lower_number_goes_first(south, north):
     fleet = Fleet()
     a = fleet.robot(south, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))
     b = fleet.robot(north, (*NORTH_OF_DOOR, SOUTHWARD), to(SOUTH_OF_DOOR))
@@ -136,11 +134,11 @@ def test_at_a_door_that_lets_one_through_the_lower_number_goes_first(
     assert untouched(a, b)
     first, second = (a, b) if south == 1 else (b, a)
     assert first.when("done") < second.when("done") - 5.0
-    assert "somebody is in the way" in second.reasons()
-    assert "somebody is in the way" not in first.reasons()
+    assert not unnamed(second.reasons(), "somebody")
+    assert unnamed(first.reasons(), "somebody")
 
 
-def test_who_is_in_the_door_already_goes_first_whatever_its_number() -> None:
+def test_who_is_in_the_door_already_goes_first_whatever_its_number():
     fleet = Fleet()
     within = fleet.robot(2, (33.15, 18.2, SOUTHWARD), to(SOUTH_OF_DOOR))
     comes = fleet.robot(1, (33.15, 15.6, NORTHWARD), to(NORTH_OF_DOOR))
@@ -150,7 +148,7 @@ def test_who_is_in_the_door_already_goes_first_whatever_its_number() -> None:
     assert untouched(within, comes)
 
 
-def test_five_in_one_corridor_all_arrive() -> None:
+def test_five_in_one_corridor_all_arrive():
     fleet = Fleet()
     for number, x in enumerate((4.0, 6.0), 1):
         fleet.robot(number, (x, 12.0, EASTWARD), to((28.0 + 2 * number, 12.0)))
@@ -161,7 +159,7 @@ def test_five_in_one_corridor_all_arrive() -> None:
     assert untouched(*fleet.robots)
 
 
-def test_a_robot_that_is_parked_in_the_corridor_is_driven_around() -> None:
+def test_a_robot_that_is_parked_in_the_corridor_is_driven_around():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     parked = fleet.parked(2, 12.0, 12.0)
@@ -171,18 +169,18 @@ def test_a_robot_that_is_parked_in_the_corridor_is_driven_around() -> None:
     assert parked.distance == 0.0
 
 
-def test_where_somebody_stands_in_the_only_door_there_is_no_way_after_a_minute() -> None:
+def test_where_somebody_stands_in_the_only_door_there_is_no_way_after_a_minute():
     fleet = Fleet()
     robot = fleet.robot(1, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))
     fleet.parked(2, 33.15, 18.2)
     fleet.run(120.0)
     assert robot.end == ("failed", "no way")
     assert robot.when("failed") == pytest.approx(GIVE_UP_AFTER, abs=2.0)
-    assert "a robot is in the way" in robot.reasons()
+    assert not unnamed(robot.reasons(), "a robot")
     assert untouched(robot)
 
 
-def test_a_place_where_somebody_stands_already_counts_as_visited_from_beside_it() -> None:
+def test_a_place_where_somebody_stands_already_counts_as_visited_from_beside_it():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to((12.0, 12.0), WEST))
     fleet.parked(2, 12.0, 12.0)
@@ -194,7 +192,7 @@ def test_a_place_where_somebody_stands_already_counts_as_visited_from_beside_it(
 # --- people -------------------------------------------------------------------------------
 
 
-def test_beside_somebody_who_stands_at_the_wall_a_robot_is_slow_and_keeps_its_distance() -> None:
+def test_beside_somebody_who_stands_at_the_wall_a_robot_is_slow_and_keeps_its_distance():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     fleet.person(12.0, 12.9)
@@ -206,7 +204,7 @@ def test_beside_somebody_who_stands_at_the_wall_a_robot_is_slow_and_keeps_its_di
     assert max(robot.speeds) > 0.48
 
 
-def test_somebody_who_walks_towards_a_robot_passes_it_without_a_touch() -> None:
+def test_somebody_who_walks_towards_a_robot_passes_it_without_a_touch():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     person = fleet.person(20.0, 12.0, vx=-1.2)
@@ -218,18 +216,18 @@ def test_somebody_who_walks_towards_a_robot_passes_it_without_a_touch() -> None:
     assert robot.speeds[nearest] < 0.05  # the person walks past, the robot stands
 
 
-def test_somebody_who_stands_in_the_middle_is_gone_around_and_never_touched() -> None:
+def test_somebody_who_stands_in_the_middle_is_gone_around_and_never_touched():
     fleet = Fleet()
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
     person = fleet.person(12.0, 12.0)
     fleet.run(200.0)
     assert robot.end == ("done", "")
-    assert {"a person is in the way", "the way is closed"} <= robot.reasons()
+    assert not unnamed(robot.reasons(), "a person", "closed")
     assert person.contacts == 0
     assert min(fleet.gaps) > 0.2
 
 
-def test_what_no_sensor_can_see_changes_nothing() -> None:
+def test_what_no_sensor_can_see_changes_nothing():
     """Behind walls, and beyond eight metres, others are not there for a robot."""
 
     def trail(*others: tuple[float, float]) -> list[tuple[float, ...]]:
@@ -249,7 +247,7 @@ def test_what_no_sensor_can_see_changes_nothing() -> None:
 # --- jams and power -----------------------------------------------------------------------
 
 
-def test_a_robot_that_runs_into_a_door_not_known_to_be_closed_takes_another_way() -> None:
+def test_a_robot_that_runs_into_a_door_not_known_to_be_closed_takes_another_way():
     fleet = Fleet(closed((19.0, 10.8, 20.3, 10.8)))
     robot = fleet.robot(1, (19.6, 12.2, SOUTHWARD), to((19.6, 8.0)))
     fleet.run(300.0)
@@ -260,7 +258,7 @@ def test_a_robot_that_runs_into_a_door_not_known_to_be_closed_takes_another_way(
     assert around > 15.0  # by the door at (26, 8.8), where the straight way is 4 m
 
 
-def test_a_robot_that_cannot_get_in_has_failed_after_so_many_jams() -> None:
+def test_a_robot_that_cannot_get_in_has_failed_after_so_many_jams():
     fleet = Fleet(closed((32.6, 18.2, 33.7, 18.2)))
     robot = fleet.robot(1, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))
     fleet.run(400.0)
@@ -269,7 +267,7 @@ def test_a_robot_that_cannot_get_in_has_failed_after_so_many_jams() -> None:
     assert len(jammed) == MOST_JAMS + 1 == 4
 
 
-def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home() -> None:
+def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home():
     low = RESERVE - 0.01
     fleet = Fleet(charge=lambda now: 1.0 if now < 5.0 else low)
     robot = fleet.robot(1, (*WEST, EASTWARD), to(EAST))
@@ -285,7 +283,7 @@ def test_a_battery_that_is_nearly_empty_ends_a_mission_but_not_the_way_home() ->
 # --- inspection ---------------------------------------------------------------------------
 
 
-def test_an_inspection_ends_where_the_event_is_seen_and_faces_it() -> None:
+def test_an_inspection_ends_where_the_event_is_seen_and_faces_it():
     fleet = Fleet()
     place = (10.0, 20.0)  # in the workshop, whose door is at (6.05, 13.2)
     fleet.hazards = [HazardSpot("fire", *place, 0.5, shines=True)]
@@ -299,7 +297,7 @@ def test_an_inspection_ends_where_the_event_is_seen_and_faces_it() -> None:
     assert abs(math.remainder(bearing - robot.body.pose().heading, 2 * math.pi)) < 0.15
 
 
-def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_by_itself() -> None:
+def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_by_itself():
     fleet = Fleet()
     place = (10.0, 20.0)
     robot = fleet.robot(1, (6.05, 12.0, NORTHWARD), MissionGoal((place,), event="fire"))
@@ -311,7 +309,7 @@ def test_an_inspection_with_nothing_in_view_goes_near_looks_all_around_and_ends_
     assert robot.when("done") - robot.when("waiting") == pytest.approx(INSPECT_FOR, abs=0.2)
 
 
-def test_something_else_at_the_place_is_not_the_event() -> None:
+def test_something_else_at_the_place_is_not_the_event():
     fleet = Fleet()
     place = (10.0, 20.0)
     fleet.hazards = [
@@ -326,7 +324,7 @@ def test_something_else_at_the_place_is_not_the_event() -> None:
 # --- the same again -----------------------------------------------------------------------
 
 
-def test_the_same_meeting_happens_the_same_way_again() -> None:
+def test_the_same_meeting_happens_the_same_way_again():
     def meeting() -> list[tuple[float, ...]]:
         fleet = Fleet()
         fleet.robot(1, (*SOUTH_OF_DOOR, NORTHWARD), to(NORTH_OF_DOOR))

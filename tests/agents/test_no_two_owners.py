@@ -141,13 +141,11 @@ def search(seed: int) -> None:
 
 @pytest.mark.invariant("S2", "S5")
 @pytest.mark.parametrize("seed", range(60))
-def test_no_order_of_events_and_no_forgery_gives_a_robot_a_wrong_owner(seed: int) -> None:
+def test_no_order_of_events_and_no_forgery_gives_a_robot_a_wrong_owner(seed):
     search(seed)
 
 
-def test_the_search_finds_a_robot_that_believes_an_answer_that_was_overtaken(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_search_finds_a_robot_that_believes_an_answer_that_was_overtaken(monkeypatch):
     monkeypatch.setattr(Inquiry, "_was_over", lambda *_: False)
     with pytest.raises(AssertionError):
         deque(map(search, range(60)), maxlen=0)

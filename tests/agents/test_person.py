@@ -48,12 +48,12 @@ def test_no_median_changes_nothing() -> None:
 
 
 def test_a_trait_that_nobody_has_is_named_with_those_that_there_are() -> None:
-    with pytest.raises(ConfigError, match=r"operator\.traits 'luck' is unknown; known: perceptual"):
+    with pytest.raises(ConfigError, match=r"operator\.traits 'luck' .*known: perceptual"):
         Population().with_medians({"luck": 1.0})
 
 
 def test_a_median_is_above_zero() -> None:
-    with pytest.raises(ConfigError, match=r"operator\.traits 'margin' is 0\.0; should be above 0"):
+    with pytest.raises(ConfigError, match=r"operator\.traits 'margin' is 0\.0;"):
         Population().with_medians({"margin": 0.0})
 
 

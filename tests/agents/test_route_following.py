@@ -23,9 +23,7 @@ def around(wall: float) -> Route:
 
 @pytest.mark.parametrize("piece", [0.4, 0.1, 0.02])
 @pytest.mark.parametrize("between", [0.05, 1.0, 3.0])
-def test_one_who_looks_seldom_knows_its_place_on_a_finely_cut_route(
-    piece: float, between: float
-) -> None:
+def test_one_who_looks_seldom_knows_its_place_on_a_finely_cut_route(piece, between):
     route = waves(piece)
     for along in np.arange(0.0, route.length, between).tolist():
         ahead = route.ahead(*route.point_at(along), 0.0, 0.0)
@@ -35,9 +33,7 @@ def test_one_who_looks_seldom_knows_its_place_on_a_finely_cut_route(
 
 @pytest.mark.parametrize("wall", [0.1, 0.3])
 @pytest.mark.parametrize("between", [0.05, 0.5, 2.0])
-def test_one_does_not_take_the_other_side_of_a_thin_wall_for_ones_own(
-    wall: float, between: float
-) -> None:
+def test_one_does_not_take_the_other_side_of_a_thin_wall_for_ones_own(wall, between):
     """One goes so close to the wall that the way back is nearer than the way out."""
     route = around(wall)
     for x in np.arange(0.0, 8.6, between).tolist():
@@ -47,7 +43,7 @@ def test_one_does_not_take_the_other_side_of_a_thin_wall_for_ones_own(
         assert ahead.distance == pytest.approx(math.hypot(0.5, 0.8 * wall))
 
 
-def test_who_cuts_a_corner_is_soon_past_it() -> None:
+def test_who_cuts_a_corner_is_soon_past_it():
     """Within the 2 m that one looks ahead: half of that on either side of the corner."""
     route = Route(np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)]))
     for x in np.arange(0.0, 9.1, 0.1).tolist():
@@ -58,12 +54,12 @@ def test_who_cuts_a_corner_is_soon_past_it() -> None:
     assert after.remaining == pytest.approx(9.0)
 
 
-def test_who_begins_far_along_a_route_finds_its_place_at_the_first_look() -> None:
+def test_who_begins_far_along_a_route_finds_its_place_at_the_first_look():
     route = Route(np.array([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)]))
     assert route.ahead(10.0, 6.0, 0.0, 0.0).remaining == pytest.approx(4.0)
 
 
-def test_laps_that_lie_on_each_other_are_gone_one_by_one() -> None:
+def test_laps_that_lie_on_each_other_are_gone_one_by_one():
     """Also by one who slips back a little: the next lap begins behind it."""
     angles = np.linspace(0.0, 6.0 * math.pi, 181)
     route = Route(np.stack([np.cos(angles), np.sin(angles)], 1), reach=0.5 * math.pi)

@@ -155,7 +155,7 @@ def test_a_mistake_in_the_configuration_is_told(config: dict[str, object], told:
 
 def test_two_sensors_of_one_name_are_one_too_many() -> None:
     twice = [SensorConfig(name="smoke"), SensorConfig(name="smoke")]
-    with pytest.raises(ConfigError, match="sensor 'smoke' is there twice"):
+    with pytest.raises(ConfigError, match="sensor 'smoke'"):
         make_ports(twice, {"smoke": lambda now: (0.0,)}, Streams(1).fresh)
 
 

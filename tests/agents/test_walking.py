@@ -172,7 +172,7 @@ def test_who_waits_stands_right_of_the_way_through_the_door_or_left_if_a_wall_is
 def test_a_population_walks_as_weidmann_found_though_nobody_is_slower_or_faster_than_people_are():
     """Weidmann 1993: 1.34 m/s, SD 0.26; within 3 % also of those whose speed was cut."""
     rng = np.random.default_rng(1)
-    speeds = np.array([PaceProfile().draw_speed(rng) for _ in range(20_000)])
+    speeds = np.array([PaceProfile().draw_speed(rng) for _ in range(8_000)])
     assert speeds.mean() == pytest.approx(1.34, rel=0.03)
     assert speeds.std() == pytest.approx(0.26, rel=0.03)
     assert (speeds.min(), speeds.max()) == (SLOWEST, FASTEST)
@@ -243,7 +243,7 @@ def test_a_new_goal_replaces_the_old_one_and_standing_still_forgets_it():
 # --- each other ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("offset", [-0.3, -0.1, 0.0, 0.1, 0.3])
+@pytest.mark.parametrize("offset", [-0.3, 0.0, 0.1])
 def test_two_who_meet_in_a_corridor_pass_without_touching_and_lose_hardly_any_time(offset):
     people = People(hall(20, CORRIDOR))
     one, other = people.add((1, 1.2), (19, 1.2)), people.add((19, 1.2 + offset), (1, 1.2))
@@ -267,7 +267,7 @@ def test_nobody_walks_through_a_wall_or_anybody_even_in_a_crowd():
     people = People(two_rooms(door=1.1))
     rng = np.random.default_rng(4)
     spots = [(x, y) for x in np.arange(0.6, 5.5, 0.9) for y in np.arange(0.6, 9.5, 0.9)]
-    for index in rng.permutation(len(spots))[:16]:
+    for index in rng.permutation(len(spots))[:10]:
         x, y = spots[index]
         people.add((x, y), (12 - x, y))
         people.add((12 - x, y), (x, y), speed=1.0)
@@ -300,7 +300,7 @@ def test_two_who_meet_at_a_door_pass_one_after_the_other(width):
     assert people.arrived[1] < people.arrived[0] + 5.0
 
 
-def flow_through(width, seed, count=45):
+def flow_through(width, seed, count=32):
     """Persons per second of the middle half of a crowd of different paces at a door."""
     people, passed = People(two_rooms(width, width=9.0, height=7.0)), []
     rng = np.random.default_rng(seed)
@@ -326,7 +326,7 @@ def test_a_crowd_leaves_by_a_door_at_a_rate_that_has_been_seen_of_crowds():
     door; measured was 1.9 per metre of the door itself (Seyfried et al., Transportation Science
     43, 2009).
     """
-    flow = np.mean([flow_through(1.1, seed) for seed in (1, 2)])
+    flow = flow_through(1.1, seed=1)
     assert 1.3 * (1.1 - 0.3) < flow < 1.9 * 1.1
 
 
@@ -413,10 +413,10 @@ import numpy as np
 from helpers.worlds.hall_with_people import People, two_rooms
 people = People(two_rooms(1.1))
 rng = np.random.default_rng(2)
-for y in np.arange(1.0, 9.5, 0.7):
+for y in np.arange(1.0, 9.5, 1.4):
     people.add((1.0, y), (11.0, 10.0 - y), float(rng.normal(1.34, 0.2)))
     people.add((11.0, y), (1.0, 10.0 - y), float(rng.normal(1.34, 0.2)))
-people.run_until(lambda: False, 15.0)
+people.run_until(lambda: False, 8.0)
 print([repr(c) for w in people.walkings for c in w.place])
 """
 

@@ -138,4 +138,4 @@ def test_a_reply_counts_only_if_it_answers_the_command(off: int) -> None:
     sender.start()
     network.clock.run(1.0)
     assert sender.drive.refused[BAD_MESSAGE] == off * sender.drive.sent
-    assert told[:1] == ["the robot obeys no more: no answer that can be read"] * off
+    assert ["no answer" in line for line in told[:1]] == [True] * off

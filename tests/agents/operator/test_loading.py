@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+from helpers.wording import counted
 from helpers.worlds.delayed_loops import CURSOR, ROBOT, drive, person, way
 
 from dva_sim.agents.observation import Observation
@@ -35,7 +36,7 @@ def written(folder: Path, body: str) -> str:
     return f"{path}:Mine"
 
 
-def test_all_ways_of_steering_have_names() -> None:
+def test_all_ways_of_steering_have_names():
     names = {"adaptive", "move_and_wait", "oracle", "predictor", "pursuit", "two_point"}
     assert names <= set(known_strategies())
     for name in names - {"oracle"}:
@@ -65,18 +66,18 @@ def test_all_ways_of_steering_have_names() -> None:
         ("adaptive", {"closed": "nothing"}, "operator 'nothing' is unknown"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(name: str, options: dict, problem: str) -> None:
+def test_a_mistake_is_told_in_one_line(name, options, problem):
     with pytest.raises(ConfigError) as told:
         load_strategy(name, options)(person(), ROBOT)
     assert problem in str(told.value)
 
 
-def test_a_scenario_refuses_a_strategy_that_there_is_not() -> None:
-    with pytest.raises(ConfigError, match="operator 'clever' is unknown"):
+def test_a_scenario_refuses_a_strategy_that_there_is_not():
+    with pytest.raises(ConfigError, match="'clever'"):
         scenarios.build(scenarios.load("drive-to-event"), {"operator.strategy": "clever"})
 
 
-def test_only_the_oracle_is_told_the_truth_and_it_is_no_strategy_that_sees() -> None:
+def test_only_the_oracle_is_told_the_truth_and_it_is_no_strategy_that_sees():
     oracle = load_strategy("oracle")(person(), ROBOT)
     assert isinstance(oracle, Oracle)
     assert not isinstance(oracle, Strategy)
@@ -104,25 +105,25 @@ class Mine(Pursuit):
 """
 
 
-def test_no_class_of_a_user_derives_from_the_oracle_to_be_told_the_truth(tmp_path: Path) -> None:
+def test_no_class_of_a_user_derives_from_the_oracle_to_be_told_the_truth(tmp_path):
     (tmp_path / "mine.py").write_text(CHEAT)
-    with pytest.raises(ConfigError, match="Mine cannot derive from Oracle, which alone is told"):
+    with pytest.raises(ConfigError, match=r"Mine .*Oracle"):
         load_strategy("mine.py:Mine", base=tmp_path)
 
 
-def test_nor_does_one_make_an_oracle_of_itself(tmp_path: Path) -> None:
+def test_nor_does_one_make_an_oracle_of_itself(tmp_path):
     (tmp_path / "mine.py").write_text(OTHER)
-    with pytest.raises(ConfigError, match="makes no operator, but Oracle"):
+    with pytest.raises(ConfigError, match="Oracle"):
         load_strategy("mine.py:Mine", base=tmp_path)(person(), ROBOT)
 
 
-def test_one_that_poses_as_the_oracle_is_not_taken_for_it(tmp_path: Path) -> None:
+def test_one_that_poses_as_the_oracle_is_not_taken_for_it(tmp_path):
     (tmp_path / "mine.py").write_text(POSING)
     made = load_strategy("mine.py:Mine", base=tmp_path)(person(), ROBOT)
     assert not isinstance(made, Oracle)
 
 
-def test_the_strategy_of_a_user_steers(tmp_path: Path) -> None:
+def test_the_strategy_of_a_user_steers(tmp_path):
     name = written(
         tmp_path,
         "    def drive(self, route, view, stop_before):\n"
@@ -152,15 +153,13 @@ USING = """
 """
 
 
-def test_a_strategy_of_a_user_may_use_another_one_that_a_configuration_names(
-    tmp_path: Path,
-) -> None:
+def test_a_strategy_of_a_user_may_use_another_one_that_a_configuration_names(tmp_path):
     name = written(tmp_path, USING)
     mine = load_strategy(name, {"helper": "pursuit"})(person(), ROBOT)
     plain = drive(Pursuit(person(), ROBOT), way((0, 0), (5, 0)), 0.0, 0.1)
     half = drive(mine, way((0, 0), (5, 0)), 0.0, 0.1)
     assert half[0].wanted.speed == pytest.approx(0.5 * plain[0].wanted.speed)
-    with pytest.raises(ConfigError, match="option 'helper' is 'oracle', which sees nothing"):
+    with pytest.raises(ConfigError, match="option 'helper' is 'oracle'"):
         load_strategy(name, {"helper": "oracle"})(person(), ROBOT)
 
 
@@ -175,9 +174,7 @@ def test_a_strategy_of_a_user_may_use_another_one_that_a_configuration_names(
         ("('fast', 'left')", "TypeError: must be real number, not str"),
     ],
 )
-def test_one_that_answers_nonsense_lets_the_robot_stand(
-    tmp_path: Path, answer: str, problem: str
-) -> None:
+def test_one_that_answers_nonsense_lets_the_robot_stand(tmp_path, answer, problem):
     name = written(tmp_path, f"    def drive(self, route, view, stop_before): return {answer}\n")
     mine = load_strategy(name)(person(), ROBOT)
     track = drive(mine, way((0, 0), (5, 0)), 0.0, 2.0)
@@ -186,7 +183,7 @@ def test_one_that_answers_nonsense_lets_the_robot_stand(
     assert mine.first_failure == problem
 
 
-def test_one_that_wants_too_much_gets_what_the_robot_can_do(tmp_path: Path) -> None:
+def test_one_that_wants_too_much_gets_what_the_robot_can_do(tmp_path):
     body = "    def drive(self, route, view, stop_before): return 1e9, -1e9\n"
     body += "    def point(self, view): return 3e9, 4e9\n"
     mine = load_strategy(written(tmp_path, body))(person(), CURSOR)
@@ -195,15 +192,18 @@ def test_one_that_wants_too_much_gets_what_the_robot_can_do(tmp_path: Path) -> N
     assert mine.point(PointView(0.0, seen, 0.3)) == pytest.approx((0.3, 0.4))
 
 
-def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path: Path) -> None:
+def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path):
     name = written(tmp_path, "    def drive(self, route, view, stop_before): return 1 / 0\n")
     run = simulate(
-        scenarios.build(scenarios.load("drive-to-event"), {"operator.strategy": name}), 1
+        scenarios.build(
+            scenarios.load("drive-to-event"), {"operator.strategy": name, "horizon_s": 60}
+        ),
+        1,
     )
     told = [moment.what for moment in run.recorder.timeline if "strategy fails" in moment.what]
     line = "lets go, as its strategy fails: ZeroDivisionError: division by zero"
     assert told == [line] * len(run.recorder.drives)
-    assert run.recorder.counters["failed: an answer of an operator"] > 100
+    assert counted(run.recorder.counters, "failed", "operator") > 100
 
 
 @pytest.mark.parametrize(
@@ -211,8 +211,8 @@ def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path: Path) -> 
     [("pursuit", 0, 0, 0.0), ("move_and_wait", 5, 15, 1.0), ("adaptive", 3, 15, 0.9)],
 )
 def test_a_run_tells_how_often_its_operator_waited_and_how_long_it_steered_so(
-    strategy: str, least: int, most: int, share: float
-) -> None:
+    strategy, least, most, share
+):
     """At a link delay of a second each way, adaptive persons come to move and wait."""
     changes = {"operator.strategy": strategy, "link.delay_s": 1.0}
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), changes), 1)

@@ -41,9 +41,7 @@ def start(dva: PretendedDva, event: int, place: tuple[float, float], robot: str 
     assert mode(dva, robot) is Mode.MISSION
 
 
-def test_a_fire_that_the_robot_shows_is_confirmed(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_a_fire_that_the_robot_shows_is_confirmed(dva, operator):
     start(dva, 1, fire(dva))
     assert operator.activity == "watches robot-1"
     dva.run_until(lambda: "done" in dva.progress(1))
@@ -56,9 +54,7 @@ def test_a_fire_that_the_robot_shows_is_confirmed(
     assert operator.activity == "waiting"
 
 
-def test_it_takes_the_permission_for_missions_and_drives_nothing(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_it_takes_the_permission_for_missions_and_drives_nothing(dva, operator):
     start(dva, 1, fire(dva))
     asked = [t.body for t in dva.told if isinstance(t.body, m.PermissionRequest)]
     assert [wish.level for wish in asked] == ["missions"]
@@ -68,9 +64,7 @@ def test_it_takes_the_permission_for_missions_and_drives_nothing(
     assert dva.field.robots[ROBOT].applied == 0
 
 
-def test_where_nothing_is_it_says_so_after_having_looked_around(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_where_nothing_is_it_says_so_after_having_looked_around(dva, operator):
     start(dva, 1, EAST)
     dva.run_until(lambda: "done" in dva.progress(1))
     assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
@@ -79,9 +73,7 @@ def test_where_nothing_is_it_says_so_after_having_looked_around(
     assert dva.stage.recorder.drives[0].outcome == "refuted"
 
 
-def test_a_recall_stops_the_robot_and_gives_it_back(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_a_recall_stops_the_robot_and_gives_it_back(dva, operator):
     start(dva, 1, EAST)
     assert dva.say(OPERATOR, m.OrderProgress(1, "done")) == m.OK
     dva.run_for(3.0)
@@ -93,9 +85,7 @@ def test_a_recall_stops_the_robot_and_gives_it_back(
     assert dva.stage.recorder.drives[0].outcome == "recalled"
 
 
-def test_a_newer_order_sends_the_same_robot_elsewhere(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_a_newer_order_sends_the_same_robot_elsewhere(dva, operator):
     start(dva, 1, EAST)
     assert dva.order(2, WEST, robot=ROBOT) == m.OK
     dva.run_until(lambda: "done" in dva.progress(2))
@@ -104,9 +94,7 @@ def test_a_newer_order_sends_the_same_robot_elsewhere(
     assert math.dist(dva.field.robots[ROBOT].body.pose()[:2], WEST) < 2.0
 
 
-def test_a_newer_order_for_another_robot_stops_the_first(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_a_newer_order_for_another_robot_stops_the_first(dva, operator):
     start(dva, 1, EAST)
     dva.order(2, WEST, robot=OTHER_ROBOT)
     dva.run_until(lambda: "departed" in dva.progress(2))
@@ -115,9 +103,7 @@ def test_a_newer_order_for_another_robot_stops_the_first(
     assert list(dva.sessions) == [OTHER_ROBOT]
 
 
-def test_a_robot_that_gives_up_makes_its_operator_give_up(
-    dva: PretendedDva, operator: OperatorAgent
-) -> None:
+def test_a_robot_that_gives_up_makes_its_operator_give_up(dva, operator):
     start(dva, 1, EAST)
     dva.say(ROBOT, m.Emergency())
     dva.run_until(lambda: "failed" in dva.progress(1), limit=30.0)
@@ -126,13 +112,13 @@ def test_a_robot_that_gives_up_makes_its_operator_give_up(
     assert any("the robot: emergency" in moment.what for moment in dva.stage.recorder.timeline)
 
 
-def test_a_place_without_a_way_is_given_up(dva: PretendedDva, operator: OperatorAgent) -> None:
+def test_a_place_without_a_way_is_given_up(dva, operator):
     dva.order(1, (200.0, 200.0), robot=ROBOT)
     dva.run_until(lambda: "failed" in dva.progress(1), limit=60.0)
     assert any("no way" in moment.what for moment in dva.stage.recorder.timeline)
 
 
-def test_a_revoked_permission_ends_the_mission(dva: PretendedDva, operator: OperatorAgent) -> None:
+def test_a_revoked_permission_ends_the_mission(dva, operator):
     start(dva, 1, EAST)
     over = m.PermissionRevocation(ROBOT, OPERATOR, dva.sessions[ROBOT].session)
     dva.say(ROBOT, over)
@@ -143,7 +129,7 @@ def test_a_revoked_permission_ends_the_mission(dva: PretendedDva, operator: Oper
     assert dva.stage.recorder.drives[0].outcome == "gave up"
 
 
-def test_the_same_person_judges_the_same_fire_under_each_control() -> None:
+def test_the_same_person_judges_the_same_fire_under_each_control():
     """Order, picture, judgement and report are one thing; only who steers differs."""
     for control in ("direct", "coordinated", "supervisory"):
         dva = PretendedDva(robots=1, control=control)

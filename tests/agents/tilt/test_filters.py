@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,24 +35,24 @@ def batches(filter_: Filter, levels: list[float], fresh: int) -> list[float]:
     return out
 
 
-def test_with_few_fresh_samples_a_copying_median_stays_frozen_at_zero() -> None:
+def test_with_few_fresh_samples_a_copying_median_stays_frozen_at_zero():
     step = [2.0] * 10 + [8.0] * 10 + [2.0] * 10
     assert set(batches(made("median20-copy"), step, SAMPLES_IN_200_MS)) == {0.0}
 
 
-def test_with_few_fresh_samples_sorting_in_place_ratchets_up_and_never_comes_down() -> None:
+def test_with_few_fresh_samples_sorting_in_place_ratchets_up_and_never_comes_down():
     step = [2.0] * 5 + [8.0] * 5 + [2.0] * 20
     values = batches(made("median20-inplace"), step, SAMPLES_IN_200_MS)
     assert values[4] == 2
     assert values[9:] == [8] * 21
 
 
-def test_with_a_full_buffer_both_follow() -> None:
+def test_with_a_full_buffer_both_follow():
     for name in ("median20-copy", "median20-inplace"):
         assert batches(made(name), [2, 8, 2], 20) == [2, 8, 2]
 
 
-def test_the_median_of_20_lets_a_quarter_of_the_noise_through() -> None:
+def test_the_median_of_20_lets_a_quarter_of_the_noise_through():
     rng, filter_ = np.random.default_rng(3), made("median20-copy")
     values = []
     for _ in range(4000):
@@ -74,7 +73,7 @@ def mean_age_in_force(slots: int) -> float:
     return float(np.mean(ages[10 * fresh - 1 : -1]))
 
 
-def test_the_dissertation_filter_alone_costs_about_half_a_second() -> None:
+def test_the_dissertation_filter_alone_costs_about_half_a_second():
     """0.47 s if the 17 samples of 0.5 s filled the buffer; three stale slots make it 0.515 s."""
     assert mean_age_in_force(17) == pytest.approx(16 / 34)
     assert mean_age_in_force(20) == pytest.approx(17.5 / 34)
@@ -89,9 +88,7 @@ def test_the_dissertation_filter_alone_costs_about_half_a_second() -> None:
         ("one_pole", {"time_constant_s": 0.3}, 0.3 / PERIOD - 0.5),
     ],
 )
-def test_a_filter_lags_behind_a_rising_input_by_its_age(
-    name: str, options: dict[str, object], samples: float
-) -> None:
+def test_a_filter_lags_behind_a_rising_input_by_its_age(name, options, samples):
     filter_ = made(name, **options)
     for number in range(500):
         filter_.add((float(number), -float(number)))
@@ -100,9 +97,7 @@ def test_a_filter_lags_behind_a_rising_input_by_its_age(
 
 
 @pytest.mark.parametrize(("fresh", "age"), [(20, 9.5), (17, 9.5), (11, 9.5)])
-def test_stale_slots_make_a_median_as_old_as_if_its_buffer_were_full(
-    fresh: int, age: float
-) -> None:
+def test_stale_slots_make_a_median_as_old_as_if_its_buffer_were_full(fresh, age):
     filter_ = made("median20-copy")
     for number in range(1, 50 * fresh + 1):
         filter_.add((float(number), 0.0))
@@ -111,7 +106,7 @@ def test_stale_slots_make_a_median_as_old_as_if_its_buffer_were_full(
     assert number - value == filter_.age == age
 
 
-def test_a_frozen_median_grows_older_and_older() -> None:
+def test_a_frozen_median_grows_older_and_older():
     filter_, ages = made("median20-copy"), []
     for _ in range(3):
         batches(filter_, [5.0], SAMPLES_IN_200_MS)
@@ -119,14 +114,14 @@ def test_a_frozen_median_grows_older_and_older() -> None:
     assert ages == [7, 14, 21]
 
 
-def test_a_moving_median_takes_out_a_single_outlier() -> None:
+def test_a_moving_median_takes_out_a_single_outlier():
     filter_ = made("median")
     for level in (1, 1, 50, 1, 1):
         filter_.add((level, level))
     assert filter_.value() == (1, 1)
 
 
-def test_one_pole_closes_63_percent_of_a_step_in_its_time_constant() -> None:
+def test_one_pole_closes_63_percent_of_a_step_in_its_time_constant():
     filter_ = made("one_pole", time_constant_s=10 * PERIOD)
     filter_.add((0.0, 0.0))
     for _ in range(10):
@@ -134,7 +129,7 @@ def test_one_pole_closes_63_percent_of_a_step_in_its_time_constant() -> None:
     assert filter_.value() == pytest.approx((1 - math.exp(-1), 2 - 2 * math.exp(-1)))
 
 
-def test_every_filter_answers_before_any_sample_has_come() -> None:
+def test_every_filter_answers_before_any_sample_has_come():
     for name in known_filters():
         assert made(name).value() == (0.0, 0.0)
 
@@ -163,13 +158,13 @@ def test_every_filter_answers_before_any_sample_has_come() -> None:
         ("none", {"window": 3}, "filter 'none' has no option 'window'; it has none"),
     ],
 )
-def test_what_cannot_be_is_told_in_a_line(name: str, options: dict[str, object], line: str) -> None:
+def test_what_cannot_be_is_told_in_a_line(name, options, line):
     with pytest.raises(ConfigError) as told:
         made(name, **options)
     assert str(told.value) == line
 
 
-def test_a_filter_of_a_users_file_is_found(tmp_path: Path) -> None:
+def test_a_filter_of_a_users_file_is_found(tmp_path):
     (tmp_path / "mine.py").write_text(
         "from dva_sim.agents.tilt import Filter\n"
         "class Half(Filter):\n"
@@ -198,7 +193,7 @@ class Tiring(MovingMedian):
         super().add(sample)
 
 
-def test_a_users_filter_that_takes_no_more_samples_lets_the_phone_stand() -> None:
+def test_a_users_filter_that_takes_no_more_samples_lets_the_phone_stand():
     guarded = GuardedFilter(Tiring(0.03), 0.03)
     for _ in range(3):
         guarded.add((6.0, 12.0))

@@ -41,8 +41,8 @@ def test_most_of_the_tremor_lies_between_8_and_12_hz() -> None:
 
 def test_the_size_of_tremor_and_error_does_not_depend_on_the_rate_of_looking() -> None:
     for rate in (34.0, 150.0):
-        shakes = pitches(Hand(0.15, np.random.default_rng(3), tremor=0.004), 0.0, 300.0, rate)
-        errors = pitches(still(3, lag=0.15, motor_noise=0.1), 0.3, 2000.0, rate)[100:]
+        shakes = pitches(Hand(0.15, np.random.default_rng(3), tremor=0.004), 0.0, 200.0, rate)
+        errors = pitches(still(3, lag=0.15, motor_noise=0.1), 0.3, 900.0, rate)[100:]
         assert np.std(shakes) == pytest.approx(0.004, rel=0.07)
         assert np.std(errors) == pytest.approx(0.1 * 0.3 / math.sqrt(2), rel=0.15)
 

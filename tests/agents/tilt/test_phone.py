@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -46,7 +45,7 @@ def command(app: Phone, now: float) -> TiltCommand:
     return sent
 
 
-def test_full_tilt_is_half_a_metre_and_pi_sixths_and_backwards_is_zero() -> None:
+def test_full_tilt_is_half_a_metre_and_pi_sixths_and_backwards_is_zero():
     app = phone(filter="none")
     app.ask(0.0, 5.0, math.radians(80))
     full = command(app, 1.0)
@@ -56,7 +55,7 @@ def test_full_tilt_is_half_a_metre_and_pi_sixths_and_backwards_is_zero() -> None
     assert (back.speed, back.turn_rate) == pytest.approx((0.0, -math.pi / 6))
 
 
-def test_without_noise_what_is_wanted_is_what_is_sent_through_every_angle() -> None:
+def test_without_noise_what_is_wanted_is_what_is_sent_through_every_angle():
     for reference in [(0.0, 0.0, 9.8), (3.0, 0.0, 9.33), (-2.0, 1.0, 9.5)]:
         app = phone(filter="none", reference_mps2=reference)
         for now, (speed, turn) in enumerate([(0.1, 0.0), (0.3, 0.4), (0.5, -0.5)]):
@@ -65,7 +64,7 @@ def test_without_noise_what_is_wanted_is_what_is_sent_through_every_angle() -> N
             assert (sent.speed, sent.turn_rate) == pytest.approx((speed, turn))
 
 
-def test_an_unchanged_value_is_sent_again_only_by_an_app_that_keeps_alive() -> None:
+def test_an_unchanged_value_is_sent_again_only_by_an_app_that_keeps_alive():
     for send, again in (("on_change", False), ("keep_alive", True)):
         app = phone(filter="none", send=send)
         app.ask(0.0, 0.3, 0.0)
@@ -73,7 +72,7 @@ def test_an_unchanged_value_is_sent_again_only_by_an_app_that_keeps_alive() -> N
         assert (app.look(1.0) is not None) == again
 
 
-def test_a_batch_is_looked_at_after_20_samples_or_the_longest_delay() -> None:
+def test_a_batch_is_looked_at_after_20_samples_or_the_longest_delay():
     for filter_ in ("median20-copy", "median"):
         short = phone(filter=filter_, send="on_change", max_delay_s=0.5)
         long = phone(filter=filter_, send="on_change", max_delay_s=2.0)
@@ -81,7 +80,7 @@ def test_a_batch_is_looked_at_after_20_samples_or_the_longest_delay() -> None:
         assert long.next_look(0.0, 10.0) == pytest.approx(20 / 34, abs=2e-6)
 
 
-def test_a_batch_is_complete_when_its_app_looks_by_a_clock_in_whole_microseconds() -> None:
+def test_a_batch_is_complete_when_its_app_looks_by_a_clock_in_whole_microseconds():
     app = phone(filter="median20-copy", send="on_change", max_delay_s=2.0)
     now = 0.0
     for batch in range(1, 200):
@@ -90,7 +89,7 @@ def test_a_batch_is_complete_when_its_app_looks_by_a_clock_in_whole_microseconds
         assert app.values == batch
 
 
-def test_time_goes_on_between_two_looks_where_batches_end_by_samples_and_by_time_in_turn() -> None:
+def test_time_goes_on_between_two_looks_where_batches_end_by_samples_and_by_time_in_turn():
     app = noisy(filter="median20-copy", send="on_change", max_delay_s=0.6)
     looks = [0.0]
     for _ in range(1000):
@@ -100,7 +99,7 @@ def test_time_goes_on_between_two_looks_where_batches_end_by_samples_and_by_time
     assert app.samples < 20 * app.values  # some batches ended by time
 
 
-def test_an_app_that_keeps_alive_resends_the_value_of_a_batch_until_the_next_is_complete() -> None:
+def test_an_app_that_keeps_alive_resends_the_value_of_a_batch_until_the_next_is_complete():
     app = phone(filter="median20-copy", max_delay_s=0.5)
     app.ask(0.0, 0.3, 0.0)
     sent = [command(app, tick / 10) for tick in range(1, 11)]
@@ -121,8 +120,8 @@ def test_an_app_that_keeps_alive_resends_the_value_of_a_batch_until_the_next_is_
     ],
 )
 def test_the_age_of_a_command_counts_the_wait_for_a_sample_the_filter_and_its_hold_once(
-    settings: dict[str, Any], age: float
-) -> None:
+    settings, age
+):
     app = phone(**settings)
     ages = [command(app, 5.0 + 0.0137 * look).sample_age for look in range(4000)]
     assert np.mean(ages) == pytest.approx(age, abs=0.002)
@@ -139,7 +138,7 @@ CHAINS: list[dict[str, Any]] = [
 
 
 @pytest.mark.parametrize("settings", CHAINS)
-def test_when_the_app_looks_changes_no_number(settings: dict[str, Any]) -> None:
+def test_when_the_app_looks_changes_no_number(settings):
     seldom, often = noisy(**settings), noisy(**settings)
     for app in (seldom, often):
         app.ask(0.0, 0.3, 0.2)
@@ -151,7 +150,7 @@ def test_when_the_app_looks_changes_no_number(settings: dict[str, Any]) -> None:
     assert again is None or at_last == again
 
 
-def test_two_runs_of_one_person_share_the_calibration_and_nothing_else() -> None:
+def test_two_runs_of_one_person_share_the_calibration_and_nothing_else():
     def still(seed: int, own: int) -> float:
         """Mean turn rate of who wants none [rad/s]."""
         app = noisy(seed, own, filter="none", reference_error_mps2=0.5)
@@ -163,7 +162,7 @@ def test_two_runs_of_one_person_share_the_calibration_and_nothing_else() -> None
     assert 0.0 < abs(same - other_run) < 0.02 < abs(same - other_person)
 
 
-def test_a_new_drive_begins_at_rest_with_an_empty_filter() -> None:
+def test_a_new_drive_begins_at_rest_with_an_empty_filter():
     app = phone(filter="median", hand_lag=0.2, mapping="differential")
     app.ask(0.0, 0.5, 0.5)
     command(app, 5.0)
@@ -173,13 +172,13 @@ def test_a_new_drive_begins_at_rest_with_an_empty_filter() -> None:
     assert sent.sample_age < 0.1
 
 
-def test_a_hand_closes_63_percent_of_a_step_in_its_time_constant() -> None:
+def test_a_hand_closes_63_percent_of_a_step_in_its_time_constant():
     app = phone(hand_lag=0.2, filter="none", sample_rate_hz=1000)
     app.ask(0.0, 0.0, 0.3)
     assert command(app, 0.2).turn_rate == pytest.approx(0.3 * (1 - math.exp(-1)), rel=0.02)
 
 
-def test_whoever_steers_by_the_display_gets_there_and_does_not_swing() -> None:
+def test_whoever_steers_by_the_display_gets_there_and_does_not_swing():
     for mapping in ("differential", "leaky"):
         app = phone(hand_lag=0.15, mapping=mapping)
         app.ask(0.0, 0.3, 0.4)
@@ -188,7 +187,7 @@ def test_whoever_steers_by_the_display_gets_there_and_does_not_swing() -> None:
         assert max(rates) < 0.4 * 1.1
 
 
-def test_a_small_gain_asks_for_more_tilt_than_a_hand_has() -> None:
+def test_a_small_gain_asks_for_more_tilt_than_a_hand_has():
     reached = {}
     for gain in (0.1, 0.5, 1.0):
         app = phone(filter="none", mapping_options={"gain": gain})
@@ -199,7 +198,7 @@ def test_a_small_gain_asks_for_more_tilt_than_a_hand_has() -> None:
     assert reached[0.1] < 0.15
 
 
-def test_a_large_gain_lets_more_noise_through() -> None:
+def test_a_large_gain_lets_more_noise_through():
     spread = {}
     for gain in (1.0, 4.0):
         app = noisy(mapping_options={"gain": gain})
@@ -217,16 +216,14 @@ def test_a_large_gain_lets_more_noise_through() -> None:
         ({"filter_options": {"size": 3}}, "filter 'median' has no option 'size'; known: window"),
     ],
 )
-def test_a_chain_with_a_wrong_part_is_refused_in_a_line(
-    settings: dict[str, Any], line: str
-) -> None:
+def test_a_chain_with_a_wrong_part_is_refused_in_a_line(settings, line):
     with pytest.raises(ConfigError) as told:
         phone(**settings)
     assert str(told.value).startswith(line)
 
 
 @pytest.mark.parametrize("reference", [[0, 0, 5], [0, 0, -9.8]])
-def test_a_reference_that_is_no_pose_is_refused(reference: list[float]) -> None:
+def test_a_reference_that_is_no_pose_is_refused(reference):
     with pytest.raises(ConfigError, match="reference_mps2 should"):
         validate(PhoneProfile, {"reference_mps2": reference})
 
@@ -254,8 +251,8 @@ class Leaves(NoNumber):
     ],
 )
 def test_what_a_users_class_cannot_say_is_to_stand_and_is_counted(
-    settings: dict[str, Any], first: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    settings, first, tmp_path, monkeypatch
+):
     (tmp_path / "own.py").write_text(BROKEN)
     monkeypatch.chdir(tmp_path)
     app = phone(**settings)

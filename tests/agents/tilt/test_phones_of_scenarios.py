@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
@@ -33,7 +30,7 @@ class Mine(Filter):
         ({"phone.noise_mps2": 1}, "phone: unknown key 'noise_mps2'; "),
     ],
 )
-def test_a_wrong_stage_is_refused_before_the_run(changes: dict[str, Any], line: str) -> None:
+def test_a_wrong_stage_is_refused_before_the_run(changes, line):
     with pytest.raises(ConfigError) as told:
         scenarios.build(scenarios.load("drive-to-event"), changes)
     assert line in str(told.value)
@@ -49,8 +46,8 @@ def test_a_wrong_stage_is_refused_before_the_run(changes: dict[str, Any], line: 
     ],
 )
 def test_an_option_is_placed_where_it_stands_and_nowhere_if_it_came_as_a_change(
-    key: str, told: str, tmp_path: Path
-) -> None:
+    key, told, tmp_path
+):
     part, options, name = key.split(".")
     file = tmp_path / "scenario.yaml"
     file.write_text(f"horizon_s: 20\n{part}:\n  {options}:\n    {name}: 0\n")
@@ -64,9 +61,7 @@ def test_an_option_is_placed_where_it_stands_and_nowhere_if_it_came_as_a_change(
     assert str(changed.value).startswith(told)
 
 
-def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(
-    tmp_path: Path,
-) -> None:
+def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(tmp_path):
     (tmp_path / "mine.py").write_text(FILTER)
     text = "horizon_s: 20\nevents: [{kind: fire, room: North office, at_s: 2, reported: true}]\n"
     ways = []
@@ -80,7 +75,7 @@ def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(
 
 
 @pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
-def test_a_robot_arrives_with_every_mapping(mapping: str) -> None:
+def test_a_robot_arrives_with_every_mapping(mapping):
     built = scenarios.build(scenarios.load("drive-to-event"), {"phone.mapping": mapping})
     assert [d.outcome for d in simulate(built, 1).recorder.drives] == ["confirmed"]
 
@@ -102,8 +97,8 @@ def test_a_robot_arrives_with_every_mapping(mapping: str) -> None:
     ],
 )
 def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
-    stage: str, key: str, body: str, tmp_path: Path
-) -> None:
+    stage, key, body, tmp_path
+):
     file = tmp_path / "mine.py"
     file.write_text(f"from dva_sim.agents.tilt import {stage}\nclass Mine({stage}):\n{body}")
     run = simulate(
@@ -120,6 +115,6 @@ def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
     assert measures.run_row(run)["plugin_failures"] > 100
 
 
-def test_in_a_run_of_shipped_parts_no_plugin_fails() -> None:
+def test_in_a_run_of_shipped_parts_no_plugin_fails():
     run = simulate(scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 60}), 1)
     assert measures.run_row(run)["plugin_failures"] == 0
