@@ -22,7 +22,7 @@ def far(a, b):
     return max(np.abs(np.subtract(x[:3], y[:3])).max() for x, y in zip(a, b, strict=True))
 
 
-@pytest.mark.parametrize("name", ["caparica", "campus", "office-block"])
+@pytest.mark.parametrize("name", ["caparica", "campus"])
 def test_a_site_written_and_read_again_is_the_same_to_a_millimetre(tmp_path, name):
     site = load_site(name)
     again = load_site(write_site(site, tmp_path))
@@ -91,7 +91,7 @@ def test_show_refuses_options_of_a_map_and_a_format_that_nobody_knows(tmp_path):
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
     site.show(str(tmp_path / "hall.yaml"), tmp_path / "hall.png", [], coverage=False, width=400)
-    with pytest.raises(ConfigError, match="is not generated and takes no options"):
+    with pytest.raises(ConfigError, match="no options"):
         site.show(str(tmp_path / "hall.yaml"), None, ["seed=1"], coverage=False, width=400)
     with pytest.raises(ConfigError, match="cannot be written"):
         site.show("caparica", tmp_path / "a.hologram", [], coverage=False, width=400)

@@ -20,12 +20,6 @@ def test_a_round_trip_within_three_kilometres_stays_within_a_millimetre(origin):
         assert math.dist(frame.to_xy(*frame.to_latlon(x, y)), (x, y)) < 1e-3
 
 
-def test_the_plane_agrees_with_an_independent_library():
-    for latitude, longitude in [(38.67, -9.2), (38.655, -9.21), (38.6612, -9.2058)]:
-        east, north, _ = pymap3d.geodetic2enu(latitude, longitude, 0, 38.6612, -9.2058, 0)
-        assert CAPARICA.to_xy(latitude, longitude) == pytest.approx((east, north), abs=1e-6)
-
-
 @given(
     st.floats(-75, 75),
     st.floats(-179, 179),

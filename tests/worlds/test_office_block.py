@@ -14,7 +14,7 @@ from dva_sim.worlds.office_block import OfficeBlock, assign, lay_out, office_blo
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
-few = search(8)
+few = search(4)
 blocks = st.fixed_dictionaries(
     {
         "seed": st.integers(0, 10_000),
@@ -159,8 +159,8 @@ def test_more_robots_do_not_move_a_wall():
     assert np.array_equal(few_.walls, many.walls)
 
 
-def test_a_block_of_two_hundred_by_eighty_metres_is_planned_from_end_to_end():
-    site = load_site("office-block", {"width_m": 200, "depth_m": 80})
+def test_a_block_of_120_by_60_metres_is_planned_from_end_to_end():
+    site = load_site("office-block", {"width_m": 120, "depth_m": 60})
     planner = Planner(site, 0.30)
     start, goal = site.exits[0], site.exits[-1]
     way = planner.path((start.x + 1, start.y), (goal.x, goal.y - 1))
@@ -182,5 +182,5 @@ def test_an_option_that_does_not_fit_is_told(options, words):
 
 
 def test_a_drawn_site_takes_no_options():
-    with pytest.raises(ConfigError, match="site 'caparica' is drawn and takes no options"):
+    with pytest.raises(ConfigError, match=r"'caparica' .*no options"):
         load_site("caparica", {"seed": 1})

@@ -26,8 +26,3 @@ def test_a_package_gives_all_its_names_afterwards():
         "print(same, ndimage.median_filter([1, 9, 1], 3).tolist())"
     )
     assert found == "True [1, 1, 1]"
-
-
-def test_a_name_that_a_package_does_not_have_is_refused():
-    found = told_by("import scipy\nprint(hasattr(scipy.ndimage, 'no_such'), scipy.ndimage.label)")
-    assert found.startswith("False <function label")

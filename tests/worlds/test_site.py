@@ -40,7 +40,7 @@ def test_caparica_is_an_institute_of_40_by_24_metres_with_doors_a_robot_can_pass
 
 
 def test_an_unknown_room_is_refused_with_the_rooms_there_are():
-    with pytest.raises(ConfigError, match=r"no room 'Archives'; did you mean 'Archive'\?"):
+    with pytest.raises(ConfigError, match=r"'Archives'.*'Archive'"):
         load_site("caparica").room("Archives")
 
 
@@ -79,7 +79,7 @@ def test_samples_have_their_clearance_in_rooms_behind_doors_narrower_than_it(tmp
         x, y = site.sample_free(rng, 0.5, "east")
         assert site.room_at(x, y) == "east"
         assert site.is_free(x, y, 0.5)
-    with pytest.raises(ConfigError, match="no free place of 3 m radius"):
+    with pytest.raises(ConfigError, match="3 m radius"):
         site.sample_free(rng, 3.0)
 
 
@@ -126,10 +126,10 @@ def test_a_mistake_in_a_site_file_is_told_with_its_place(tmp_path, changes, word
 def test_a_plan_that_is_not_json_is_told_with_line_and_column(tmp_path):
     path = write_site(tmp_path, TWO_ROOMS)
     (tmp_path / "tiny.geojson").write_text('{"type": "FeatureCollection",\n "features": [}')
-    with pytest.raises(ConfigError, match=r"tiny.geojson:2:15: is not JSON"):
+    with pytest.raises(ConfigError, match=r"tiny.geojson:2:15: "):
         load_site(path)
 
 
 def test_a_missing_site_is_refused_with_the_sites_there_are():
-    with pytest.raises(ConfigError, match=r"site 'atlantis' not found; available: .*caparica"):
+    with pytest.raises(ConfigError, match=r"'atlantis' .*caparica"):
         load_site("atlantis")

@@ -1,3 +1,4 @@
+import functools
 import math
 
 import numpy as np
@@ -61,7 +62,7 @@ def test_every_room_has_its_name_when_labels_are_wanted():
     assert [text.get_text() for text in bare.texts] == ["10 m"]
 
 
-@pytest.mark.parametrize("width", [60, 120])
+@pytest.mark.parametrize("width", [60, pytest.param(120, marks=pytest.mark.soak)])
 def test_no_name_leaves_its_room_however_small_it_is_drawn(width):
     site = load_site("office-block", {"width_m": width, "depth_m": 30})
     figure, ax = draw(site)
@@ -121,10 +122,14 @@ def test_a_map_without_small_marks_still_has_its_bases_and_desks():
     assert len(few.patches) == len(full.patches)
 
 
-@pytest.mark.parametrize("name", ["caparica", "campus", "office-block"])
-@pytest.mark.parametrize("coverage", [False, True])
+@functools.cache
+def drawn(name, coverage):
+    return poster(load_site(name), coverage)
+
+
+@pytest.mark.parametrize(("name", "coverage"), [("caparica", False), ("campus", True)])
 def test_a_poster_has_a_key_that_fits_below_its_map_and_can_be_read_on_a_page(name, coverage):
-    figure = poster(load_site(name), coverage)
+    figure = drawn(name, coverage)
     figure.draw_without_rendering()
     (key,) = figure.legends
     box = key.get_window_extent()
@@ -136,10 +141,10 @@ def test_a_poster_has_a_key_that_fits_below_its_map_and_can_be_read_on_a_page(na
 
 
 def test_a_poster_of_coverage_has_no_other_wash_of_colour():
-    site = load_site("campus")
-    views, waves = poster(site, False).axes[0], poster(site, True).axes[0]
-    assert washes(views) == len(site.cameras)
-    assert washes(waves) == len([area for area in site.wifi if area.grade in COVERAGE])
+    views, waves = drawn("caparica", False).axes[0], drawn("campus", True).axes[0]
+    assert washes(views) == len(load_site("caparica").cameras)
+    covered = [area for area in load_site("campus").wifi if area.grade in COVERAGE]
+    assert washes(waves) == len(covered)
 
 
 def washes(ax):

@@ -36,13 +36,11 @@ def minutes_to_alarm(ppm: float) -> float:
 
 
 @pytest.mark.parametrize(("ppm", "band"), BANDS.items())
-def test_a_carbon_monoxide_alarm_sounds_when_en_50291_wants_it(
-    ppm: float, band: tuple[float, float]
-) -> None:
+def test_a_carbon_monoxide_alarm_sounds_when_en_50291_wants_it(ppm, band):
     assert band[0] <= minutes_to_alarm(ppm) <= band[1]
 
 
-def test_the_alarm_times_are_those_of_the_target_file() -> None:
+def test_the_alarm_times_are_those_of_the_target_file():
     if not TARGETS.is_file():
         pytest.skip("the file of published numbers is not beside the project")
     checks = {check["id"]: check for check in json.loads(TARGETS.read_text())["checks"]}
@@ -55,7 +53,7 @@ def test_the_alarm_times_are_those_of_the_target_file() -> None:
         assert low <= minutes_to_alarm(float(ppm)) <= high
 
 
-def test_the_more_the_sooner_and_clean_air_makes_it_forget() -> None:
+def test_the_more_the_sooner_and_clean_air_makes_it_forget():
     times = [minutes_to_alarm(ppm) for ppm in (40.0, 50.0, 70.0, 100.0, 200.0, 300.0, 600.0)]
     assert times == sorted(times, reverse=True)
     alarm = CoAlarm()
@@ -67,7 +65,7 @@ def test_the_more_the_sooner_and_clean_air_makes_it_forget() -> None:
 # --- ceiling jets ----------------------------------------------------------------------
 
 
-def test_a_ceiling_jet_is_as_warm_and_fast_as_alpert_measured() -> None:
+def test_a_ceiling_jet_is_as_warm_and_fast_as_alpert_measured():
     """1 MW under 3 m: 271 K and 6.7 m/s above the fire, 86 K and 1.35 m/s at 3 m from its axis."""
     heat = np.array([1000.0])
     assert jet_warmth(heat, 0.0, 3.0)[0] == pytest.approx(16.9 * 100.0 / 3.0 ** (5 / 3))
@@ -76,7 +74,7 @@ def test_a_ceiling_jet_is_as_warm_and_fast_as_alpert_measured() -> None:
     assert jet_speed(heat, 3.0, 3.0)[0] == pytest.approx(1.352, abs=0.001)
 
 
-def test_smoke_is_under_way_as_long_as_the_speeds_of_the_jet_say() -> None:
+def test_smoke_is_under_way_as_long_as_the_speeds_of_the_jet_say():
     radii = np.linspace(0.45, 5.0, 4000)
     speeds = [jet_speed(np.array([50.0]), r, 3.0)[0] for r in radii]
     first = 3.45 / jet_speed(np.array([50.0]), 0.0, 3.0)[0]  # up, and the first 0.15 H
@@ -84,13 +82,13 @@ def test_smoke_is_under_way_as_long_as_the_speeds_of_the_jet_say() -> None:
     assert jet_lag(np.array([50.0]), 5.0, 3.0)[0] == pytest.approx(along, rel=1e-3)
 
 
-def test_smoke_is_thinned_as_heat_is() -> None:
+def test_smoke_is_thinned_as_heat_is():
     """0.05 kg soot for 20 MJ, of which 70 % rise: 8.7 K make 0.32 per metre."""
     soot_per_warmth = 0.05 / 20e3 / 0.7 * 1.204 * 1.005  # [kg/m3/K]
     assert jet_smoke(np.array([10.0]))[0] == pytest.approx(8700 * soot_per_warmth * 10, rel=1e-3)
 
 
-def test_a_farther_detector_sounds_later_and_a_heat_detector_later_still() -> None:
+def test_a_farther_detector_sounds_later_and_a_heat_detector_later_still():
     fire = Fire((0.0, 0.0), 0.0)
     smoke = [smoke_in_jet(fire, r, 3.0) for r in (0.5, 2.0, 4.0, 8.0)]
     heat = [heat_in_jet(fire, r, 3.0) for r in (0.5, 2.0, 4.0, 8.0)]
@@ -100,7 +98,7 @@ def test_a_farther_detector_sounds_later_and_a_heat_detector_later_still() -> No
         assert 0.0 < arrives < sounds < hot
 
 
-def test_a_heat_detector_lags_behind_the_air_by_its_response_time() -> None:
+def test_a_heat_detector_lags_behind_the_air_by_its_response_time():
     """A slow fire is a steady jet to it: it sounds when the air is little above 58 degrees."""
     slow, quick = (Fire((0, 0), 0.0, growth=growth) for growth in ("slow", "ultrafast"))
     over = []
@@ -117,7 +115,7 @@ def detector(kind: str, x: float, y: float) -> Detector:
     return Detector(f"{kind} at {x:g}, {y:g}", kind, x, y)
 
 
-def test_smoke_is_noticed_in_its_own_room_first_then_along_the_corridor() -> None:
+def test_smoke_is_noticed_in_its_own_room_first_then_along_the_corridor():
     """A fire in the chemistry lab: its door opens on the north corridor, that on the main one."""
     site = load_site("caparica")
     fire = make_hazard("fire", (19.0, 22.5), 100.0)
@@ -131,14 +129,14 @@ def test_smoke_is_noticed_in_its_own_room_first_then_along_the_corridor() -> Non
     assert (found.name, when) == ("Chemistry lab smoke", times[0])
 
 
-def test_a_hazard_that_starts_later_is_noticed_as_much_later() -> None:
+def test_a_hazard_that_starts_later_is_noticed_as_much_later():
     site = load_site("caparica")
     for kind, place in (("fire", (5, 16)), ("gas_leak", (5, 16)), ("flood", (35.0, 19.0))):
         early, late = (make_hazard(kind, place, start) for start in (0.0, 1234.0))
         assert first_detection(late, site)[1] == first_detection(early, site)[1] + 1234.0
 
 
-def test_gas_is_noticed_where_a_tenth_of_the_explosive_limit_arrives() -> None:
+def test_gas_is_noticed_where_a_tenth_of_the_explosive_limit_arrives():
     """What comes to the detector is what `Surroundings` has there."""
     from dva_sim.worlds.hazards import Surroundings
 
@@ -150,7 +148,7 @@ def test_gas_is_noticed_where_a_tenth_of_the_explosive_limit_arrives() -> None:
     assert air.at(16.0, 19.0, when - 10.0).gas < 0.0044
 
 
-def test_carbon_monoxide_is_noticed_by_its_own_detectors_only() -> None:
+def test_carbon_monoxide_is_noticed_by_its_own_detectors_only():
     site = load_site("caparica")
     leak = make_hazard("gas_leak", (5.0, 3.5), 0.0, gas="carbon_monoxide")
     assert detection_time(leak, detector("gas", 5.2, 3.6), site) == math.inf
@@ -158,7 +156,7 @@ def test_carbon_monoxide_is_noticed_by_its_own_detectors_only() -> None:
     assert first_detection(leak, site) == (None, math.inf)
 
 
-def test_water_is_noticed_when_its_film_arrives_or_the_room_is_5_mm_deep() -> None:
+def test_water_is_noticed_when_its_film_arrives_or_the_room_is_5_mm_deep():
     """2 L/s spread 5 mm deep: 1 m off after 7.9 s. Behind a door it takes longer."""
     site = load_site("caparica")
     flood = make_hazard("flood", (35.0, 19.0), 0.0)
@@ -168,7 +166,7 @@ def test_water_is_noticed_when_its_film_arrives_or_the_room_is_5_mm_deep() -> No
     assert 200.0 < beyond < 2000.0
 
 
-def test_a_heat_detector_notices_a_fire_later_than_a_smoke_detector_at_its_place() -> None:
+def test_a_heat_detector_notices_a_fire_later_than_a_smoke_detector_at_its_place():
     site = load_site("caparica")
     fire = make_hazard("fire", (19.0, 22.5), 0.0)
     smoke, heat = (detection_time(fire, detector(k, 19.0, 19.0), site) for k in ("smoke", "heat"))

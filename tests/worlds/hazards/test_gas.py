@@ -50,7 +50,7 @@ def puff(air: Air, node: int, amount: float, seconds: int) -> NDArray[np.float64
 # --- meshes ----------------------------------------------------------------------------
 
 
-def test_a_floor_of_more_nodes_than_32_bits_can_pair_has_a_mesh() -> None:
+def test_a_floor_of_more_nodes_than_32_bits_can_pair_has_a_mesh():
     """60 000 nodes in a row of 6 km: 3.6e9 pairs, each node joined to the next."""
     cells = np.full((1, 60_000), FREE, np.uint8)
     mesh = make_mesh(OccupancyGrid(0.1, Pose(0.0, 0.0, 0.0), cells), cells == FREE, 0.1)
@@ -59,16 +59,14 @@ def test_a_floor_of_more_nodes_than_32_bits_can_pair_has_a_mesh() -> None:
 
 
 @pytest.mark.parametrize(("floor_m2", "side"), [(100, 0.5), (10_000, 0.5), (40_000, 1.0)])
-def test_cells_are_half_a_metre_wide_up_to_10_000_square_metres(
-    floor_m2: float, side: float
-) -> None:
+def test_cells_are_half_a_metre_wide_up_to_10_000_square_metres(floor_m2, side):
     assert side_for(floor_m2) == pytest.approx(side)
 
 
 # --- puffs -----------------------------------------------------------------------------
 
 
-def test_a_puff_in_the_open_is_gaussian() -> None:
+def test_a_puff_in_the_open_is_gaussian():
     """1 m3 under a ceiling of 3 m, 0.05 m2/s: after 60 s it is exp(-r2/12)/(12 pi) / 3 m."""
     mesh = floor(20.5, 20.5)
     air = Air(mesh, 0.05, 0.0)
@@ -80,7 +78,7 @@ def test_a_puff_in_the_open_is_gaussian() -> None:
     assert variance == pytest.approx(2.0 * 0.05 * 60.0, rel=0.01)
 
 
-def test_a_wall_throws_a_puff_back_as_a_source_behind_it_would() -> None:
+def test_a_wall_throws_a_puff_back_as_a_source_behind_it_would():
     mesh = floor(20.5, 15.0)
     air = Air(mesh, 0.05, 0.0)
     share = puff(air, mesh.node_at(10.25, 1.25), 1.0, 120)  # the wall is at y = 0
@@ -90,7 +88,7 @@ def test_a_wall_throws_a_puff_back_as_a_source_behind_it_would() -> None:
     assert np.abs(share - exact).max() < 0.02 * exact.max()
 
 
-def test_a_draught_carries_a_puff_along_while_it_spreads() -> None:
+def test_a_draught_carries_a_puff_along_while_it_spreads():
     """0.15 m3/s through a passage of 0.5 m x 3 m are 0.1 m/s: 10 m in 100 s."""
     mesh = floor(40.0, 0.5)
     ends = mesh.node_at(0.25, 0.25), mesh.node_at(39.75, 0.25)
@@ -107,7 +105,7 @@ def test_a_draught_carries_a_puff_along_while_it_spreads() -> None:
 # --- conservation ----------------------------------------------------------------------
 
 
-def test_what_is_set_free_is_in_the_air_or_was_carried_out() -> None:
+def test_what_is_set_free_is_in_the_air_or_was_carried_out():
     wall = (slice(0, 70), slice(48, 50))
     mesh = floor(10.0, 8.0, (wall,))
     draught = Draught(mesh.node_at(1.0, 1.0), mesh.node_at(9.0, 1.0), 0.2)
@@ -122,7 +120,7 @@ def test_what_is_set_free_is_in_the_air_or_was_carried_out() -> None:
     assert state[-1] > 0.5
 
 
-def test_a_draught_loses_no_air_on_its_way() -> None:
+def test_a_draught_loses_no_air_on_its_way():
     wall = (slice(0, 70), slice(48, 50))
     mesh = floor(10.0, 8.0, (wall,))
     supply, exhaust = mesh.node_at(1.0, 1.0), mesh.node_at(9.0, 1.0)
@@ -134,7 +132,7 @@ def test_a_draught_loses_no_air_on_its_way() -> None:
     assert np.abs(gained).max() < 1e-12
 
 
-def test_fresh_air_bounds_what_a_leak_brings_into_a_room_that_is_well_mixed() -> None:
+def test_fresh_air_bounds_what_a_leak_brings_into_a_room_that_is_well_mixed():
     """G = 1 L/s into V = 75 m3 with Q = 6 air changes per hour: G/Q (1 - exp(-Q t / V))."""
     mesh = floor(5.0, 5.0)
     air = Air(mesh, 100.0, 6.0 / 3600.0)
@@ -149,7 +147,7 @@ def test_fresh_air_bounds_what_a_leak_brings_into_a_room_that_is_well_mixed() ->
 # --- walls -----------------------------------------------------------------------------
 
 
-def test_no_gas_passes_a_wall_wherever_it_stands_in_the_mesh() -> None:
+def test_no_gas_passes_a_wall_wherever_it_stands_in_the_mesh():
     for column in (50, 52, 53):  # on a border of the coarse cells, and within them
         mesh = floor(10.0, 4.0, ((slice(None), slice(column, column + 1)),))
         air = Air(mesh, 0.05, 0.0)
@@ -161,7 +159,7 @@ def test_no_gas_passes_a_wall_wherever_it_stands_in_the_mesh() -> None:
         assert state[:-1][~behind].min() > 0.0
 
 
-def test_a_door_lets_through_as_much_as_it_is_wide() -> None:
+def test_a_door_lets_through_as_much_as_it_is_wide():
     """In a passage 8 m long that is 2 m wide and narrows to 1 m half-way, the gas falls twice
     as steeply behind the narrowing, once it flows steadily to where it is sucked off."""
     mesh = floor(16.0, 2.0, ((slice(10, 20), slice(80, 160)),))
@@ -181,7 +179,7 @@ def test_a_door_lets_through_as_much_as_it_is_wide() -> None:
     assert wide == pytest.approx(0.01 / 3.0 / 0.5 * 3.0 / 2.0, rel=0.01)  # q L / (D w)
 
 
-def test_as_much_gas_comes_from_one_place_to_another_as_back() -> None:
+def test_as_much_gas_comes_from_one_place_to_another_as_back():
     mesh = floor(10.0, 8.0, ((slice(0, 70), slice(48, 50)),))
     air = Air(mesh, 0.05, 2.0 / 3600.0)
     there, here = mesh.node_at(2.0, 1.0), mesh.node_at(8.0, 2.0)

@@ -45,16 +45,14 @@ def filling(spaces: Spaces, heat: float, step: float = 1.0) -> tuple[SmokeLayers
 # --- plumes and filling ----------------------------------------------------------------
 
 
-def test_a_plume_draws_in_what_the_correlation_says() -> None:
+def test_a_plume_draws_in_what_the_correlation_says():
     """1 MW of convective heat, 5 m up: 0.071 x 10 x 14.62 + 1.8 = 12.2 kg/s."""
     assert plume(1000.0, 5.0) == pytest.approx(12.18, abs=0.01)
     assert plume(1000.0, 2.0) == pytest.approx(0.032 * 63.1 * 2.0, abs=0.01)  # within flames
     assert plume(0.0, 5.0) == 0.0
 
 
-def test_smoke_of_a_steady_fire_fills_a_room_as_zukoski_says(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_smoke_of_a_steady_fire_fills_a_room_as_zukoski_says(monkeypatch):
     """His equation: the layer grows by what the plume draws in and by what the heat expands."""
     monkeypatch.setattr(model, "WALL_LOSS", 0.0)
     smoke, march = filling(rooms([200.0], 6.0, []), 300.0, step=0.5)
@@ -69,7 +67,7 @@ def test_smoke_of_a_steady_fire_fills_a_room_as_zukoski_says(
         assert smoke.layers(march.at(time))[0][0] == pytest.approx(bottom, abs=0.02)
 
 
-def test_without_expansion_the_closed_form_of_zukoski_is_near() -> None:
+def test_without_expansion_the_closed_form_of_zukoski_is_near():
     """z/H = (1 + 2/3 k Q^1/3 H^2/3 t / A)^-3/2 with k = 0.076 / 1.2 for the heat that rises."""
     smoke, march = filling(rooms([200.0], 6.0, []), 300.0)
     for time in (30.0, 60.0, 120.0):
@@ -78,7 +76,7 @@ def test_without_expansion_the_closed_form_of_zukoski_is_near() -> None:
         assert smoke.layers(march.at(time))[0][0] == pytest.approx(closed, rel=0.12)
 
 
-def test_the_measured_filling_times_of_nfpa_92_are_near() -> None:
+def test_the_measured_filling_times_of_nfpa_92_are_near():
     """z/H = 1.11 - 0.28 ln(t Q^1/3 H^-4/3 / (A/H^2)), from fires in large rooms: first smoke."""
     area, height, heat = 400.0, 10.0, 1000.0
     smoke, march = filling(rooms([area], height, []), heat)
@@ -92,7 +90,7 @@ def test_the_measured_filling_times_of_nfpa_92_are_near() -> None:
 # --- doors -----------------------------------------------------------------------------
 
 
-def test_a_door_of_a_burning_room_lets_out_half_a_kilogram_for_each_a_root_h() -> None:
+def test_a_door_of_a_burning_room_lets_out_half_a_kilogram_for_each_a_root_h():
     """Kawagoe: 0.5 A sqrt(H) kg/s flow through the only opening of a room full of flames;
     1.2 m x 2.1 m are 1.83 kg/s."""
     fire = Fire((0.0, 0.0), 0.0)
@@ -105,7 +103,7 @@ def test_a_door_of_a_burning_room_lets_out_half_a_kilogram_for_each_a_root_h() -
     assert 1.05 < height[0, 0] < 2.1  # it leaves in the upper half
 
 
-def test_smoke_spills_only_when_it_reaches_below_the_lintel() -> None:
+def test_smoke_spills_only_when_it_reaches_below_the_lintel():
     smoke, march = filling(rooms([50.0, 50.0], 3.0, [(0, 1, 1.0)]), 100.0)
     before = next(
         s for s in (march.at(t) for t in np.arange(1.0, 200.0)) if smoke.layers(s)[0][0] < 2.15
@@ -115,7 +113,7 @@ def test_smoke_spills_only_when_it_reaches_below_the_lintel() -> None:
     assert march.at(120.0)[1, SOOT] > 0.0
 
 
-def test_far_rooms_are_reached_later_and_less() -> None:
+def test_far_rooms_are_reached_later_and_less():
     smoke, march = filling(rooms([40.0] * 4, 3.0, [(0, 1, 1.0), (1, 2, 1.0), (2, 3, 1.0)]), 200.0)
     for time in (60.0, 120.0, 300.0):
         soot = march.at(time)[:-1, SOOT] / np.maximum(volumes(march.at(time)[:-1]), 1e-9)
@@ -124,7 +122,7 @@ def test_far_rooms_are_reached_later_and_less() -> None:
     assert bottoms[0] < bottoms[1]
 
 
-def test_a_room_with_a_door_gets_hot_but_not_quite_as_hot_as_measured() -> None:
+def test_a_room_with_a_door_gets_hot_but_not_quite_as_hot_as_measured():
     """McCaffrey, Quintiere and Harkleroad: 6.85 (Q^2 / (A sqrt(H) h A_T))^1/3 [K], for 300 kW in
     a room of 12 m2 and 2.4 m with a door of 0.8 m x 2.1 m. Ours is cooler: the heat that flames
     radiate never comes back from the walls."""
@@ -141,9 +139,7 @@ def test_a_room_with_a_door_gets_hot_but_not_quite_as_hot_as_measured() -> None:
 
 
 @pytest.mark.parametrize("doors", [[], [(0, 1, 1.0)], [(0, 1, 1.0), (1, 2, 0.9), (1, 2, 1.2)]])
-def test_soot_and_carbon_monoxide_are_in_the_rooms_or_have_left(
-    doors: list[tuple[int, int, float]],
-) -> None:
+def test_soot_and_carbon_monoxide_are_in_the_rooms_or_have_left(doors):
     """2 MW fill two small rooms and press out what they cannot hold."""
     _, march = filling(rooms([20.0, 30.0], 3.0, doors), 2000.0)
     for time in (10.0, 100.0, 900.0):
@@ -154,7 +150,7 @@ def test_soot_and_carbon_monoxide_are_in_the_rooms_or_have_left(
         assert state.min() >= 0.0
 
 
-def test_no_layer_is_deeper_than_its_room() -> None:
+def test_no_layer_is_deeper_than_its_room():
     smoke, march = filling(rooms([20.0, 30.0], 3.0, [(0, 1, 1.0)]), 3000.0)
     for time in range(10, 900, 50):
         state = march.at(float(time))
@@ -162,7 +158,7 @@ def test_no_layer_is_deeper_than_its_room() -> None:
         assert smoke.layers(state)[0].min() >= 0.0
 
 
-def test_when_the_fire_is_out_the_smoke_cools_and_stays() -> None:
+def test_when_the_fire_is_out_the_smoke_cools_and_stays():
     smoke, march = filling(rooms([50.0], 3.0, []), 300.0)
     state = march.at(120.0)
     warm = smoke.layers(state)[1][0]
