@@ -81,7 +81,7 @@ def understood(binding, data):
 def test_every_element_of_every_message_is_the_same_in_the_binding_and_on_the_way_back(
     binding, kind
 ):
-    @search(15)
+    @search(4)
     @given(BODIES[kind].flatmap(with_header))
     def both_ways(sent):
         held = understood(binding, encode(sent))

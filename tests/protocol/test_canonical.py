@@ -31,20 +31,7 @@ KNOWN = [
 ]
 SEEDS = [encode(one) for one in KNOWN]
 SAMPLES = sorted((ROOT / "protocol" / "samples" / "valid").glob("*.xml"))
-known_bodies = st.one_of(
-    *(
-        BODIES[kind]
-        for kind in (
-            m.SetTeleOp,
-            m.Heartbeat,
-            m.RobotStatus,
-            m.RobotHolder,
-            m.PersonStatus,
-            m.Reply,
-            m.Registration,
-        )
-    )
-)
+known_bodies = st.one_of(*(BODIES[kind] for kind in {type(one.body): None for one in KNOWN}))
 
 
 def name(one):
@@ -93,7 +80,7 @@ def test_minus_zero_of_another_make_is_read_without_the_parser():
     assert repr(read_canonical(data).body) == repr(m.SetTeleOp(0.5, -0.0))
 
 
-@search()
+@search(40)
 @given(known_bodies.flatmap(with_header))
 def test_both_ways_read_the_same(sent):
     data = encode(sent)
@@ -101,19 +88,19 @@ def test_both_ways_read_the_same(sent):
     assert repr(decode(data)) == repr(sent)
 
 
-@search(200)
+@search(60)
 @given(known_bodies.flatmap(with_header), st.integers(0, 2**32))
 def test_a_damaged_message_is_read_the_same_or_left_to_the_parser(sent, seed):
     agrees(mutated(encode(sent), Random(seed)))
 
 
-@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
-def test_a_damaged_sample_is_read_the_same_or_left_to_the_parser(path):
-    data, rng = encode(decode(path.read_bytes())), Random(20140901)
-    for _ in range(60):
-        agrees(mutated(data, rng))
-    for number in range(len(data)):
-        agrees(data[:number] + data[number + 1 :])
+def test_a_damaged_sample_is_read_the_same_or_left_to_the_parser():
+    for path in SAMPLES:
+        data, rng = encode(decode(path.read_bytes())), Random(20140901)
+        for _ in range(60):
+            agrees(mutated(data, rng))
+        for number in range(len(data)):
+            agrees(data[:number] + data[number + 1 :])
 
 
 @pytest.mark.parametrize("data", SEEDS, ids=map(name, KNOWN))
@@ -136,7 +123,7 @@ def test_every_flipped_bit_is_read_the_same_or_left_to_the_parser(data):
     "element", ["Speed", "TurnRate", "Latitude", "Longitude", "Heading", "HeldFor"]
 )
 @given(value=st.floats(allow_nan=False, allow_infinity=False) | st.decimals(-2000, 2000, places=15))
-@search()
+@search(30)
 def test_any_number_is_read_the_same_or_left_to_the_parser(element, value):
     text = repr(value) if isinstance(value, float) else f"{value:f}"
     pattern = f"(<{element}>)[^<]*".encode()

@@ -21,7 +21,7 @@ def test_every_body_has_a_strategy():
     assert set(BODIES) == set(get_args(m.Body))
 
 
-@search()
+@search(40)
 @given(messages)
 def test_what_is_encoded_is_valid_and_decodes_to_the_same_message(sent):
     data = encode(sent)

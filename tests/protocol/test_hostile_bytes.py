@@ -29,7 +29,7 @@ GOOD = encode(message(m.SetTeleOp(0.5, 0.56, 86320)))
 REPLY = encode(message(m.Reply(124, m.BUSY, "é & <ü>", m.SensorInfo("http://10.0.0.1/?a=b"))))
 SAMPLES = ROOT / "protocol" / "samples" / "valid"
 ALL = {path.stem: encode(decode(path.read_bytes())) for path in sorted(SAMPLES.glob("*.xml"))}
-each_kind = pytest.mark.parametrize("data", ALL.values(), ids=ALL)
+PLAIN = "plain elements"
 
 
 def with_every_bit_flipped(data):
@@ -47,11 +47,11 @@ def refused(old, new, data=GOOD):
     return caught.value.reason
 
 
-@each_kind
-def test_a_message_cut_off_anywhere_is_refused(data):
-    for end in range(len(data)):
-        with pytest.raises(ProtocolError):
-            decode(data[:end])
+def test_a_message_cut_off_anywhere_is_refused():
+    for data in ALL.values():
+        for end in range(len(data)):
+            with pytest.raises(ProtocolError):
+                decode(data[:end])
 
 
 @pytest.mark.parametrize("data", [GOOD, REPLY], ids=["command", "reply"])
@@ -61,25 +61,21 @@ def test_a_flipped_bit_gives_what_the_bytes_say_or_a_refusal(data):
 
 
 @pytest.mark.soak
-@each_kind
-def test_a_flipped_bit_in_any_kind_gives_what_the_bytes_say_or_a_refusal(data):
-    for damaged in with_every_bit_flipped(data):
-        decode_or_refuse(damaged)
+def test_a_flipped_bit_in_any_kind_gives_what_the_bytes_say_or_a_refusal():
+    for data in ALL.values():
+        for damaged in with_every_bit_flipped(data):
+            decode_or_refuse(damaged)
 
 
-@each_kind
-def test_exchanged_elements_give_what_the_bytes_say_or_a_refusal(data):
-    spans = [found.span() for found in LEAF.finditer(data)]
-    for (a, b), (c, d) in itertools.combinations(spans, 2):
-        exchanged = data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
-        assert exchanged == data or decode_or_refuse(exchanged) != decode(data)
-
-
-@each_kind
-def test_dropped_and_doubled_elements_give_what_the_bytes_say_or_a_refusal(data):
-    for found in LEAF.finditer(data):
-        for instead in (b"", found[0] * 2):
-            decode_or_refuse(data[: found.start()] + instead + data[found.end() :])
+def test_exchanged_dropped_and_doubled_elements_give_what_the_bytes_say_or_a_refusal():
+    for data in ALL.values():
+        found = list(LEAF.finditer(data))
+        for (a, b), (c, d) in itertools.combinations([one.span() for one in found], 2):
+            exchanged = data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
+            assert exchanged == data or decode_or_refuse(exchanged) != decode(data)
+        for one in found:
+            for instead in (b"", one[0] * 2):
+                decode_or_refuse(data[: one.start()] + instead + data[one.end() :])
 
 
 def test_the_fields_of_a_command_stand_in_one_order_once():
@@ -107,7 +103,7 @@ def test_any_bytes_in_a_message_give_what_they_say_or_a_refusal(at, width, inser
     decode_or_refuse(REPLY[:at] + inserted + REPLY[at + width :])
 
 
-@search(300)
+@search(150)
 @given(st.sampled_from(list(ALL.values())), st.integers(0, 2**32))
 def test_a_damaged_message_gives_what_it_says_or_a_refusal(data, seed):
     decode_or_refuse(mutated(data, Random(seed)))
@@ -126,9 +122,9 @@ def test_a_damaged_message_gives_what_it_says_or_a_refusal(data, seed):
     ],
 )
 def test_a_doctype_is_refused_with_or_without_its_entities(doctype):
-    assert "other than plain elements" in refused(b"<msg>", doctype + b"<msg>")
+    assert PLAIN in refused(b"<msg>", doctype + b"<msg>")
     data = GOOD.replace(b">0.5<", b">&half;<")
-    assert "other than plain elements" in refused(b"<msg>", doctype + b"<msg>", data)
+    assert PLAIN in refused(b"<msg>", doctype + b"<msg>", data)
 
 
 @pytest.mark.parametrize(
@@ -136,39 +132,19 @@ def test_a_doctype_is_refused_with_or_without_its_entities(doctype):
     [b"0.<!-- -->56", b"<!-- 0.5 -->0.56", b"<![CDATA[0.56]]>", b"0.<?stop?>56"],
 )
 def test_a_value_is_never_half_hidden_by_markup(value):
-    assert "other than plain elements" in refused(b"0.56", value)
+    assert PLAIN in refused(b"0.56", value)
 
 
-@pytest.mark.parametrize(
-    "value",
-    [
-        b"nan",
-        b"NaN",
-        b"INF",
-        b"-INF",
-        b"inf",
-        b"1e999",
-        b"-1e999",
-        b"1_0.5",
-        b"0x1p3",
-        b"+0.5",
-        b".5",
-        b"5.",
-        b"1,5",
-        b"0.5 0.5",
-        b"",
-        b" ",
-        "٠.٥".encode(),
-        "０.５".encode(),
-        "\u00a00.5".encode(),
-        b"9" * 5000,
-        b"0." + b"0" * 5000,
-        b"&half;",
-        b"<Speed>0.5</Speed>",
-    ],
-)
-def test_what_is_no_plain_finite_number_is_no_turn_rate(value):
-    refused(b"0.56", value)
+NO_NUMBERS = [
+    *(b"nan", b"NaN", b"INF", b"-INF", b"inf", b"1e999", b"-1e999", b"1_0.5", b"0x1p3", b"+0.5"),
+    *(b".5", b"5.", b"1,5", b"0.5 0.5", b"", b" ", b"&half;", b"<Speed>0.5</Speed>"),
+    *(b"9" * 5000, b"0." + b"0" * 5000, "٠.٥".encode(), "０.５".encode(), "\u00a00.5".encode()),
+]
+
+
+def test_what_is_no_plain_finite_number_is_no_turn_rate():
+    for value in NO_NUMBERS:
+        refused(b"0.56", value)
 
 
 @pytest.mark.parametrize(
@@ -254,18 +230,12 @@ def test_a_declaration_of_anything_but_xml_in_utf_8_is_refused(declaration):
     assert "declaration" in refused(GOOD[: GOOD.index(b"<msg>")], declaration)
 
 
-@pytest.mark.parametrize(
-    "declaration",
-    [
-        b"",
-        b"\n",
-        b'<?xml version="1.0"?>',
-        b"<?xml version='1.0' encoding='utf-8' ?>\n",
+def test_other_ways_to_declare_utf_8_are_accepted():
+    for declaration in (
+        *(b"", b"\n", b'<?xml version="1.0"?>', b"<?xml version='1.0' encoding='utf-8' ?>\n"),
         b'<?xml version = "1.0"  encoding = "UTF-8" standalone="no"?>\r\n',
-    ],
-)
-def test_other_ways_to_declare_utf_8_are_accepted(declaration):
-    assert decode(GOOD.replace(GOOD[: GOOD.index(b"<msg>")], declaration)) == decode(GOOD)
+    ):
+        assert decode(GOOD.replace(GOOD[: GOOD.index(b"<msg>")], declaration)) == decode(GOOD)
 
 
 def test_a_byte_order_mark_is_refused():
@@ -285,7 +255,7 @@ def test_a_byte_order_mark_is_refused():
     ],
 )
 def test_attributes_and_namespaces_are_refused(root):
-    assert "other than plain elements" in refused(b"<msg>", root)
+    assert PLAIN in refused(b"<msg>", root)
 
 
 def test_a_schema_named_in_the_message_is_never_opened(tmp_path):
@@ -293,13 +263,13 @@ def test_a_schema_named_in_the_message_is_never_opened(tmp_path):
     other.write_text("<not a schema")
     location = f'xsi:noNamespaceSchemaLocation="{other}"'.encode()
     root = b'<msg xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" ' + location + b">"
-    assert "other than plain elements" in refused(b"<msg>", root)
+    assert PLAIN in refused(b"<msg>", root)
 
 
 @pytest.mark.parametrize("name", [b"msg>", b"SimpleMsg>", b"TeleOp>", b"Speed>"])
 def test_a_prefix_that_was_never_declared_is_refused(name):
     data = GOOD.replace(b"<" + name, b"<x:" + name).replace(b"</" + name, b"</x:" + name)
-    with pytest.raises(ProtocolError, match="other than plain elements"):
+    with pytest.raises(ProtocolError, match=PLAIN):
         decode(data)
 
 
@@ -397,11 +367,11 @@ def attack(messages):
 @reads_proc
 @pytest.mark.parametrize("hostile", HOSTILE, ids=lambda hostile: hostile.__name__)
 def test_what_was_never_seen_before_is_not_kept(hostile):
-    """The parser keeps names and blanks for ever; 10,000 of these made 10 MB."""
-    attack(map(hostile, range(1000)))
+    """The parser keeps names and blanks for ever; 3,000 of these made 3 MB."""
+    attack(map(hostile, range(500)))
     before = resident_bytes()
-    attack(map(hostile, range(1000, 11_000)))
-    assert resident_bytes() - before < 2e6
+    attack(map(hostile, range(500, 3500)))
+    assert resident_bytes() - before < 1.5e6
 
 
 def test_blanks_between_elements_mean_nothing_and_are_no_value():

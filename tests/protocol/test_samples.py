@@ -1,6 +1,7 @@
 """The samples and the specification, read as someone writing another implementation would."""
 
 import re
+from contextlib import suppress
 from typing import get_args
 
 import pytest
@@ -24,10 +25,6 @@ ELEMENTS = {
     m.Registration: "RegMsg",
     m.Reply: "reply",
 }
-
-
-def stem(path):
-    return path.stem
 
 
 NEW = {
@@ -66,21 +63,19 @@ def test_an_older_peer_understands_all_samples_but_those_of_what_was_added_since
     assert refused == added
 
 
-@pytest.mark.parametrize("version", OLD)
-@pytest.mark.parametrize("path", INVALID, ids=stem)
-def test_nothing_that_is_marked_invalid_was_accepted_before(path, version):
-    try:
-        tree = etree.parse(path)
-    except etree.XMLSyntaxError:
-        return
-    assert OLD[version].validate(tree) == SCHEMA.validate(tree)
+def test_nothing_that_is_marked_invalid_was_accepted_before():
+    for path in INVALID:
+        with suppress(etree.XMLSyntaxError):
+            tree = etree.parse(path)
+            judged = [schema.validate(tree) for schema in OLD.values()]
+            assert judged == [SCHEMA.validate(tree)] * len(OLD), path.name
 
 
-@pytest.mark.parametrize("path", VALID, ids=stem)
-def test_a_valid_sample_is_accepted_and_survives_a_round_trip(path):
-    data = path.read_bytes()
-    SCHEMA.assertValid(etree.fromstring(data))
-    assert decode(encode(decode(data))) == decode(data)
+def test_a_valid_sample_is_accepted_and_survives_a_round_trip():
+    for path in VALID:
+        data = path.read_bytes()
+        SCHEMA.assertValid(etree.fromstring(data))
+        assert decode(encode(decode(data))) == decode(data), path.name
 
 
 def test_there_is_a_valid_sample_of_every_body_and_content():
@@ -113,13 +108,13 @@ def who_finds(data):
     return "rule" if SCHEMA.validate(tree) else "schema"
 
 
-@pytest.mark.parametrize("path", INVALID, ids=stem)
-def test_an_invalid_sample_is_refused_for_the_reason_given(path):
-    data = path.read_bytes()
-    assert who_finds(data) == FOUND_BY[path.name]
-    with pytest.raises(ProtocolError) as refused:
-        decode(data)
-    assert refused.value.code == m.BAD_MESSAGE
+def test_an_invalid_sample_is_refused_for_the_reason_given():
+    for path in INVALID:
+        data = path.read_bytes()
+        assert who_finds(data) == FOUND_BY[path.name], path.name
+        with pytest.raises(ProtocolError) as refused:
+            decode(data)
+        assert refused.value.code == m.BAD_MESSAGE
 
 
 def test_the_command_printed_in_the_dissertation_decodes_right():
@@ -140,7 +135,7 @@ def test_the_registration_printed_in_the_dissertation_is_accepted_once_mended():
     assert decode(mended.encode()).body == body
     as_printed = mended.replace('encoding="UTF-8" standalone="yes"?>', 'encoding="UTF-8"?')
     assert as_printed != mended
-    with pytest.raises(ProtocolError, match="the XML declaration is broken"):
+    with pytest.raises(ProtocolError, match="XML declaration"):
         decode(as_printed.encode())
 
 
