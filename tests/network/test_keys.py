@@ -57,7 +57,7 @@ def test_secrets_are_for_their_owner_only(folder: Path) -> None:
     assert mode(folder / SECRET) == 0o600
     assert mode(folder / "secret") == 0o700
     (folder / SECRET).chmod(0o640)
-    assert "others may read this secret; mend it with: chmod 600" in refused(folder, ROBOT)
+    assert "chmod 600" in refused(folder, ROBOT)
     KeyRing(folder).pair(GUARD)
 
 
@@ -82,13 +82,13 @@ def test_a_folder_can_be_split(folder: Path, tmp_path: Path) -> None:
     ring = KeyRing(there)
     assert ring.pair(ROBOT) == KeyRing(folder).pair(ROBOT)
     assert ring.public(GUARD) == KeyRing(folder).public(GUARD)
-    assert f"there is no secret key of {GUARD}" in refused(there, GUARD)
+    assert f"secret key of {GUARD}" in refused(there, GUARD)
     assert create_keys(there, [GUARD]) == []  # its secret is elsewhere
 
 
 def test_what_is_missing_is_named(folder: Path, tmp_path: Path) -> None:
     assert "dva-sim keys" in refused(tmp_path / "nowhere")
-    assert "there is no public key of robot-9" in refused(folder, "robot-9")
+    assert "public key of robot-9" in refused(folder, "robot-9")
     (tmp_path / "empty").mkdir()
     assert "holds no keys" in refused(tmp_path / "empty")
 
@@ -127,7 +127,7 @@ def test_a_secret_does_not_belong_among_the_public_keys(folder: Path) -> None:
 def test_keys_that_are_no_pair_are_refused(folder: Path, tmp_path: Path) -> None:
     create_keys(tmp_path / "other", [ROBOT])
     shutil.copy(tmp_path / "other" / SECRET, folder / SECRET)
-    assert "one of them is outdated" in refused(folder, ROBOT)
+    assert "outdated" in refused(folder, ROBOT)
     shutil.copy(folder / "secret" / "02-00-00-02-00-01.key_secret", folder / SECRET)
     assert f"is the key of {GUARD}" in refused(folder, ROBOT)
     text = (tmp_path / "other" / SECRET).read_text()
@@ -139,13 +139,13 @@ def test_keys_that_are_no_pair_are_refused(folder: Path, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("id_", ["", "../robot", "a b", "-", 'x"', "é", "x" * 65, "a\n"])
 def test_an_id_that_is_no_file_name_is_refused(tmp_path: Path, id_: str) -> None:
-    with pytest.raises(ConfigError, match="cannot be the id of a device"):
+    with pytest.raises(ConfigError, match="id"):
         create_keys(tmp_path, ["fine", id_])
     assert list(tmp_path.iterdir()) == []
 
 
 def test_two_ids_never_share_a_file(folder: Path) -> None:
-    with pytest.raises(ConfigError, match="would have the same file"):
+    with pytest.raises(ConfigError, match="same file"):
         create_keys(folder, [ROBOT.replace(":", "-")])
 
 

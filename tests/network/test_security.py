@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import zmq
 from helpers.processes.patience import PATIENCE_S
+from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network import security as module
@@ -151,59 +152,51 @@ def open_both(server: End, client: End, binds: int, connects: int) -> tuple[Sock
 
 @each_pair
 def test_a_key_that_is_unknown_is_told_at_both_ends(
-    ring: KeyRing, other_ring: KeyRing, make: Make, tmp_path: Path, binds: int, connects: int
-) -> None:
+    ring, other_ring, make, tmp_path, binds, connects
+):
     half = knows_the_server_only(ring, other_ring, tmp_path / "half")
     server, client = make(ring, ROBOT), make(half, OPERATOR)
     open_both(server, client, binds, connects)
     at_server, at_client = both_say(server, client, Reason.UNKNOWN_KEY)
     key = half.public(OPERATOR).decode()[:8]
     assert f"an unknown key ({key}...) tried to connect from 127.0.0.1" in at_server
-    assert f"{ROBOT} does not know the key of {OPERATOR}" in at_client
+    assert not unnamed(at_client, ROBOT, f"the key of {OPERATOR}")
     assert client.said[0].gave_up
     assert server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 1
 
 
 @each_pair
-def test_a_wrong_server_key_is_told_at_both_ends(
-    ring: KeyRing, other_ring: KeyRing, make: Make, binds: int, connects: int
-) -> None:
+def test_a_wrong_server_key_is_told_at_both_ends(ring, other_ring, make, binds, connects):
     server, client = make(ring, ROBOT), make(other_ring, OPERATOR)
     open_both(server, client, binds, connects)
     at_server, at_client = both_say(server, client, Reason.WRONG_SERVER_KEY)
-    assert f"the other end has a wrong public key of {ROBOT}" in at_server
-    assert f"the public key of {ROBOT} here is not the one it has" in at_client
+    assert f"wrong public key of {ROBOT}" in at_server
+    assert f"public key of {ROBOT}" in at_client
     assert not client.said[0].gave_up
     assert server.security.refused[ROBOT, Reason.WRONG_SERVER_KEY] >= module.PATIENCE
 
 
 @each_pair
-def test_a_client_without_keys_is_told_at_both_ends(
-    ring: KeyRing, make: Make, binds: int, connects: int
-) -> None:
+def test_a_client_without_keys_is_told_at_both_ends(ring, make, binds, connects):
     server, client = make(ring, ROBOT), make(None, OPERATOR)
     open_both(server, client, binds, connects)
     at_server, at_client = both_say(server, client, Reason.PLAIN_CLIENT)
-    assert "the other end has no keys, this one wants them" in at_server
-    assert f"{ROBOT} wants keys, this end has none" in at_client
+    assert "no keys" in at_server
+    assert f"{ROBOT} wants keys" in at_client
 
 
 @each_pair
-def test_a_server_without_keys_is_told_at_both_ends(
-    ring: KeyRing, make: Make, binds: int, connects: int
-) -> None:
+def test_a_server_without_keys_is_told_at_both_ends(ring, make, binds, connects):
     server, client = make(None, ROBOT), make(ring, OPERATOR)
     open_both(server, client, binds, connects)
     at_server, at_client = both_say(server, client, Reason.PLAIN_SERVER)
-    assert "the other end has keys switched on, this one has not" in at_server
-    assert f"{ROBOT} has no keys switched on, this end has" in at_client
+    assert "keys switched on" in at_server
+    assert f"{ROBOT} has no keys" in at_client
 
 
 @pytest.mark.parametrize("connects", [zmq.REQ, zmq.DEALER])
 @pytest.mark.parametrize("encrypted", [True, False])
-def test_requests_and_replies_travel(
-    ring: KeyRing, make: Make, connects: int, encrypted: bool
-) -> None:
+def test_requests_and_replies_travel(ring, make, connects, encrypted):
     keys = ring if encrypted else None
     server, client = make(keys, ROBOT), make(keys, OPERATOR)
     router, asker = open_both(server, client, zmq.ROUTER, connects)
@@ -219,7 +212,7 @@ def test_requests_and_replies_travel(
 
 
 @pytest.mark.parametrize("encrypted", [True, False])
-def test_what_is_published_arrives(ring: KeyRing, make: Make, encrypted: bool) -> None:
+def test_what_is_published_arrives(ring, make, encrypted):
     keys = ring if encrypted else None
     server, client = make(keys, ROBOT), make(keys, OPERATOR)
     publisher, subscriber = open_both(server, client, zmq.PUB, zmq.SUB)
@@ -233,7 +226,7 @@ def test_what_is_published_arrives(ring: KeyRing, make: Make, encrypted: bool) -
     assert server.said == client.said == []
 
 
-def test_several_devices_in_one_context(ring: KeyRing, make: Make) -> None:
+def test_several_devices_in_one_context(ring, make):
     both = make(ring, ROBOT)
     router, endpoint = both.bind(zmq.ROUTER)
     both.device = OPERATOR
@@ -242,9 +235,7 @@ def test_several_devices_in_one_context(ring: KeyRing, make: Make) -> None:
     assert both.security.sender(receive([both], router)[-1]) == OPERATOR
 
 
-def test_a_refused_client_can_be_told_to_try_again(
-    ring: KeyRing, other_ring: KeyRing, make: Make, tmp_path: Path
-) -> None:
+def test_a_refused_client_can_be_told_to_try_again(ring, other_ring, make, tmp_path):
     half = knows_the_server_only(ring, other_ring, tmp_path / "half")
     server, client = make(ring, ROBOT), make(half, OPERATOR)
     publisher, subscriber = open_both(server, client, zmq.PUB, zmq.SUB)
@@ -259,9 +250,7 @@ def test_a_refused_client_can_be_told_to_try_again(
     run([server, client], lambda: publisher.send(b"idle") or subscriber.poll(0))
 
 
-def test_a_persistent_client_is_told_once(
-    ring: KeyRing, other_ring: KeyRing, make: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_persistent_client_is_told_once(ring, other_ring, make, monkeypatch):
     monkeypatch.setattr(module, "RECONNECT_FIRST", 5)
     server, client = make(ring, ROBOT), make(other_ring, OPERATOR)
     open_both(server, client, zmq.ROUTER, zmq.DEALER)
@@ -270,9 +259,7 @@ def test_a_persistent_client_is_told_once(
     assert len(client.security._handshakes) == 1
 
 
-def test_one_hang_up_is_kept_for_the_time_out_but_not_told(
-    ring: KeyRing, other_ring: KeyRing, make: Make
-) -> None:
+def test_one_hang_up_is_kept_for_the_time_out_but_not_told(ring, other_ring, make):
     server, client = make(ring, ROBOT), make(other_ring, OPERATOR)
     open_both(server, client, zmq.ROUTER, zmq.REQ)
     run([server, client], lambda: client.security.trouble(OPERATOR, ROBOT))
@@ -280,9 +267,7 @@ def test_one_hang_up_is_kept_for_the_time_out_but_not_told(
     assert client.said == []
 
 
-def test_strangers_without_number_are_not_told_without_end(
-    ring: KeyRing, make: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_strangers_without_number_are_not_told_without_end(ring, make, monkeypatch):
     monkeypatch.setattr(module, "STRANGERS_TOLD", 3)
     server = make(ring, ROBOT)
     _, endpoint = server.bind(zmq.ROUTER)
@@ -293,11 +278,11 @@ def test_strangers_without_number_are_not_told_without_end(
         stranger.connect(endpoint)
     run([server], lambda: server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 6)
     assert len(server.said) == 3
-    assert str(server.said[-1]).endswith("there are many, no more will be told")
+    assert "no more" in str(server.said[-1])
     assert len(server.security._strangers) == 3
 
 
-def test_a_loop_that_is_late_does_not_stop_the_traffic(ring: KeyRing, make: Make) -> None:
+def test_a_loop_that_is_late_does_not_stop_the_traffic(ring, make):
     """libzmq holds up everything when the queue of a monitor is full, by default at 1000."""
     server = make(ring, ROBOT)
     _, endpoint = server.bind(zmq.ROUTER)
@@ -311,7 +296,7 @@ def test_a_loop_that_is_late_does_not_stop_the_traffic(ring: KeyRing, make: Make
     assert len(server.said) == 1
 
 
-def test_a_peer_that_only_knocks_is_no_refusal(ring: KeyRing, make: Make) -> None:
+def test_a_peer_that_only_knocks_is_no_refusal(ring, make):
     server, client = make(ring, ROBOT), make(ring, OPERATOR)
     router, endpoint = server.bind(zmq.ROUTER)
     address = "127.0.0.1", int(endpoint.rpartition(":")[2])
@@ -324,9 +309,7 @@ def test_a_peer_that_only_knocks_is_no_refusal(ring: KeyRing, make: Make) -> Non
 
 
 @pytest.mark.parametrize("encrypted", [True, False])
-def test_a_peer_that_keeps_silent_is_told(
-    ring: KeyRing, make: Make, monkeypatch: pytest.MonkeyPatch, encrypted: bool
-) -> None:
+def test_a_peer_that_keeps_silent_is_told(ring, make, monkeypatch, encrypted):
     monkeypatch.setattr(module, "HANDSHAKE_LIMIT", 50)
     client = make(ring if encrypted else None, OPERATOR)
     with tcp.create_server(("127.0.0.1", 0)) as mute:
@@ -336,7 +319,7 @@ def test_a_peer_that_keeps_silent_is_told(
     assert f"is it {ROBOT} who listens there?" in str(client.said[0])
 
 
-def test_a_peer_that_hangs_up_without_keys_is_told(make: Make) -> None:
+def test_a_peer_that_hangs_up_without_keys_is_told(make):
     client = make(None, OPERATOR)
     with tcp.create_server(("127.0.0.1", 0)) as rude:
         rude.settimeout(0.0)
@@ -351,7 +334,7 @@ def test_a_peer_that_hangs_up_without_keys_is_told(make: Make) -> None:
     assert client.said[0].reason == Reason.CLOSED
 
 
-def test_without_an_open_door_nobody_gets_in(ring: KeyRing, make: Make) -> None:
+def test_without_an_open_door_nobody_gets_in(ring, make):
     server, client = make(ring, ROBOT), make(ring, OPERATOR)
     router, endpoint = server.bind(zmq.ROUTER)
     server.security.close()
@@ -362,7 +345,7 @@ def test_without_an_open_door_nobody_gets_in(ring: KeyRing, make: Make) -> None:
     assert not router.poll(0)
 
 
-def test_monitors_go_with_their_sockets(ring: KeyRing, make: Make) -> None:
+def test_monitors_go_with_their_sockets(ring, make):
     server, client = make(ring, ROBOT), make(ring, OPERATOR)
     released, endpoint = server.bind(zmq.ROUTER)
     closed = client.connect(zmq.REQ, ROBOT, endpoint)
@@ -375,7 +358,7 @@ def test_monitors_go_with_their_sockets(ring: KeyRing, make: Make) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="open files of Linux")
-def test_sockets_that_come_and_go_leave_nothing_behind(ring: KeyRing, make: Make) -> None:
+def test_sockets_that_come_and_go_leave_nothing_behind(ring, make):
     client = make(ring, OPERATOR)
 
     def come_and_go() -> int:
@@ -392,11 +375,11 @@ def test_sockets_that_come_and_go_leave_nothing_behind(ring: KeyRing, make: Make
     run([client], lambda: come_and_go() <= before)
 
 
-def test_keys_that_are_missing_are_told_before_anything_opens(ring: KeyRing, make: Make) -> None:
+def test_keys_that_are_missing_are_told_before_anything_opens(ring, make):
     end = make(ring, "02:00:00:01:00:09")
-    with pytest.raises(ConfigError, match="no public key of 02:00:00:01:00:09"):
+    with pytest.raises(ConfigError, match="key of 02:00:00:01:00:09"):
         end.bind(zmq.ROUTER)
     end.device = OPERATOR
-    with pytest.raises(ConfigError, match="no public key of robot-9"):
+    with pytest.raises(ConfigError, match="key of robot-9"):
         end.connect(zmq.REQ, "robot-9", "tcp://127.0.0.1:9")
     assert len(end.security.sockets()) == 1

@@ -52,9 +52,7 @@ class Robot:
 
 @DEPTHS
 @pytest.mark.parametrize(("delay", "service"), [(0.0, 0.05), (0.1, 0.05), (0.5, 0.2)])
-def test_the_period_under_request_reply_is_round_trip_plus_service(
-    depth: Depth, delay: float, service: float
-) -> None:
+def test_the_period_under_request_reply_is_round_trip_plus_service(depth, delay, service):
     net = network(depth, delay_s=delay)
     robot = Robot(net, service)
     requester = Requester(net, "phone", "robot", timeout=9.0)
@@ -70,9 +68,7 @@ def test_the_period_under_request_reply_is_round_trip_plus_service(
 
 
 @DEPTHS
-def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_does_not(
-    depth: Depth,
-) -> None:
+def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_does_not(depth):
     """10 commands a second, 0.5 s each: after 10 s a stop comes 40 s late."""
     ages = {}
     for latest_wins in (False, True):
@@ -94,9 +90,7 @@ def test_plain_publishing_to_a_slow_robot_queues_without_bound_and_latest_wins_d
 
 
 @DEPTHS
-def test_three_attempts_at_a_robot_that_needs_longer_execute_a_command_three_times(
-    depth: Depth,
-) -> None:
+def test_three_attempts_at_a_robot_that_needs_longer_execute_a_command_three_times(depth):
     net = network(depth, delay_s=0.05)
     robot, alerts = Robot(net, 3.0), list[float]()
     requester = Requester(net, "phone", "robot", timeout=1.0, attempts=3)
@@ -109,8 +103,8 @@ def test_three_attempts_at_a_robot_that_needs_longer_execute_a_command_three_tim
 @DEPTHS
 @pytest.mark.parametrize(("timeout", "heard"), [(1.9, 0), (2.2, 1)])
 def test_below_four_round_trips_a_request_over_a_new_connection_is_never_answered(
-    depth: Depth, timeout: float, heard: int
-) -> None:
+    depth, timeout, heard
+):
     net, replies = network(depth, delay_s=0.25), list[bytes]()
     Robot(net, 0.0)
     requester = Requester(net, "phone", "robot", timeout, attempts=3)
@@ -119,7 +113,7 @@ def test_below_four_round_trips_a_request_over_a_new_connection_is_never_answere
     assert len(replies) == heard
 
 
-def test_one_loss_ends_all_control_where_the_time_out_is_below_four_round_trips() -> None:
+def test_one_loss_ends_all_control_where_the_time_out_is_below_four_round_trips():
     """Round trip 0.5 s. All is well until the link is gone for a moment after 30 s."""
     for timeout, goes_on in ((1.5, False), (3.0, True)):
         net = network("segment", delay_s=0.25, outages=[{"from_s": 30.0, "for_s": 1.5}])
@@ -137,7 +131,7 @@ def test_one_loss_ends_all_control_where_the_time_out_is_below_four_round_trips(
         assert (max(times) > 115.0) is goes_on
 
 
-def test_a_full_pipe_drops_what_is_published_and_counts_it() -> None:
+def test_a_full_pipe_drops_what_is_published_and_counts_it():
     bounds = {"high_water_mark": 5, "send_buffer_bytes": 4096}
     net, got = network("segment", bounds, rate_bps=10_000), list[int]()
     net.subscribe("robot", "phone", "r|", got.append)
@@ -150,7 +144,7 @@ def test_a_full_pipe_drops_what_is_published_and_counts_it() -> None:
     assert 5 < len(got) < 30
 
 
-def test_requests_wait_where_the_pipe_is_full_and_none_is_lost() -> None:
+def test_requests_wait_where_the_pipe_is_full_and_none_is_lost():
     bounds = {"high_water_mark": 2, "send_buffer_bytes": 4096}
     net = network("segment", bounds, rate_bps=20_000)
     robot = Robot(net, 0.0)
@@ -162,7 +156,7 @@ def test_requests_wait_where_the_pipe_is_full_and_none_is_lost() -> None:
     assert [data for data, _ in robot.done] == asked
 
 
-def test_a_full_inbox_holds_up_the_publisher_instead_of_losing_commands() -> None:
+def test_a_full_inbox_holds_up_the_publisher_instead_of_losing_commands():
     """400 commands at once; 10 may wait at the robot, which takes 0.1 s for each."""
     fast = {"delay_s": 0.01, "rate_bps": 1e9, "queue_bytes": 10_000_000}
     for depth, kept in (("message", 11), ("segment", 400)):
@@ -185,9 +179,7 @@ def test_a_full_inbox_holds_up_the_publisher_instead_of_losing_commands() -> Non
 
 
 @DEPTHS
-def test_after_a_publisher_is_back_a_subscriber_misses_the_interval_and_the_handshake(
-    depth: Depth,
-) -> None:
+def test_after_a_publisher_is_back_a_subscriber_misses_the_interval_and_the_handshake(depth):
     net, got = network(depth, delay_s=0.1, rate_bps=1e9), list[int]()
     net.subscribe("robot", "phone", "r|", got.append)
     for number in range(1000):
@@ -200,7 +192,7 @@ def test_after_a_publisher_is_back_a_subscriber_misses_the_interval_and_the_hand
     assert 0.01 * after == pytest.approx(6.0 + RECONNECT + 3.5 * 0.2, abs=0.02)
 
 
-def test_what_waits_in_the_pipe_outlives_its_connection_and_what_had_left_it_does_not() -> None:
+def test_what_waits_in_the_pipe_outlives_its_connection_and_what_had_left_it_does_not():
     """5 requests a second pass; when the robot leaves, a batch of 20 is beyond the pipe."""
     net = network("segment", {"send_buffer_bytes": 4096}, delay_s=0.05, rate_bps=20_000)
     robot = Robot(net, 0.0)
@@ -221,7 +213,7 @@ def test_what_waits_in_the_pipe_outlives_its_connection_and_what_had_left_it_doe
     assert done == before + asked[len(before) + lost :]
 
 
-def test_a_late_reply_to_a_closed_connection_is_dropped() -> None:
+def test_a_late_reply_to_a_closed_connection_is_dropped():
     net, replies, held = network("segment", delay_s=0.05), list[bytes](), list[Request]()
     net.serve("robot", held.append)
     requester = Requester(net, "phone", "robot", timeout=1.0, attempts=2)

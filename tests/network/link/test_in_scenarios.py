@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -30,7 +29,7 @@ def longest_gap(times: list[float], since: float, until: float) -> float:
     return max(b - a for a, b in itertools.pairwise(inside))
 
 
-def test_during_an_outage_no_command_reaches_the_robot_and_afterwards_they_do() -> None:
+def test_during_an_outage_no_command_reaches_the_robot_and_afterwards_they_do():
     free = applied(run())
     assert longest_gap(free, 30.0, 40.0) < 1.0
     out = applied(run(outages=[{"from_s": 32, "for_s": 4}]))
@@ -38,7 +37,7 @@ def test_during_an_outage_no_command_reaches_the_robot_and_afterwards_they_do() 
     assert [t for t in out if t > 36.0]
 
 
-def test_a_partition_between_operator_and_robot_leaves_the_rest_of_the_network_alone() -> None:
+def test_a_partition_between_operator_and_robot_leaves_the_rest_of_the_network_alone():
     gap = {"from_s": 32, "for_s": 4}
     recording = run(partitions=[{"source": "operator-1", "destination": "robot-1", **gap}])
     assert not [t for t in applied(recording) if 32.5 < t < 36.0]
@@ -47,7 +46,7 @@ def test_a_partition_between_operator_and_robot_leaves_the_rest_of_the_network_a
     assert down.lost == 0
 
 
-def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays() -> None:
+def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays():
     link = {
         "delay_s": 0.05,
         "delay_law": {"law": "gamma", "sd_s": 0.02, "correlation_s": 2.0},
@@ -68,9 +67,7 @@ def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays() -> Non
         ("link:\n  partitions: [{source: a, from_s: 1, for_s: 1}]\n", "'a' of a partition is nob"),
     ],
 )
-def test_a_mistake_is_told_with_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, words: str
-) -> None:
+def test_a_mistake_is_told_with_its_place(tmp_path, monkeypatch, text, words):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.log").write_text("1 2\nx 3\n")
     (tmp_path / "s.yaml").write_text(text + "events: [{kind: fire, at_s: 5}]\n")

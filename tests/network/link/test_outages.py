@@ -98,7 +98,7 @@ def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others() -
 def test_a_partition_of_nobody_is_refused() -> None:
     partitions = LinkConfig(partitions=PARTED).partitions  # type: ignore[arg-type]
     check_partitions(partitions, ["dva", "operator-1", "robot-1"])
-    with pytest.raises(ConfigError, match=r"source 'operator-\*' of a partition is nobody; known:"):
+    with pytest.raises(ConfigError, match=r"'operator-\*' .*known: "):
         check_partitions(partitions, ["dva", "robot-1"])
 
 

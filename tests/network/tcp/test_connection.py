@@ -73,7 +73,7 @@ def test_data_opens_the_peer_when_the_last_acknowledgement_was_lost():
 
 
 def test_an_unknown_congestion_control_is_named_with_the_known_ones():
-    with pytest.raises(ConfigError, match="'vegas' is unknown; known: cubic, reno"):
+    with pytest.raises(ConfigError, match=r"'vegas' .*cubic, reno"):
         TcpOptions(congestion="vegas")
 
 
