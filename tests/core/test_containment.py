@@ -37,7 +37,7 @@ def standing_by() -> Office:
     return office
 
 
-def test_without_the_rule_a_confirmed_event_is_over() -> None:
+def test_without_the_rule_a_confirmed_event_is_over():
     office = Office()
     office.fire(12)
     office.finds(OPERATOR, "confirmed", 5.0)
@@ -46,7 +46,7 @@ def test_without_the_rule_a_confirmed_event_is_over() -> None:
     assert office.event().state is State.CONFIRMED
 
 
-def test_a_confirmed_event_is_dealt_with_by_a_person_and_then_over(office: Office) -> None:
+def test_a_confirmed_event_is_dealt_with_by_a_person_and_then_over(office):
     office.fire(12, now=1.0)
     sends = office.finds(OPERATOR, "confirmed", 5.0)[1]
     assert sends == [Send(GUARD, order("contain"))]
@@ -62,13 +62,13 @@ def test_a_confirmed_event_is_dealt_with_by_a_person_and_then_over(office: Offic
     assert office.working == {OPERATOR: 1, ROBOT: 1}  # its operator has not said `done` yet
 
 
-def test_nobody_can_contain_what_is_not_confirmed(office: Office) -> None:
+def test_nobody_can_contain_what_is_not_confirmed(office):
     office.fire(12)
     office.finds(OPERATOR, "contained", 5.0)
     assert office.event().state is State.ON_SCENE
 
 
-def test_who_has_confirmed_it_may_be_the_one_to_deal_with_it(office: Office) -> None:
+def test_who_has_confirmed_it_may_be_the_one_to_deal_with_it(office):
     office.busy(ROBOT, OPERATOR)
     office.ok(office.fire(12))
     assert office.finds(GUARD, "confirmed", 30.0)[1] == []
@@ -80,9 +80,7 @@ def test_who_has_confirmed_it_may_be_the_one_to_deal_with_it(office: Office) -> 
     assert GUARD not in office.working
 
 
-def test_late_news_of_the_order_to_look_takes_nothing_from_who_deals_with_it(
-    office: Office,
-) -> None:
+def test_late_news_of_the_order_to_look_takes_nothing_from_who_deals_with_it(office):
     office.busy(ROBOT, OPERATOR)
     looked = office.fire(12)
     office.finds(GUARD, "confirmed", 20.0)
@@ -91,7 +89,7 @@ def test_late_news_of_the_order_to_look_takes_nothing_from_who_deals_with_it(
     assert (office.event().actor, office.working[GUARD]) == (GUARD, 1)
 
 
-def test_a_robot_deals_with_nothing_whatever_the_policy_says() -> None:
+def test_a_robot_deals_with_nothing_whatever_the_policy_says():
     office = Office(Everything(), RULES)
     office.busy(GUARD)
     office.ok(office.fire(12))
@@ -100,7 +98,7 @@ def test_a_robot_deals_with_nothing_whatever_the_policy_says() -> None:
     assert office.event().actor is None
 
 
-def test_what_nobody_comes_to_contain_within_60_s_is_escalated(office: Office) -> None:
+def test_what_nobody_comes_to_contain_within_60_s_is_escalated(office):
     office.busy(GUARD)
     office.fire(12)
     office.finds(OPERATOR, "confirmed", 50.0)
@@ -110,16 +108,14 @@ def test_what_nobody_comes_to_contain_within_60_s_is_escalated(office: Office) -
     assert office.event().state is State.ESCALATED
 
 
-def test_a_confirmed_event_that_is_refuted_after_all_is_over_and_its_actor_free(
-    office: Office,
-) -> None:
+def test_a_confirmed_event_that_is_refuted_after_all_is_over_and_its_actor_free(office):
     office.fire(12)
     office.ok(office.finds(OPERATOR, "confirmed", 5.0)[1], 5.0)
     assert office.finds(OPERATOR, "refuted", 6.0)[1] == [Send(GUARD, OVER)]
     assert GUARD not in office.working
 
 
-def test_who_refutes_it_itself_is_not_told_that_it_is_over(office: Office) -> None:
+def test_who_refutes_it_itself_is_not_told_that_it_is_over(office):
     office.fire(12)
     office.ok(office.finds(OPERATOR, "confirmed", 5.0)[1], 5.0)
     assert office.finds(GUARD, "refuted", 30.0)[1] == []
@@ -128,7 +124,7 @@ def test_who_refutes_it_itself_is_not_told_that_it_is_over(office: Office) -> No
     assert GUARD not in office.working
 
 
-def test_the_actor_is_told_if_somebody_else_has_contained_it(office: Office) -> None:
+def test_the_actor_is_told_if_somebody_else_has_contained_it(office):
     office.fire(12)
     office.ok(office.finds(OPERATOR, "confirmed", 5.0)[1], 5.0)
     assert office.finds(OPERATOR, "contained", 9.0)[1] == [Send(GUARD, OVER)]
@@ -148,7 +144,7 @@ def two_guards() -> Office:
 
 
 @pytest.mark.parametrize("word", ["failed", "done"])
-def test_an_actor_that_fails_is_replaced_and_that_was_an_attempt(word: str) -> None:
+def test_an_actor_that_fails_is_replaced_and_that_was_an_attempt(word):
     office = two_guards()
     assert office.event().attempts == 1
     sends = office.progress(GUARD, word, 20.0)[1]
@@ -156,7 +152,7 @@ def test_an_actor_that_fails_is_replaced_and_that_was_an_attempt(word: str) -> N
     assert (office.event().attempts, office.event().waiting_since) == (2, 20.0)
 
 
-def test_an_actor_that_declines_is_replaced_and_that_was_no_attempt() -> None:
+def test_an_actor_that_declines_is_replaced_and_that_was_no_attempt():
     office = Office(rules=RULES)
     office.register(OTHER_GUARD, "Guard", 80)
     office.fire(12)
@@ -165,14 +161,14 @@ def test_an_actor_that_declines_is_replaced_and_that_was_no_attempt() -> None:
     assert (office.event().attempts, office.event().waiting_since) == (1, 5.0)
 
 
-def test_an_actor_that_falls_silent_is_replaced() -> None:
+def test_an_actor_that_falls_silent_is_replaced():
     office = two_guards()
     office.beat(OTHER_GUARD, OPERATOR, ROBOT, now=11.0)
     assert office.desk.tick(11.0) == [Send(OTHER_GUARD, order("contain"))]
     assert office.event().attempts == 2
 
 
-def test_the_times_of_the_next_actor_are_its_own() -> None:
+def test_the_times_of_the_next_actor_are_its_own():
     office = two_guards()
     office.progress(GUARD, "arrived", 10.0)
     office.progress(GUARD, "failed", 20.0)
@@ -183,7 +179,7 @@ def test_the_times_of_the_next_actor_are_its_own() -> None:
     assert [times[step] for step in steps] == [20.0, 50.0, 50.0, 50.0]
 
 
-def test_an_actor_that_needs_more_than_900_s_is_told_and_replaced() -> None:
+def test_an_actor_that_needs_more_than_900_s_is_told_and_replaced():
     office = two_guards()
     office.tick(904.9)
     assert office.event().actor == GUARD
@@ -192,7 +188,7 @@ def test_an_actor_that_needs_more_than_900_s_is_told_and_replaced() -> None:
     assert Send(OTHER_GUARD, order("contain")) in sends
 
 
-def test_an_event_that_actors_give_back_four_times_is_escalated() -> None:
+def test_an_event_that_actors_give_back_four_times_is_escalated():
     office = two_guards()
     now = 10.0
     while office.event().open:
@@ -207,41 +203,39 @@ def test_an_event_that_actors_give_back_four_times_is_escalated() -> None:
 # --- standing by ---------------------------------------------------------------------------
 
 
-def test_who_stands_by_hears_at_once_when_the_event_is_confirmed(standing_by: Office) -> None:
+def test_who_stands_by_hears_at_once_when_the_event_is_confirmed(standing_by):
     assert standing_by.event().actor == GUARD
     assert standing_by.finds(OPERATOR, "confirmed", 30.0)[1] == [Send(GUARD, order("contain"))]
     standing_by.finds(GUARD, "contained", 60.0)
     assert standing_by.event().state is State.CONTAINED
 
 
-def test_who_stands_by_is_free_when_the_event_is_refuted(standing_by: Office) -> None:
+def test_who_stands_by_is_free_when_the_event_is_refuted(standing_by):
     assert standing_by.finds(OPERATOR, "refuted", 30.0)[1] == [Send(GUARD, OVER)]
     assert GUARD not in standing_by.working
 
 
-def test_who_stands_by_is_the_one_to_look_when_the_robot_fails(standing_by: Office) -> None:
+def test_who_stands_by_is_the_one_to_look_when_the_robot_fails(standing_by):
     """Else the event would wait for somebody while the nearest guard stands idle beside it."""
     sends = standing_by.progress(OPERATOR, "failed", 30.0)[1]
     assert sends == [Send(GUARD, OVER), Send(GUARD, order("confirm"))]
     assert standing_by.working == {GUARD: 1}
 
 
-def test_who_stands_by_is_free_when_the_event_is_escalated_at_its_last_attempt(
-    standing_by: Office,
-) -> None:
+def test_who_stands_by_is_free_when_the_event_is_escalated_at_its_last_attempt(standing_by):
     standing_by.event().attempts = 4
     assert standing_by.progress(OPERATOR, "failed", 30.0)[1] == [Send(GUARD, OVER)]
     assert standing_by.event().state is State.ESCALATED
     assert standing_by.working == {}
 
 
-def test_who_stands_by_and_gives_up_costs_the_event_nothing(standing_by: Office) -> None:
+def test_who_stands_by_and_gives_up_costs_the_event_nothing(standing_by):
     standing_by.progress(GUARD, "failed", 20.0)
     event = standing_by.event()
     assert (event.state, event.attempts, event.waiting_since) == (State.ASSIGNED, 1, 0.0)
 
 
-def test_who_declines_to_stand_by_takes_nothing_from_who_looks() -> None:
+def test_who_declines_to_stand_by_takes_nothing_from_who_looks():
     office = Office(HazardTeam(), RULES)
     stand_by = [send for send in office.fire(12) if send.to == GUARD]
     office.no(stand_by, 2.0)
@@ -249,14 +243,14 @@ def test_who_declines_to_stand_by_takes_nothing_from_who_looks() -> None:
     assert office.working == {OPERATOR: 1, ROBOT: 1}
 
 
-def test_who_stands_by_may_do_so_for_longer_than_an_order_takes(standing_by: Office) -> None:
+def test_who_stands_by_may_do_so_for_longer_than_an_order_takes(standing_by):
     standing_by.desk.registry.silent_after = 1e9
     standing_by.event().times["assigned"] = 600.0
     assert standing_by.tick(1000.0) == []
     assert standing_by.event().actor == GUARD
 
 
-def test_an_event_that_needs_no_containment_needs_nobody_to_stand_by() -> None:
+def test_an_event_that_needs_no_containment_needs_nobody_to_stand_by():
     class Eager(Everything):
         preempts = True
 
@@ -274,7 +268,7 @@ class Everything(Policy):
         return [Assignment(t, r) for t in every for r in range(len(situation.responders))]
 
 
-def test_after_a_restart_every_order_that_stands_is_said_again(standing_by: Office) -> None:
+def test_after_a_restart_every_order_that_stands_is_said_again(standing_by):
     again = standing_by.desk.orders.again()
     assert [(s.to, s.body.task) for s in again] == [(OPERATOR, "confirm"), (GUARD, "stand_by")]
     standing_by.finds(OPERATOR, "confirmed", 30.0)
@@ -282,11 +276,11 @@ def test_after_a_restart_every_order_that_stands_is_said_again(standing_by: Offi
     assert standing_by.desk.orders.again() == [Send(GUARD, order("contain"))]
 
 
-def test_a_detector_is_never_asked_to_do_anything(standing_by: Office) -> None:
+def test_a_detector_is_never_asked_to_do_anything(standing_by):
     assert DETECTOR not in {send.to for send in standing_by.sent}
 
 
-def test_a_guard_who_has_confirmed_an_event_is_waited_for_to_deal_with_it() -> None:
+def test_a_guard_who_has_confirmed_an_event_is_waited_for_to_deal_with_it():
     office = Office(rules=RULES)
     office.register(OTHER_GUARD, "Guard", 80)
     office.busy(OPERATOR)

@@ -15,6 +15,7 @@ from helpers.dva.dispatch_desk import (
     Office,
     east,
 )
+from helpers.wording import unnamed
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.audit import Fact
@@ -88,9 +89,7 @@ NEEDED = [
 @pytest.mark.parametrize(
     ("body", "needs"), NEEDED, ids=lambda x: getattr(x, "__name__", str(x)[:20])
 )
-def test_a_role_allows_what_it_includes_and_nothing_else(
-    role: str, body: m.Body, needs: str
-) -> None:
+def test_a_role_allows_what_it_includes_and_nothing_else(role, body, needs):
     office = staffed(role)
     office.fire(12)
     reply, sends = decide(office, body, 1.0)
@@ -101,14 +100,14 @@ def test_a_role_allows_what_it_includes_and_nothing_else(
         assert f"needs {needs}" in reply.text
 
 
-def test_a_control_room_of_which_the_dva_was_told_nothing_may_look() -> None:
+def test_a_control_room_of_which_the_dva_was_told_nothing_may_look():
     office = staffed()
     office.register("02:00:00:07:00:09", "ControlRoom")
     reply, _ = decide(office, m.GetDispatch(), room="02:00:00:07:00:09")
     assert reply.content == m.DispatchStatus("automatic", 60.0, None, "look")
 
 
-def test_who_is_no_control_room_decides_nothing_whatever_it_is_called() -> None:
+def test_who_is_no_control_room_decides_nothing_whatever_it_is_called():
     office = Office(roles={OPERATOR: "supervise"})
     office.fire(12)
     assert decide(office, m.FalseAlarm(1, "toast"), room=OPERATOR)[0].code == m.NOT_PERMITTED
@@ -116,7 +115,7 @@ def test_who_is_no_control_room_decides_nothing_whatever_it_is_called() -> None:
 
 
 @pytest.mark.parametrize(("role", "code"), [("dispatch", m.NOT_PERMITTED), ("supervise", m.BUSY)])
-def test_only_who_supervises_takes_a_robot_without_asking(role: str, code: int) -> None:
+def test_only_who_supervises_takes_a_robot_without_asking(role, code):
     office = staffed(role)
     office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
     reply, _ = decide(office, m.PermissionRequest(ROBOT, "missions", (), "force"), 1.0)
@@ -126,7 +125,7 @@ def test_only_who_supervises_takes_a_robot_without_asking(role: str, code: int) 
 
 
 @pytest.mark.invariant("S5")
-def test_a_revoked_permission_ends_for_robot_and_holder_and_frees_the_event() -> None:
+def test_a_revoked_permission_ends_for_robot_and_holder_and_frees_the_event():
     office = staffed("supervise", ask_first=True)
     office.fire(12)
     decide(office, m.Assign(1, ROBOT), 1.0)
@@ -143,7 +142,7 @@ def test_a_revoked_permission_ends_for_robot_and_holder_and_frees_the_event() ->
 # --- sending -----------------------------------------------------------------------------------
 
 
-def test_who_is_sent_gets_the_order_and_the_policy_is_overruled() -> None:
+def test_who_is_sent_gets_the_order_and_the_policy_is_overruled():
     office = staffed()
     office.fire(12)  # the robot is sent
     facts(office)
@@ -163,7 +162,7 @@ def test_who_is_sent_gets_the_order_and_the_policy_is_overruled() -> None:
     assert fact.advised_in == pytest.approx(4 + 2 / 0.35 - 2.0, abs=0.1)
 
 
-def test_a_robot_is_driven_by_whom_the_control_room_names() -> None:
+def test_a_robot_is_driven_by_whom_the_control_room_names():
     office = staffed(ask_first=True)
     office.register(OTHER_OPERATOR, "Remote Control")
     office.fire(12)
@@ -173,7 +172,7 @@ def test_a_robot_is_driven_by_whom_the_control_room_names() -> None:
     assert office.event().state is State.CONFIRMED
 
 
-def test_a_control_room_may_drive_itself_and_names_no_other() -> None:
+def test_a_control_room_may_drive_itself_and_names_no_other():
     office = staffed(ask_first=True)
     office.fire(12)
     reply, _ = decide(office, m.Assign(1, ROBOT, OTHER_ROOM), 1.0)
@@ -181,27 +180,27 @@ def test_a_control_room_may_drive_itself_and_names_no_other() -> None:
     assert decide(office, m.Assign(1, ROBOT, ROOM), 1.0)[1] == [Send(ROOM, order(1, ROBOT))]
 
 
-def test_who_is_at_an_event_is_not_called_away_by_being_sent_to_another() -> None:
+def test_who_is_at_an_event_is_not_called_away_by_being_sent_to_another():
     office = staffed()
     office.fire(12)
     office.fire(60, now=1.0)
     reply, sends = decide(office, m.Assign(2, ROBOT, decisions=1), 2.0)
     assert (reply.code, sends) == (m.BUSY, [])
-    assert reply.text == "robot is at event 1: take it off there first"
+    assert reply.text.startswith("robot is at event 1")
 
 
 @pytest.mark.invariant("S5")
-def test_a_robot_in_somebody_elses_hands_is_not_sent() -> None:
+def test_a_robot_in_somebody_elses_hands_is_not_sent():
     office = staffed(ask_first=True)
     office.register(OTHER_OPERATOR, "Remote Control")
     office.say(OTHER_OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
     office.fire(12)
     reply, sends = decide(office, m.Assign(1, ROBOT), 5.0)
     assert (reply.code, sends) == (m.BUSY, [])
-    assert reply.text == "robot is held by remote control: take it over first"
+    assert "remote control" in reply.text
 
 
-def test_nobody_is_called_from_a_scene_but_by_being_taken_off() -> None:
+def test_nobody_is_called_from_a_scene_but_by_being_taken_off():
     office = staffed()
     office.fire(12)
     office.progress(OPERATOR, "arrived", 5.0)
@@ -212,7 +211,7 @@ def test_nobody_is_called_from_a_scene_but_by_being_taken_off() -> None:
     assert decide(office, m.TakeOff(1, ROBOT, decisions=now), 7.0)[0].code == m.OK
 
 
-def test_who_was_taken_off_is_not_sent_there_again_by_the_policy() -> None:
+def test_who_was_taken_off_is_not_sent_there_again_by_the_policy():
     office = staffed()
     office.fire(12)
     _, sends = decide(office, m.TakeOff(1, ROBOT, "its battery is low"), 1.0)
@@ -225,7 +224,7 @@ def test_who_was_taken_off_is_not_sent_there_again_by_the_policy() -> None:
 
 
 @pytest.mark.invariant("S6")
-def test_an_event_nobody_is_left_for_is_escalated_at_its_deadline_all_the_same() -> None:
+def test_an_event_nobody_is_left_for_is_escalated_at_its_deadline_all_the_same():
     office = staffed()
     office.fire(12)
     for device in (ROBOT, GUARD, OTHER_GUARD):
@@ -237,7 +236,7 @@ def test_an_event_nobody_is_left_for_is_escalated_at_its_deadline_all_the_same()
     assert [f.action for f in facts(office)][-1] == "escalate"
 
 
-def test_a_guard_stands_by_and_deals_with_it_as_a_control_room_wants() -> None:
+def test_a_guard_stands_by_and_deals_with_it_as_a_control_room_wants():
     office = staffed(ask_first=True, rules=CONTAINING)
     office.fire(12)
     assert decide(office, m.Assign(1, GUARD, None, "contain"), 1.0)[0].code == m.WRONG_MODE
@@ -252,7 +251,7 @@ def test_a_guard_stands_by_and_deals_with_it_as_a_control_room_wants() -> None:
     assert office.event().state is State.CONTAINED
 
 
-def test_where_nothing_is_contained_nobody_is_sent_to() -> None:
+def test_where_nothing_is_contained_nobody_is_sent_to():
     office = staffed(ask_first=True)
     office.fire(12)
     assert decide(office, m.Assign(1, GUARD, None, "contain"), 1.0)[0].code == m.NOT_SUPPORTED
@@ -267,9 +266,7 @@ def test_where_nothing_is_contained_nobody_is_sent_to() -> None:
     [(m.FalseAlarm(1, "toast"), State.REFUTED), (m.Escalate(1, "call them"), State.ESCALATED)],
 )
 @pytest.mark.parametrize("stage", ["pending", "assigned", "on scene", "confirmed"])
-def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(
-    body: m.Body, state: State, stage: str
-) -> None:
+def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(body, state, stage):
     office = staffed(ask_first=stage == "pending", rules=CONTAINING)
     office.fire(12)
     if stage == "on scene":
@@ -290,22 +287,20 @@ def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(
 # --- who wins ----------------------------------------------------------------------------------
 
 
-def test_of_two_who_act_at_once_one_wins_and_the_other_is_told_by_whom_and_why() -> None:
+def test_of_two_who_act_at_once_one_wins_and_the_other_is_told_by_whom_and_why():
     office = staffed(ask_first=True)
     office.fire(12)
     assert decide(office, m.Assign(1, GUARD, reason="nearest", decisions=0), 1.0)[0].code == m.OK
     reply, sends = decide(office, m.FalseAlarm(1, "toast", decisions=0), 1.5, OTHER_ROOM)
     assert (reply.code, sends) == (m.OUT_OF_ORDER, [])
-    assert reply.text == (
-        "event 1 was decided on since: assign of guard by controlroom, 0.5 s ago: nearest"
-    )
+    assert not unnamed(reply.text, "event 1", "assign of guard", "0.5 s", "nearest")
     assert isinstance(reply.content, m.EventStatus)
     last = reply.content.last_decision
     assert last == m.LastDecision(ROOM, "controlroom", "assign", 0.5, "nearest")
     assert office.event().state is State.ASSIGNED
 
 
-def test_without_having_seen_it_nobody_takes_an_event_out_of_anothers_hands() -> None:
+def test_without_having_seen_it_nobody_takes_an_event_out_of_anothers_hands():
     office = staffed(ask_first=True)
     office.fire(12)
     decide(office, m.Assign(1, GUARD), 1.0)
@@ -313,7 +308,7 @@ def test_without_having_seen_it_nobody_takes_an_event_out_of_anothers_hands() ->
     assert (reply.code, sends) == (m.BUSY, [])
 
 
-def test_the_first_to_acknowledge_has() -> None:
+def test_the_first_to_acknowledge_has():
     office = staffed()
     office.fire(12)
     assert decide(office, m.Acknowledge(1), 3.0)[0].code == m.OK
@@ -332,7 +327,7 @@ def test_the_first_to_acknowledge_has() -> None:
         m.Escalate(1, decisions=0),
     ],
 )
-def test_the_same_decision_once_more_changes_nothing(body: m.Body) -> None:
+def test_the_same_decision_once_more_changes_nothing(body):
     office = staffed(ask_first=True)
     office.fire(12)
     decide(office, body, 1.0)
@@ -342,7 +337,7 @@ def test_the_same_decision_once_more_changes_nothing(body: m.Body) -> None:
     assert (reply.code, sends, repr(office.event()), facts(office)) == (m.OK, [], before, [])
 
 
-def test_what_is_not_there_is_refused_by_name() -> None:
+def test_what_is_not_there_is_refused_by_name():
     office = staffed()
     office.fire(12)
     assert decide(office, m.Acknowledge(7))[0].code == m.UNKNOWN_EVENT
@@ -356,7 +351,7 @@ def test_what_is_not_there_is_refused_by_name() -> None:
 # --- asked first -------------------------------------------------------------------------------
 
 
-def test_asked_first_the_policy_proposes_and_sends_nobody() -> None:
+def test_asked_first_the_policy_proposes_and_sends_nobody():
     office = staffed(ask_first=True)
     assert office.fire(12, now=1.0) == []
     content = decide(office, m.GetEventList(), 3.0)[0].content
@@ -372,7 +367,7 @@ def test_asked_first_the_policy_proposes_and_sends_nobody() -> None:
 
 
 @pytest.mark.invariant("S6")
-def test_what_nobody_has_decided_in_time_is_done_as_proposed() -> None:
+def test_what_nobody_has_decided_in_time_is_done_as_proposed():
     office = staffed(ask_first=True)
     office.fire(12, now=1.0)
     assert office.tick(60.0) == []
@@ -382,7 +377,7 @@ def test_what_nobody_has_decided_in_time_is_done_as_proposed() -> None:
     assert (fact.author, fact.role, fact.cause) == (DVA, None, "nobody has decided within 60 s")
 
 
-def test_a_question_does_not_wait_longer_because_another_is_proposed() -> None:
+def test_a_question_does_not_wait_longer_because_another_is_proposed():
     office = staffed(ask_first=True)
     office.fire(12, now=1.0)
     office.silence(ROBOT, 30.0)
@@ -390,13 +385,13 @@ def test_a_question_does_not_wait_longer_because_another_is_proposed() -> None:
     assert office.tick(61.0, alive=False) == [Send(GUARD, order(1))]
 
 
-def test_where_nobody_is_there_who_may_decide_nobody_is_asked() -> None:
+def test_where_nobody_is_there_who_may_decide_nobody_is_asked():
     office = Office(rules=RULES, roles={ROOM: "drive"}, ask_first=True)
     office.register(ROOM, "ControlRoom")
     assert office.fire(12) == [Send(OPERATOR, order(1, ROBOT))]
 
 
-def test_switched_to_automatic_what_was_asked_is_done() -> None:
+def test_switched_to_automatic_what_was_asked_is_done():
     office = staffed("supervise", ask_first=True)
     office.fire(12, now=1.0)
     reply, sends = decide(office, m.SetDispatch("automatic", "too much to do"), 2.0)
@@ -411,7 +406,7 @@ def test_switched_to_automatic_what_was_asked_is_done() -> None:
 # --- the proposal and its reasons ----------------------------------------------------------------
 
 
-def test_a_proposal_names_everybody_with_a_time_and_a_reason() -> None:
+def test_a_proposal_names_everybody_with_a_time_and_a_reason():
     office = staffed(ask_first=True)
     office.fire(60, now=0.0)
     decide(office, m.Assign(1, OTHER_GUARD), 1.0)
@@ -419,7 +414,7 @@ def test_a_proposal_names_everybody_with_a_time_and_a_reason() -> None:
     content = decide(office, m.GetProposal(2), 2.0)[0].content
     assert isinstance(content, m.Proposal)
     assert (content.device, content.task, content.decide_within) == (ROBOT, "confirm", 60.0)
-    assert content.reason == "the earliest there of 2 who could go"
+    assert not unnamed(content.reason, "earliest", " 2 ")
     reasons = {c.device: c.reason for c in content.candidates}
     assert reasons == {ROBOT: "free", GUARD: "free", OTHER_GUARD: "is at event 1"}
     times = {c.device: c.arrival_in for c in content.candidates}
@@ -427,7 +422,7 @@ def test_a_proposal_names_everybody_with_a_time_and_a_reason() -> None:
     assert content.candidates[0].device == ROBOT
 
 
-def test_a_proposal_tells_why_nobody_can_go() -> None:
+def test_a_proposal_tells_why_nobody_can_go():
     office = staffed(ask_first=True)
     office.fire(12)
     for device in (ROBOT, GUARD):
@@ -438,11 +433,11 @@ def test_a_proposal_tells_why_nobody_can_go() -> None:
     assert isinstance(content, m.Proposal)
     assert (content.device, content.reason) == (None, "nobody can go")
     reasons = {c.device: c.reason for c in content.candidates}
-    assert reasons[ROBOT] == "was taken off this event"
+    assert "taken off" in reasons[ROBOT]
     assert reasons[OTHER_GUARD].startswith("not heard of for")
 
 
-def test_who_only_asks_changes_nobodys_luck() -> None:
+def test_who_only_asks_changes_nobodys_luck():
     def sent(asks: int) -> list[Send]:
         from dva_sim.core.dispatch import RandomChoice
 
@@ -464,7 +459,7 @@ def test_who_only_asks_changes_nobodys_luck() -> None:
 # --- lists ---------------------------------------------------------------------------------------
 
 
-def test_the_list_is_told_in_parts_and_none_is_missing() -> None:
+def test_the_list_is_told_in_parts_and_none_is_missing():
     office = staffed(ask_first=True)
     for number in range(40):
         office.fire(30.0 * number, now=1.0, kind="flood")

@@ -36,7 +36,7 @@ def state(office: Office, event: int = 1) -> State:
 
 
 @pytest.mark.invariant("S6")
-def test_pending_beyond_its_deadline_means_escalated(office: Office) -> None:
+def test_pending_beyond_its_deadline_means_escalated(office):
     office.busy(*TEAM)
     office.fire(12, now=0.0)
     office.tick(59.9)
@@ -45,7 +45,7 @@ def test_pending_beyond_its_deadline_means_escalated(office: Office) -> None:
     assert state(office) is State.ESCALATED
 
 
-def test_with_no_patience_an_event_is_escalated_at_once_if_nobody_is_free() -> None:
+def test_with_no_patience_an_event_is_escalated_at_once_if_nobody_is_free():
     office = Office(rules=Rules(escalate_after=0.0))
     office.fire(12)
     assert state(office) is State.ASSIGNED
@@ -54,7 +54,7 @@ def test_with_no_patience_an_event_is_escalated_at_once_if_nobody_is_free() -> N
     assert state(office, 2) is State.ESCALATED
 
 
-def test_with_endless_patience_an_event_waits_for_somebody_for_ever() -> None:
+def test_with_endless_patience_an_event_waits_for_somebody_for_ever():
     office = Office(rules=Rules(escalate_after=math.inf))
     office.busy(GUARD, ROBOT, OPERATOR)
     office.fire(12)
@@ -64,7 +64,7 @@ def test_with_endless_patience_an_event_waits_for_somebody_for_ever() -> None:
     assert [send.to for send in office.tick(1e7 + 1)] == [GUARD]
 
 
-def test_of_more_events_than_may_wait_the_newest_is_escalated() -> None:
+def test_of_more_events_than_may_wait_the_newest_is_escalated():
     office = Office(rules=Rules(most_waiting=2))
     office.busy(GUARD, ROBOT, OPERATOR)
     for metres in (10, 40, 70, 90):
@@ -72,7 +72,7 @@ def test_of_more_events_than_may_wait_the_newest_is_escalated() -> None:
     assert [state(office, n) for n in (1, 2, 3, 4)] == [State.PENDING] * 2 + [State.ESCALATED] * 2
 
 
-def test_the_newest_is_the_one_detected_last_even_if_an_older_one_waits_again() -> None:
+def test_the_newest_is_the_one_detected_last_even_if_an_older_one_waits_again():
     office = Office(rules=Rules(most_waiting=1))
     office.ok(office.fire(12))
     office.busy(GUARD)
@@ -85,7 +85,7 @@ def test_the_newest_is_the_one_detected_last_even_if_an_older_one_waits_again() 
     assert (state(office, 1), state(office, 2)) == (State.PENDING, State.ESCALATED)
 
 
-def test_where_nothing_may_wait_an_event_for_which_nobody_is_free_is_lost() -> None:
+def test_where_nothing_may_wait_an_event_for_which_nobody_is_free_is_lost():
     office = Office(rules=Rules(most_waiting=0))
     office.fire(12)
     office.busy(GUARD)
@@ -96,14 +96,14 @@ def test_where_nothing_may_wait_an_event_for_which_nobody_is_free_is_lost() -> N
 # --- orders that nobody takes up -----------------------------------------------------------
 
 
-def test_a_declined_order_does_not_count_as_an_attempt(office: Office) -> None:
+def test_a_declined_order_does_not_count_as_an_attempt(office):
     for _ in range(3 * MAX_ATTEMPTS):
         office.no(office.tick(1.0) or office.fire(12), 1.0)
     assert state(office) is State.PENDING
     assert office.event().attempts == 0
 
 
-def test_who_declines_an_order_is_not_asked_again_for_10_s(office: Office) -> None:
+def test_who_declines_an_order_is_not_asked_again_for_10_s(office):
     office.busy(GUARD)
     order = office.fire(12)[0]
     office.no([order], 1.0)
@@ -112,9 +112,7 @@ def test_who_declines_an_order_is_not_asked_again_for_10_s(office: Office) -> No
     assert [send.to for send in office.tick(11.0)] == [OPERATOR]
 
 
-def test_who_takes_an_order_up_and_then_declines_it_is_not_asked_again_at_once(
-    office: Office,
-) -> None:
+def test_who_takes_an_order_up_and_then_declines_it_is_not_asked_again_at_once(office):
     office.busy(GUARD)
     office.ok(office.fire(12))
     assert office.progress(OPERATOR, "declined", 1.0)[1] == []
@@ -123,13 +121,13 @@ def test_who_takes_an_order_up_and_then_declines_it_is_not_asked_again_at_once(
     assert len(office.tick(11.0)) == 1
 
 
-def test_an_order_that_is_not_delivered_leaves_the_event_open_to_others(office: Office) -> None:
+def test_an_order_that_is_not_delivered_leaves_the_event_open_to_others(office):
     orders = office.fire(12)
     office.no(orders, 5.0)
     assert (state(office), office.event().responder, office.working) == (State.PENDING, None, {})
 
 
-def test_an_order_that_nobody_took_up_does_not_end_the_wait(office: Office) -> None:
+def test_an_order_that_nobody_took_up_does_not_end_the_wait(office):
     office.busy(GUARD)
     office.no(office.fire(12, now=0.0), 27.0)
     office.busy(OPERATOR)
@@ -139,7 +137,7 @@ def test_an_order_that_nobody_took_up_does_not_end_the_wait(office: Office) -> N
     assert state(office) is State.ESCALATED
 
 
-def test_fakes_that_never_answer_cannot_keep_an_event_from_its_deadline(office: Office) -> None:
+def test_fakes_that_never_answer_cannot_keep_an_event_from_its_deadline(office):
     """Two guards by turns get the order, fall silent before their time is up, and come back."""
     office.busy(ROBOT, OPERATOR)
     office.register(OTHER_GUARD, "Guard", 5)
@@ -157,9 +155,7 @@ def test_fakes_that_never_answer_cannot_keep_an_event_from_its_deadline(office: 
     assert office.event().attempts == 0
 
 
-def test_a_fake_that_says_it_declines_cannot_keep_an_event_from_its_deadline(
-    office: Office,
-) -> None:
+def test_a_fake_that_says_it_declines_cannot_keep_an_event_from_its_deadline(office):
     office.busy(ROBOT, OPERATOR)
     office.fire(12, now=0.0)
     for now in range(1, 80):
@@ -169,9 +165,7 @@ def test_a_fake_that_says_it_declines_cannot_keep_an_event_from_its_deadline(
     assert state(office) is State.ESCALATED
 
 
-def test_fakes_that_take_every_order_up_and_vanish_end_at_the_fourth_attempt(
-    office: Office,
-) -> None:
+def test_fakes_that_take_every_order_up_and_vanish_end_at_the_fourth_attempt(office):
     office.busy(ROBOT, OPERATOR)
     orders, now = office.fire(12), 0.0
     for _ in range(MAX_ATTEMPTS):
@@ -185,14 +179,14 @@ def test_fakes_that_take_every_order_up_and_vanish_end_at_the_fourth_attempt(
     assert (state(office), office.event().attempts) == (State.ESCALATED, 4)
 
 
-def test_only_the_answer_to_an_order_was_lost_if_its_holder_has_set_out(office: Office) -> None:
+def test_only_the_answer_to_an_order_was_lost_if_its_holder_has_set_out(office):
     orders = office.fire(12)
     office.progress(OPERATOR, "departed", 20.0)
     office.no(orders, 27.0)
     assert (state(office), office.working) == (State.ASSIGNED, {OPERATOR: 1, ROBOT: 1})
 
 
-def test_an_order_declined_after_its_event_was_settled_frees_who_declined(office: Office) -> None:
+def test_an_order_declined_after_its_event_was_settled_frees_who_declined(office):
     office.fire(12)
     orders = office.progress(OPERATOR, "failed", 5.0)[1]
     office.finds(OPERATOR, "confirmed", 6.0)
@@ -201,9 +195,7 @@ def test_an_order_declined_after_its_event_was_settled_frees_who_declined(office
     assert office.working == {}
 
 
-def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_it(
-    office: Office,
-) -> None:
+def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_it(office):
     """The first one fell silent and was replaced; its request fails only after three attempts."""
     late = office.fire(12)
     assert late[0].to == OPERATOR
@@ -219,20 +211,20 @@ def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_i
 # --- orders that come to nothing -----------------------------------------------------------
 
 
-def test_a_responder_that_fails_is_replaced(office: Office) -> None:
+def test_a_responder_that_fails_is_replaced(office):
     office.fire(12)
     sends = office.progress(OPERATOR, "failed", 5.0)[1]
     assert [(send.to, send.body.event_id) for send in sends] == [(GUARD, 1)]
 
 
-def test_a_responder_that_failed_goes_again_if_nobody_else_can(office: Office) -> None:
+def test_a_responder_that_failed_goes_again_if_nobody_else_can(office):
     office.busy(GUARD)
     office.fire(12)
     sends = office.progress(OPERATOR, "failed", 5.0)[1]
     assert [send.to for send in sends] == [OPERATOR]
 
 
-def test_who_says_done_without_a_finding_has_failed(office: Office) -> None:
+def test_who_says_done_without_a_finding_has_failed(office):
     office.fire(12)
     sends = office.progress(OPERATOR, "done", 5.0)[1]
     assert [send.to for send in sends] == [GUARD]
@@ -240,7 +232,7 @@ def test_who_says_done_without_a_finding_has_failed(office: Office) -> None:
     assert office.event().attempts == 1
 
 
-def test_an_event_that_nobody_settles_is_escalated_after_its_attempts(office: Office) -> None:
+def test_an_event_that_nobody_settles_is_escalated_after_its_attempts(office):
     orders = office.fire(12)
     for _ in range(MAX_ATTEMPTS):
         assert state(office) is State.ASSIGNED
@@ -248,9 +240,7 @@ def test_an_event_that_nobody_settles_is_escalated_after_its_attempts(office: Of
     assert (orders, office.event().attempts, state(office)) == ([], 4, State.ESCALATED)
 
 
-def test_who_has_not_settled_an_event_after_900_s_gives_it_back_and_is_told(
-    office: Office,
-) -> None:
+def test_who_has_not_settled_an_event_after_900_s_gives_it_back_and_is_told(office):
     office.busy(GUARD)
     office.ok(office.fire(12, now=0.0))
     office.tick(899.9)
@@ -263,9 +253,7 @@ def test_who_has_not_settled_an_event_after_900_s_gives_it_back_and_is_told(
 
 
 @pytest.mark.parametrize("finding", ["confirmed", "refuted"])
-def test_who_found_something_and_whose_last_word_was_lost_is_free_900_s_later(
-    office: Office, finding: str
-) -> None:
+def test_who_found_something_and_whose_last_word_was_lost_is_free_900_s_later(office, finding):
     office.fire(12)
     office.finds(OPERATOR, finding, 30.0)
     office.tick(929.9)
@@ -274,7 +262,7 @@ def test_who_found_something_and_whose_last_word_was_lost_is_free_900_s_later(
     assert office.working == {}
 
 
-def test_that_holds_too_while_somebody_else_has_still_to_deal_with_the_event() -> None:
+def test_that_holds_too_while_somebody_else_has_still_to_deal_with_the_event():
     """Else the only guard would be thought at work for ever, and nobody would ever come."""
     office = Office(rules=Rules(containment=True, escalate_after=math.inf))
     office.busy(ROBOT, OPERATOR)
@@ -286,7 +274,7 @@ def test_that_holds_too_while_somebody_else_has_still_to_deal_with_the_event() -
     assert [(send.to, send.body.task) for send in sends] == [(GUARD, "contain")]
 
 
-def test_without_a_limit_an_order_stands_for_ever_and_pauses_are_forgotten_all_the_same() -> None:
+def test_without_a_limit_an_order_stands_for_ever_and_pauses_are_forgotten_all_the_same():
     office = Office(rules=Rules(order_limit=math.inf, escalate_after=math.inf))
     office.busy(GUARD)
     office.no(office.fire(12), 1.0)
@@ -297,14 +285,14 @@ def test_without_a_limit_an_order_stands_for_ever_and_pauses_are_forgotten_all_t
     assert office.desk.orders._pauses == []
 
 
-def test_a_robot_cannot_give_back_what_its_operator_was_ordered(office: Office) -> None:
+def test_a_robot_cannot_give_back_what_its_operator_was_ordered(office):
     office.fire(12)
     for word in ("departed", "failed", "done"):
         assert office.progress(ROBOT, word, 1.0)[0].code == m.UNKNOWN_EVENT
     assert office.working == {OPERATOR: 1, ROBOT: 1}
 
 
-def test_who_has_no_order_or_another_cannot_say_how_one_stands(office: Office) -> None:
+def test_who_has_no_order_or_another_cannot_say_how_one_stands(office):
     office.fire(12)
     for who, event in ((GUARD, 1), (DETECTOR, 1), (OPERATOR, 2)):
         assert office.progress(who, "done", 1.0, event)[0].code == m.UNKNOWN_EVENT
@@ -314,11 +302,11 @@ def test_who_has_no_order_or_another_cannot_say_how_one_stands(office: Office) -
 # --- when the next tick is due -------------------------------------------------------------
 
 
-def test_a_desk_that_knows_nobody_has_no_deadline() -> None:
+def test_a_desk_that_knows_nobody_has_no_deadline():
     assert Office().new_desk().next_deadline() == math.inf
 
 
-def test_the_next_deadline_is_that_of_silence_of_a_wait_or_of_an_order(office: Office) -> None:
+def test_the_next_deadline_is_that_of_silence_of_a_wait_or_of_an_order(office):
     desk = office.desk
     assert desk.next_deadline() == pytest.approx(10.0)
     desk.registry.silent_after = 1e9
@@ -330,7 +318,7 @@ def test_the_next_deadline_is_that_of_silence_of_a_wait_or_of_an_order(office: O
     assert desk.next_deadline() == 67.0
 
 
-def test_after_each_tick_the_next_deadline_lies_ahead(office: Office) -> None:
+def test_after_each_tick_the_next_deadline_lies_ahead(office):
     office.busy(GUARD)
     office.no(office.fire(12), 1.0)
     office.fire(90, now=2.0)

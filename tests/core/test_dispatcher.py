@@ -49,21 +49,21 @@ def advised(*advice: Advice, **wants: bool) -> Office:
 # --- who goes ------------------------------------------------------------------------------
 
 
-def test_the_earliest_expected_arrival_goes() -> None:
+def test_the_earliest_expected_arrival_goes():
     office = Office()
     assert office.fire(12) == [Send(OPERATOR, m.Order(1, "fire", east(12), ROBOT))]
     far = office.fire(40, kind="gas_leak")
     assert far == [Send(GUARD, m.Order(2, "gas_leak", east(40), None))]
 
 
-def test_a_robot_goes_only_with_a_free_operator() -> None:
+def test_a_robot_goes_only_with_a_free_operator():
     office = Office()
     office.register(OTHER_ROBOT, "Robot", 10)
     first, second = office.fire(12), office.fire(12, kind="gas_leak")
     assert [s.to for s in first + second] == [OPERATOR, GUARD]
 
 
-def test_who_has_not_told_where_it_is_is_sent_nowhere() -> None:
+def test_who_has_not_told_where_it_is_is_sent_nowhere():
     office = Office()
     office.busy(GUARD, ROBOT)
     office.register(OTHER_GUARD, "Guard")
@@ -72,7 +72,7 @@ def test_who_has_not_told_where_it_is_is_sent_nowhere() -> None:
     assert [send.to for send in office.tick(2.0)] == [OTHER_GUARD]
 
 
-def test_a_silent_device_is_sent_nowhere() -> None:
+def test_a_silent_device_is_sent_nowhere():
     office = Office()
     office.beat(DETECTOR, OPERATOR, ROBOT, now=11.0)
     office.desk.tick(11.0)
@@ -80,7 +80,7 @@ def test_a_silent_device_is_sent_nowhere() -> None:
     assert office.fire(12, now=11.0) == []
 
 
-def test_the_policy_sees_guards_then_robots_and_events_detected_longest_ago_first() -> None:
+def test_the_policy_sees_guards_then_robots_and_events_detected_longest_ago_first():
     policy = Advising(lambda _: [])
     office = Office(policy)
     office.register(OTHER_GUARD, "Guard", 80)
@@ -97,7 +97,7 @@ def test_the_policy_sees_guards_then_robots_and_events_detected_longest_ago_firs
     assert (seen.cover, seen.bids.size, seen.preference.size) == (None, 0, 0)
 
 
-def test_the_policy_sees_the_lists_of_the_place() -> None:
+def test_the_policy_sees_the_lists_of_the_place():
     policy = Advising(lambda _: [])
     ground = SiteKnowledge(lambda position, devices: [float(d == GUARD) for d in devices])
     office = Office(policy, ground=ground)
@@ -105,7 +105,7 @@ def test_the_policy_sees_the_lists_of_the_place() -> None:
     assert policy.seen[-1].preference.tolist() == [[1.0, 0.0]]
 
 
-def test_with_nobody_to_send_or_nothing_to_do_the_policy_is_not_asked() -> None:
+def test_with_nobody_to_send_or_nothing_to_do_the_policy_is_not_asked():
     policy = Advising(lambda _: [])
     office = Office(policy)
     office.tick(1.0)
@@ -122,7 +122,7 @@ def everything(situation: Situation) -> list[Advice]:
     return [Assignment(t, r) for t in every for r in range(len(situation.responders))]
 
 
-def test_the_desk_enforces_the_rules_whatever_a_policy_returns() -> None:
+def test_the_desk_enforces_the_rules_whatever_a_policy_returns():
     office = Office(Advising(everything))
     office.fire(12)
     office.fire(12, kind="gas_leak")
@@ -141,16 +141,14 @@ def test_the_desk_enforces_the_rules_whatever_a_policy_returns() -> None:
         ([Announcement(0)], 0),  # no auctions
     ],
 )
-def test_what_the_rules_do_not_allow_is_overruled_and_counted(
-    advice: list[Advice], taken: int
-) -> None:
+def test_what_the_rules_do_not_allow_is_overruled_and_counted(advice, taken):
     office = advised(*advice)
     assert len(office.fire(12)) == taken
     assert office.desk.counters["overruled"] == 1
     assert office.desk.counters["policy failed"] == 0
 
 
-def test_more_robots_than_operators_are_overruled() -> None:
+def test_more_robots_than_operators_are_overruled():
     office = Office(Advising(lambda s: [Assignment(t, t + 1) for t in range(len(s.tasks))]))
     office.register(OTHER_ROBOT, "Robot", 10)
     office.desk.book.add("fire", east(12), 0.5, 0.0)
@@ -159,7 +157,7 @@ def test_more_robots_than_operators_are_overruled() -> None:
     assert office.desk.counters["overruled"] == 1
 
 
-def test_nobody_is_sent_where_there_is_no_way() -> None:
+def test_nobody_is_sent_where_there_is_no_way():
     def walled(starts: Any, goals: Any) -> Any:
         distance, eta = crow(starts, goals)
         return np.full_like(distance, np.inf), np.full_like(eta, np.inf)
@@ -212,30 +210,28 @@ def mutates(situation: Situation) -> Any:
         lambda s: [Relocation(0, 0)],
     ],
 )
-def test_a_policy_that_fails_is_counted_and_the_earliest_arrival_goes(
-    advice: Callable[[Situation], Any],
-) -> None:
+def test_a_policy_that_fails_is_counted_and_the_earliest_arrival_goes(advice):
     office = Office(Advising(advice))
     assert [send.to for send in office.fire(12)] == [OPERATOR]
     assert office.desk.counters["policy failed"] == 1
     assert office.desk.dispatcher.last_failure
 
 
-def test_indices_of_numpy_are_as_good_as_any() -> None:
+def test_indices_of_numpy_are_as_good_as_any():
     office = Office(Advising(lambda s: [Assignment(np.int64(0), np.uint8(0))]))
     assert [send.to for send in office.fire(12)] == [GUARD]
     assert office.desk.counters["policy failed"] == 0
 
 
 @pytest.mark.parametrize("name", ["distance", "eta", "preference", "bids"])
-def test_what_a_policy_is_shown_it_cannot_change(name: str) -> None:
+def test_what_a_policy_is_shown_it_cannot_change(name):
     policy = Advising(lambda _: [], auctions=True)
     office = Office(policy, ground=SiteKnowledge(lambda position, devices: [0.0] * len(devices)))
     office.fire(12)
     assert not getattr(policy.seen[-1], name).flags.writeable
 
 
-def test_what_is_known_of_the_place_a_policy_cannot_change() -> None:
+def test_what_is_known_of_the_place_a_policy_cannot_change():
     def spoil(situation: Situation) -> Any:
         assert situation.cover is not None
         situation.cover.reach[:] = 0.0
@@ -248,7 +244,7 @@ def test_what_is_known_of_the_place_a_policy_cannot_change() -> None:
     assert ground.reach.tolist() == [[1.0, 1.0]]
 
 
-def test_a_map_that_hands_out_its_own_tables_keeps_them() -> None:
+def test_a_map_that_hands_out_its_own_tables_keeps_them():
     table = np.zeros((1, 3)), np.ones((1, 3))
     office = Office(rules=Rules(containment=True))
     office.register(OTHER_GUARD, "Guard", 80)

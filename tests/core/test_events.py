@@ -201,7 +201,7 @@ def test_a_step_that_does_not_exist_is_refused() -> None:
     book = EventBook()
     event = book.add("fire", HERE, 0.5, 0.0)
     book.move(event, State.ESCALATED, 1.0)
-    with pytest.raises(ValueError, match="cannot go from escalated to confirmed"):
+    with pytest.raises(ValueError, match="escalated to confirmed"):
         book.move(event, State.CONFIRMED, 2.0)
 
 

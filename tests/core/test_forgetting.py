@@ -6,7 +6,6 @@ import sqlite3
 from collections.abc import Sized
 from contextlib import closing
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,6 +19,7 @@ from helpers.dva.dispatch_desk import (
     ROBOT,
     Office,
 )
+from helpers.wording import counted
 
 from dva_sim.core.events import State
 from dva_sim.core.sessions import Send
@@ -58,7 +58,7 @@ def held(office: Office, holder: str = OPERATOR, robot: str = ROBOT, now: float 
 # --- when ----------------------------------------------------------------------------------
 
 
-def test_who_is_silent_for_a_minute_is_forgotten_and_has_to_register_again(office: Office) -> None:
+def test_who_is_silent_for_a_minute_is_forgotten_and_has_to_register_again(office):
     only(office, OPERATOR, ROBOT, GUARD, until=60.0)
     assert DETECTOR in known(office)
     only(office, OPERATOR, ROBOT, GUARD, since=60.0, until=FORGOTTEN)
@@ -69,14 +69,14 @@ def test_who_is_silent_for_a_minute_is_forgotten_and_has_to_register_again(offic
     assert DETECTOR in known(office)
 
 
-def test_who_is_heard_again_is_not_forgotten(office: Office) -> None:
+def test_who_is_heard_again_is_not_forgotten(office):
     only(office, OPERATOR, until=40.0)
     office.beat(ROBOT, now=41.0)
     only(office, OPERATOR, since=41.0, until=100.9)
     assert known(office) == {OPERATOR, ROBOT}
 
 
-def test_who_registers_again_after_that_comes_last(office: Office) -> None:
+def test_who_registers_again_after_that_comes_last(office):
     only(office, OPERATOR, until=FORGOTTEN)
     office.register(GUARD, "Guard", now=61.0)
     office.register(ROBOT, "Robot", now=61.0)
@@ -87,7 +87,7 @@ def test_who_registers_again_after_that_comes_last(office: Office) -> None:
 # --- who lasts -----------------------------------------------------------------------------
 
 
-def test_a_robot_that_somebody_holds_is_not_forgotten(office: Office) -> None:
+def test_a_robot_that_somebody_holds_is_not_forgotten(office):
     session = held(office)
     only(office, OPERATOR, until=200.0)
     assert known(office) == {OPERATOR, ROBOT}
@@ -98,9 +98,7 @@ def test_a_robot_that_somebody_holds_is_not_forgotten(office: Office) -> None:
 
 
 @pytest.mark.invariant("S5")
-def test_a_robot_that_has_not_heard_of_an_end_lasts_and_is_told_when_it_is_back(
-    office: Office,
-) -> None:
+def test_a_robot_that_has_not_heard_of_an_end_lasts_and_is_told_when_it_is_back(office):
     session = held(office)
     over = Send(ROBOT, m.PermissionRevocation(ROBOT, OPERATOR, session))
     sends = only(office, ROBOT, until=SILENT)
@@ -115,7 +113,7 @@ def test_a_robot_that_has_not_heard_of_an_end_lasts_and_is_told_when_it_is_back(
 
 
 @pytest.mark.invariant("S6")
-def test_who_works_on_an_event_is_replaced_first_and_then_forgotten(office: Office) -> None:
+def test_who_works_on_an_event_is_replaced_first_and_then_forgotten(office):
     office.ok(office.fire(12))
     assert office.event().responder == ROBOT
     only(office, GUARD, until=FORGOTTEN)
@@ -125,7 +123,7 @@ def test_who_works_on_an_event_is_replaced_first_and_then_forgotten(office: Offi
     assert office.desk.book.counts[State.ASSIGNED] == office.desk.book.total == 1
 
 
-def test_what_was_sent_to_who_is_forgotten_may_come_back_undelivered(office: Office) -> None:
+def test_what_was_sent_to_who_is_forgotten_may_come_back_undelivered(office):
     sends = office.fire(12)
     only(office, GUARD, until=FORGOTTEN)
     for send in sends:
@@ -137,19 +135,17 @@ def test_what_was_sent_to_who_is_forgotten_may_come_back_undelivered(office: Off
 # --- who makes room ------------------------------------------------------------------------
 
 
-def test_in_a_full_registry_the_longest_silent_makes_room(office: Office) -> None:
+def test_in_a_full_registry_the_longest_silent_makes_room(office):
     office.desk.registry.most = 4
     office.beat(OPERATOR, now=5.0)
     office.beat(ROBOT, now=6.0)
     office.tick(20.0, alive=False)
     assert office.say(STRANGER, m.Registration("x", "TeleOp", ADDRESS), 20.0)[0].code == m.OK
     assert known(office) == {GUARD, OPERATOR, ROBOT, STRANGER}  # the detector said least
-    assert office.desk.counters["forgotten for want of room"] == 1
+    assert counted(office.desk.counters, "forgotten", "room") == 1
 
 
-def test_of_whom_something_is_open_makes_room_last_and_its_holder_hears_that(
-    office: Office,
-) -> None:
+def test_of_whom_something_is_open_makes_room_last_and_its_holder_hears_that(office):
     session = held(office)
     only(office, OPERATOR, until=20.0)
     office.desk.registry.most = 4
@@ -187,9 +183,7 @@ def sizes(thing: Any, depth: int = 4) -> dict[str, int]:
     return found
 
 
-def test_after_ten_waves_the_desk_holds_what_it_held_after_the_first(
-    office: Office, tmp_path: Path
-) -> None:
+def test_after_ten_waves_the_desk_holds_what_it_held_after_the_first(office, tmp_path):
     """Each is heard once; half of the operators hold a robot of their wave and ask others."""
     memory = Store(tmp_path / "state.sqlite")
     desk, now, after = office.desk, 0.0, []
@@ -226,9 +220,7 @@ TABLES = ("devices", "grants", "untold")
 # --- the file ------------------------------------------------------------------------------
 
 
-def test_the_next_life_does_not_know_who_was_forgotten_and_knows_every_event(
-    office: Office, tmp_path: Path
-) -> None:
+def test_the_next_life_does_not_know_who_was_forgotten_and_knows_every_event(office, tmp_path):
     office.register(OTHER_ROBOT, "Robot", 50)
     office.register(OTHER_OPERATOR, "TeleOp")
     file = tmp_path / "state.sqlite"

@@ -15,6 +15,7 @@ from helpers.dva.dispatch_desk import (
     ROBOT,
     Office,
 )
+from helpers.wording import unnamed
 
 from dva_sim.core.events import State
 from dva_sim.core.permissions import Access, AccessRule
@@ -46,7 +47,7 @@ def granted(
 # --- one holder at a time ------------------------------------------------------------------
 
 
-def test_a_robot_is_held_by_one_and_the_robot_is_told(office: Office) -> None:
+def test_a_robot_is_held_by_one_and_the_robot_is_told(office):
     office.register(OTHER_OPERATOR, "TeleOp")
     reply, sends = office.say(OPERATOR, ASK)
     assert isinstance(reply.content, m.Permission)
@@ -55,7 +56,7 @@ def test_a_robot_is_held_by_one_and_the_robot_is_told(office: Office) -> None:
     assert office.say(OTHER_OPERATOR, ASK)[0].code == m.BUSY
 
 
-def test_only_an_operator_whose_order_it_is_may_drive_a_robot(office: Office) -> None:
+def test_only_an_operator_whose_order_it_is_may_drive_a_robot(office):
     assert office.say(DETECTOR, ASK)[0].code == m.NOT_PERMITTED
     office.register(OTHER_OPERATOR, "TeleOp")
     office.fire(12)
@@ -64,13 +65,13 @@ def test_only_an_operator_whose_order_it_is_may_drive_a_robot(office: Office) ->
     assert office.say(OPERATOR, ASK)[0].code == m.OK
 
 
-def test_nobody_can_be_granted_what_is_no_robot(office: Office) -> None:
+def test_nobody_can_be_granted_what_is_no_robot(office):
     for device in (GUARD, OTHER_ROBOT):
         asked = m.PermissionRequest(device, "teleoperation")
         assert office.say(OPERATOR, asked)[0].code == m.UNKNOWN_DEVICE
 
 
-def test_sessions_only_grow(office: Office) -> None:
+def test_sessions_only_grow(office):
     sessions = []
     for _ in range(3):
         sessions.append(granted(office).session)
@@ -78,7 +79,7 @@ def test_sessions_only_grow(office: Office) -> None:
     assert sessions == sorted(set(sessions))
 
 
-def test_a_session_grows_above_and_is_luck_below(office: Office) -> None:
+def test_a_session_grows_above_and_is_luck_below(office):
     first = granted(office).session
     office.desk.sessions.permissions.release(OPERATOR)
     office.desk.sessions.permissions.draw = lambda: 2**32 - 1
@@ -88,7 +89,7 @@ def test_a_session_grows_above_and_is_luck_below(office: Office) -> None:
     assert (second >> 32) - (first >> 32) == 1
 
 
-def test_a_permission_introduces_holder_and_robot_to_each_other(office: Office) -> None:
+def test_a_permission_introduces_holder_and_robot_to_each_other(office):
     office.say(ROBOT, m.Registration("robot", "Robot", "192.168.1.20:5600"), 10.1)
     reply, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "both", ("heat_flux",)))
     content, grant = reply.content, sends[0].body
@@ -99,9 +100,7 @@ def test_a_permission_introduces_holder_and_robot_to_each_other(office: Office) 
     assert grant.session == content.session
 
 
-def test_a_robot_is_told_of_a_permission_once_and_again_when_its_holder_moves(
-    office: Office,
-) -> None:
+def test_a_robot_is_told_of_a_permission_once_and_again_when_its_holder_moves(office):
     ask = m.PermissionRequest(ROBOT, "both")
     first = office.say(OPERATOR, ask)[1]
     assert [type(send.body) for send in first] == [m.PermissionGrant]
@@ -117,7 +116,7 @@ def test_a_robot_is_told_of_a_permission_once_and_again_when_its_holder_moves(
 # --- the end of a session ------------------------------------------------------------------
 
 
-def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office: Office) -> None:
+def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office):
     session = granted(office).session
     mine = m.PermissionRevocation(ROBOT, OPERATOR, session)
     assert office.say(DETECTOR, mine)[0].code == m.BAD_SESSION
@@ -128,7 +127,7 @@ def test_a_holder_gives_its_permission_back_and_the_robot_is_told(office: Office
     assert granted(office).session > session
 
 
-def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office: Office) -> None:
+def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office):
     session = granted(office).session
     office.status(ROBOT, 10, now=11.0)
     sends = office.desk.tick(11.0)
@@ -137,7 +136,7 @@ def test_a_silent_holder_loses_its_session_and_both_ends_are_told(office: Office
     assert office.desk.sessions.permissions.grants == {}
 
 
-def test_a_grant_that_fails_ends_its_own_session_alone(office: Office) -> None:
+def test_a_grant_that_fails_ends_its_own_session_alone(office):
     driver = granted(office).session
     office.desk.sessions.permissions.draw = lambda: 8
     _, sends = office.say(OPERATOR, m.PermissionRequest(ROBOT, "sensors", ("heat_flux",)))
@@ -146,7 +145,7 @@ def test_a_grant_that_fails_ends_its_own_session_alone(office: Office) -> None:
     assert office.desk.sessions.permissions.observers == {}
 
 
-def test_a_robot_that_could_not_be_told_is_told_again(office: Office) -> None:
+def test_a_robot_that_could_not_be_told_is_told_again(office):
     session = granted(office).session
     over = m.PermissionRevocation(ROBOT, OPERATOR, session)
     sent = office.say(OPERATOR, over)[1][0]
@@ -155,19 +154,19 @@ def test_a_robot_that_could_not_be_told_is_told_again(office: Office) -> None:
     assert office.desk.tick(3.0) == []
 
 
-def test_all_sessions_end_with_the_desk(office: Office) -> None:
+def test_all_sessions_end_with_the_desk(office):
     over = m.PermissionRevocation(ROBOT, OPERATOR, granted(office).session)
     assert office.desk.close() == [Send(ROBOT, over), Send(OPERATOR, over)]
 
 
-def test_a_declined_order_leaves_the_operator_what_it_held_by_itself(office: Office) -> None:
+def test_a_declined_order_leaves_the_operator_what_it_held_by_itself(office):
     session = granted(office).session
     order = office.fire(12)[0]
     assert office.no([order], 1.0) == []
     assert office.desk.sessions.permissions.grants[ROBOT].session == session
 
 
-def test_the_right_to_drive_ends_with_the_order(office: Office) -> None:
+def test_the_right_to_drive_ends_with_the_order(office):
     office.fire(12)
     session = granted(office).session
     sends = office.progress(OPERATOR, "failed", 5.0)[1]
@@ -175,7 +174,7 @@ def test_the_right_to_drive_ends_with_the_order(office: Office) -> None:
     assert office.desk.sessions.permissions.grants == {}
 
 
-def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office: Office) -> None:
+def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office):
     office.register(OTHER_OPERATOR, "TeleOp")
     granted(office)
     assert [send.to for send in office.fire(12)] == [GUARD]
@@ -184,7 +183,7 @@ def test_a_robot_that_somebody_holds_is_sent_nowhere_by_another(office: Office) 
 # --- sensors -------------------------------------------------------------------------------
 
 
-def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office: Office) -> None:
+def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office):
     driver = granted(office).session
     office.desk.sessions.permissions.draw = lambda: 8
     reader = granted(office, DETECTOR, "sensors").session
@@ -193,7 +192,7 @@ def test_who_reads_sensors_holds_nothing_else_and_needs_no_order(office: Office)
     assert office.desk.sessions.permissions.grants[ROBOT].holder == OPERATOR
 
 
-def test_sensors_are_granted_one_by_one() -> None:
+def test_sensors_are_granted_one_by_one():
     office = guarded(AccessRule(sensors=frozenset({"heat_flux", "gas"})))
     asked = m.PermissionRequest(ROBOT, "sensors", ("gas", "camera"))
     content = office.say(DETECTOR, asked)[0].content
@@ -201,13 +200,13 @@ def test_sensors_are_granted_one_by_one() -> None:
     assert content.sensors == ("gas",)
 
 
-def test_who_may_read_none_of_the_sensors_it_asks_for_is_refused() -> None:
+def test_who_may_read_none_of_the_sensors_it_asks_for_is_refused():
     office = guarded(AccessRule(sensors=frozenset({"gas"})))
     asked = m.PermissionRequest(ROBOT, "sensors", ("camera",))
     assert office.say(DETECTOR, asked)[0].code == m.NOT_PERMITTED
 
 
-def test_who_may_drive_but_not_read_drives_without_sensors() -> None:
+def test_who_may_drive_but_not_read_drives_without_sensors():
     office = guarded(AccessRule(sensors=frozenset()))
     assert granted(office, level="both").sensors == ()
 
@@ -226,9 +225,7 @@ def test_who_may_drive_but_not_read_drives_without_sensors() -> None:
         ((), set()),
     ],
 )
-def test_a_rule_allows_its_levels_and_what_they_are_made_of(
-    levels: tuple[str, ...], granted_levels: set[str]
-) -> None:
+def test_a_rule_allows_its_levels_and_what_they_are_made_of(levels, granted_levels):
     got = set()
     for level in ("teleoperation", "missions", "both", "sensors"):
         office = guarded(AccessRule(levels=frozenset(levels)))
@@ -237,7 +234,7 @@ def test_a_rule_allows_its_levels_and_what_they_are_made_of(
     assert got == granted_levels
 
 
-def test_a_rule_is_about_its_holders_and_robots_only() -> None:
+def test_a_rule_is_about_its_holders_and_robots_only():
     rule = AccessRule(holders=frozenset({"teleop"}), robots=frozenset({"robot"}))
     assert guarded(rule).say(OPERATOR, ASK)[0].code == m.OK
     for other in (
@@ -245,17 +242,15 @@ def test_a_rule_is_about_its_holders_and_robots_only() -> None:
         AccessRule(robots=frozenset({"another"})),
     ):
         reply = guarded(other).say(OPERATOR, ASK)[0]
-        assert (reply.code, reply.text) == (
-            m.NOT_PERMITTED,
-            "teleop may not have teleoperation of robot",
-        )
+        assert reply.code == m.NOT_PERMITTED
+        assert not unnamed(reply.text, "teleop", "teleoperation of robot")
 
 
-def test_without_a_rule_nothing_is_allowed() -> None:
+def test_without_a_rule_nothing_is_allowed():
     assert guarded().say(OPERATOR, ASK)[0].code == m.NOT_PERMITTED
 
 
-def test_a_rule_holds_from_its_beginning_and_before_its_end() -> None:
+def test_a_rule_holds_from_its_beginning_and_before_its_end():
     codes = {}
     for now in (99.9, 100.0, 199.9, 200.0):
         office = guarded(AccessRule(since=100.0, until=200.0))
@@ -268,7 +263,7 @@ def test_a_rule_holds_from_its_beginning_and_before_its_end() -> None:
     }
 
 
-def test_a_permission_is_revoked_while_in_use_when_the_time_of_its_rule_ends() -> None:
+def test_a_permission_is_revoked_while_in_use_when_the_time_of_its_rule_ends():
     office = guarded(AccessRule(until=200.0))
     session = granted(office, now=190.0).session
     assert office.desk.next_deadline() <= 200.0
@@ -278,21 +273,21 @@ def test_a_permission_is_revoked_while_in_use_when_the_time_of_its_rule_ends() -
     assert office.desk.counters["permission revoked"] == 1
 
 
-def test_a_permission_that_another_rule_allows_too_is_not_revoked() -> None:
+def test_a_permission_that_another_rule_allows_too_is_not_revoked():
     office = guarded(AccessRule(until=200.0), AccessRule(since=150.0, until=400.0))
     granted(office, now=190.0)
     assert office.tick(200.0) == []
     assert len(office.tick(400.0)) == 2
 
 
-def test_a_permission_ends_when_one_of_its_sensors_may_no_longer_be_read() -> None:
+def test_a_permission_ends_when_one_of_its_sensors_may_no_longer_be_read():
     office = guarded(AccessRule(sensors=frozenset()), AccessRule(until=200.0))
     assert granted(office, now=190.0).sensors == ("heat_flux",)
     assert len(office.tick(200.0)) == 2
     assert granted(office, now=201.0).sensors == ()
 
 
-def test_an_order_outlives_a_revoked_permission_and_its_operator_says_how_it_ends() -> None:
+def test_an_order_outlives_a_revoked_permission_and_its_operator_says_how_it_ends():
     office = guarded(AccessRule(until=20.0))
     office.ok(office.fire(12, now=10.0), 10.0)
     granted(office, now=11.0)
@@ -302,7 +297,7 @@ def test_an_order_outlives_a_revoked_permission_and_its_operator_says_how_it_end
     assert [send.to for send in sends] == [GUARD]
 
 
-def test_the_end_of_rules_is_no_deadline_once_it_is_past() -> None:
+def test_the_end_of_rules_is_no_deadline_once_it_is_past():
     office = guarded(AccessRule(until=200.0))
     assert math.isfinite(office.desk.next_deadline())
     office.desk.tick(200.0)

@@ -49,7 +49,7 @@ def listed(office: Office, device: str | None = None) -> m.SensorList:
 # --- which sensors there are -------------------------------------------------------------------
 
 
-def test_nobody_is_asked_until_somebody_wants_to_know() -> None:
+def test_nobody_is_asked_until_somebody_wants_to_know():
     office = Office()
     assert office.sent == []
     reply, sends = office.say(OPERATOR, m.GetSensorInfo())
@@ -62,7 +62,7 @@ def test_nobody_is_asked_until_somebody_wants_to_know() -> None:
     assert office.register(OTHER_ROBOT, "Robot", 20) == [Send(OTHER_ROBOT, m.GetSensorInfo())]
 
 
-def test_one_robot_or_all_are_listed(office: Office) -> None:
+def test_one_robot_or_all_are_listed(office):
     office.register(OTHER_ROBOT, "Robot", 20)
     for robot in (ROBOT, OTHER_ROBOT):
         learn(office, robot)
@@ -71,11 +71,11 @@ def test_one_robot_or_all_are_listed(office: Office) -> None:
 
 
 @pytest.mark.parametrize("device", [GUARD, "02:00:00:09:00:09"])
-def test_there_are_no_sensors_of_what_is_no_robot(office: Office, device: str) -> None:
+def test_there_are_no_sensors_of_what_is_no_robot(office, device):
     assert office.say(OPERATOR, m.GetSensorInfo(device))[0].code == m.UNKNOWN_DEVICE
 
 
-def test_a_robot_that_does_not_answer_holds_up_nobody_but_is_asked_again_by_name() -> None:
+def test_a_robot_that_does_not_answer_holds_up_nobody_but_is_asked_again_by_name():
     office = Office()
     sends = office.say(OPERATOR, m.GetSensorInfo())[1]
     office.no(sends)
@@ -83,13 +83,13 @@ def test_a_robot_that_does_not_answer_holds_up_nobody_but_is_asked_again_by_name
     assert office.say(OPERATOR, m.GetSensorInfo(ROBOT))[1] == [ASK]
 
 
-def test_a_robot_that_starts_anew_is_asked_anew(office: Office) -> None:
+def test_a_robot_that_starts_anew_is_asked_anew(office):
     learn(office)
     office.number = 0
     assert ASK in office.register(ROBOT, "Robot")
 
 
-def test_a_list_of_any_sensors_fits_into_a_message(office: Office) -> None:
+def test_a_list_of_any_sensors_fits_into_a_message(office):
     many = m.SensorInfo("x" * 256, tuple(m.Sensor("&" * 64, "\U0001f525" * 30) for _ in range(16)))
     robots = [f"02:00:00:01:01:{number:02X}" for number in range(70)]
     for number, robot in enumerate(robots):
@@ -106,9 +106,7 @@ def test_a_list_of_any_sensors_fits_into_a_message(office: Office) -> None:
 # --- reading them ------------------------------------------------------------------------------
 
 
-def test_the_dva_lets_itself_be_permitted_and_then_subscribes_to_what_it_heeds(
-    office: Office,
-) -> None:
+def test_the_dva_lets_itself_be_permitted_and_then_subscribes_to_what_it_heeds(office):
     (grant,) = learn(office)
     assert isinstance(grant.body, m.PermissionGrant)
     assert (grant.body.holder, grant.body.level, grant.body.sensors) == (DVA, "sensors", ("smoke",))
@@ -118,7 +116,7 @@ def test_the_dva_lets_itself_be_permitted_and_then_subscribes_to_what_it_heeds(
     assert office.tick(RENEW) == [wish]
 
 
-def test_a_robot_that_no_longer_knows_the_dva_is_told_its_permission_again(office: Office) -> None:
+def test_a_robot_that_no_longer_knows_the_dva_is_told_its_permission_again(office):
     (grant,) = learn(office)
     wishes = office.ok([grant])
     office.no(wishes, 1.0)
@@ -127,7 +125,7 @@ def test_a_robot_that_no_longer_knows_the_dva_is_told_its_permission_again(offic
     assert sends[0].to == ROBOT
 
 
-def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office: Office) -> None:
+def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office):
     (grant,) = learn(office)
     office.ok([grant])
     office.silence(ROBOT, 11.0)
@@ -139,7 +137,7 @@ def test_a_robot_that_was_gone_is_asked_and_permitted_anew(office: Office) -> No
 
 
 @pytest.mark.invariant("S10")
-def test_of_a_robot_that_is_gone_nothing_is_kept(office: Office) -> None:
+def test_of_a_robot_that_is_gone_nothing_is_kept(office):
     office.silence(ROBOT, 11.0)
     office.no([ASK], 27.0)
     learn(office, now=28.0)
@@ -147,7 +145,7 @@ def test_of_a_robot_that_is_gone_nothing_is_kept(office: Office) -> None:
     assert office.desk.sensing == fresh
 
 
-def test_a_dva_that_heeds_nothing_reads_nothing() -> None:
+def test_a_dva_that_heeds_nothing_reads_nothing():
     office = Office()
     office.say(OPERATOR, m.GetSensorInfo())
     assert learn(office) == []
@@ -158,7 +156,7 @@ def test_a_dva_that_heeds_nothing_reads_nothing() -> None:
 # --- what it means -----------------------------------------------------------------------------
 
 
-def test_much_smoke_at_a_robot_is_a_fire_there_and_somebody_is_sent(office: Office) -> None:
+def test_much_smoke_at_a_robot_is_a_fire_there_and_somebody_is_sent(office):
     sends = office.shows(ROBOT, "smoke", *SMOKY, now=3.0)
     event = office.event()
     assert (event.kind, event.position, event.sources) == ("fire", east(10), {ROBOT: 0.6})
@@ -168,31 +166,29 @@ def test_much_smoke_at_a_robot_is_a_fire_there_and_somebody_is_sent(office: Offi
 
 
 @pytest.mark.parametrize("values", [(0.5, 0.5), (0.5, 0.5, 0.1, 0.5, 0.5), (0.29,) * 50])
-def test_noise_is_no_fire(office: Office, values: tuple[float, ...]) -> None:
+def test_noise_is_no_fire(office, values):
     office.shows(ROBOT, "smoke", *values)
     assert office.desk.book.total == 0
 
 
-def test_what_a_sensor_goes_on_showing_is_said_once(office: Office) -> None:
+def test_what_a_sensor_goes_on_showing_is_said_once(office):
     office.shows(ROBOT, "smoke", *SMOKY * 20)
     assert (office.desk.book.total, office.event().reports) == (1, 1)
 
 
-def test_gas_is_a_leak_and_another_event_than_smoke(office: Office) -> None:
+def test_gas_is_a_leak_and_another_event_than_smoke(office):
     office.shows(ROBOT, "smoke", *SMOKY)
     office.shows(ROBOT, "gas", *(0.01,) * IN_A_ROW)
     assert [event.kind for event in office.desk.book.open.values()] == ["fire", "gas_leak"]
 
 
 @pytest.mark.parametrize("sensor", ["water", "temperature"])
-def test_what_it_does_not_heed_means_nothing(office: Office, sensor: str) -> None:
+def test_what_it_does_not_heed_means_nothing(office, sensor):
     office.shows(ROBOT, sensor, *(99.0,) * 9)
     assert office.desk.book.total == 0
 
 
-def test_smoke_at_the_place_of_an_event_confirms_it_and_who_was_sent_need_not_look(
-    office: Office,
-) -> None:
+def test_smoke_at_the_place_of_an_event_confirms_it_and_who_was_sent_need_not_look(office):
     office.ok(office.fire(12))
     assert office.event().operator == OPERATOR
     sends = office.shows(ROBOT, "smoke", *SMOKY, now=5.0)
@@ -202,7 +198,7 @@ def test_smoke_at_the_place_of_an_event_confirms_it_and_who_was_sent_need_not_lo
     assert office.desk.book.total == 1
 
 
-def test_a_confirmed_event_that_is_to_be_contained_waits_for_a_guard_then() -> None:
+def test_a_confirmed_event_that_is_to_be_contained_waits_for_a_guard_then():
     office = Office(sensing=Sensing(ALARMS), rules=Rules(containment=True))
     office.busy(GUARD)
     office.fire(12)
@@ -213,7 +209,7 @@ def test_a_confirmed_event_that_is_to_be_contained_waits_for_a_guard_then() -> N
     assert Send(GUARD, contain) in sends
 
 
-def test_smoke_some_way_off_speaks_for_the_event_but_does_not_confirm_it(office: Office) -> None:
+def test_smoke_some_way_off_speaks_for_the_event_but_does_not_confirm_it(office):
     office.fire(10 + REACH - 1)
     before = office.event().confidence
     assert office.shows(ROBOT, "smoke", *SMOKY) == []
@@ -223,13 +219,13 @@ def test_smoke_some_way_off_speaks_for_the_event_but_does_not_confirm_it(office:
     assert office.desk.book.total == 1
 
 
-def test_beyond_its_reach_smoke_is_another_fire(office: Office) -> None:
+def test_beyond_its_reach_smoke_is_another_fire(office):
     office.fire(10 + REACH + 1)
     office.shows(ROBOT, "smoke", *SMOKY)
     assert office.desk.book.total == 2
 
 
-def test_a_robot_alone_confirms_nothing_of_its_own_but_a_second_one_does(office: Office) -> None:
+def test_a_robot_alone_confirms_nothing_of_its_own_but_a_second_one_does(office):
     office.shows(ROBOT, "smoke", *SMOKY, 0.0, *SMOKY)
     assert office.event().state is State.ASSIGNED
     office.register(OTHER_ROBOT, "Robot", 12)
@@ -238,7 +234,7 @@ def test_a_robot_alone_confirms_nothing_of_its_own_but_a_second_one_does(office:
     assert office.desk.book.total == 1
 
 
-def test_what_people_have_found_is_no_news_for_a_while(office: Office) -> None:
+def test_what_people_have_found_is_no_news_for_a_while(office):
     office.fire(12)
     office.finds(OPERATOR, "confirmed", 5.0)
     office.shows(ROBOT, "smoke", *SMOKY, 0.0, now=10.0)
@@ -247,7 +243,7 @@ def test_what_people_have_found_is_no_news_for_a_while(office: Office) -> None:
     assert office.desk.book.total == 2
 
 
-def test_what_was_refuted_is_news_again(office: Office) -> None:
+def test_what_was_refuted_is_news_again(office):
     office.fire(12)
     office.finds(OPERATOR, "refuted", 5.0)
     office.shows(ROBOT, "smoke", *SMOKY, now=10.0)
@@ -257,7 +253,7 @@ def test_what_was_refuted_is_news_again(office: Office) -> None:
 # --- one event, whoever tells of it ------------------------------------------------------------
 
 
-def test_a_detector_says_better_where_it_is_and_nobody_has_set_out(office: Office) -> None:
+def test_a_detector_says_better_where_it_is_and_nobody_has_set_out(office):
     office.busy(GUARD, OPERATOR)
     office.shows(ROBOT, "smoke", *SMOKY)
     office.fire(25)
@@ -267,7 +263,7 @@ def test_a_detector_says_better_where_it_is_and_nobody_has_set_out(office: Offic
 
 
 @pytest.mark.invariant("S6")
-def test_who_is_on_the_way_to_where_it_was_felt_is_sent_to_where_it_is(office: Office) -> None:
+def test_who_is_on_the_way_to_where_it_was_felt_is_sent_to_where_it_is(office):
     office.ok(office.shows(ROBOT, "smoke", *SMOKY))
     sends = office.fire(25, now=2.0)
     felt, seen = office.event(1), office.event(2)
@@ -277,15 +273,13 @@ def test_who_is_on_the_way_to_where_it_was_felt_is_sent_to_where_it_is(office: O
     assert sum(office.desk.book.counts.values()) == office.desk.book.total == 2
 
 
-def test_smoke_at_a_robot_whose_place_is_not_known_means_nothing(office: Office) -> None:
+def test_smoke_at_a_robot_whose_place_is_not_known_means_nothing(office):
     office.register(OTHER_ROBOT, "Robot")
     assert office.shows(OTHER_ROBOT, "smoke", *SMOKY) == []
     assert office.desk.book.total == 0
 
 
-def test_when_no_more_events_fit_that_is_counted(
-    office: Office, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_when_no_more_events_fit_that_is_counted(office, monkeypatch):
     monkeypatch.setattr("dva_sim.core.events.MOST_OPEN", 0)
     assert office.shows(ROBOT, "smoke", *SMOKY) == []
     assert office.desk.refused == 1

@@ -55,13 +55,13 @@ def next_life(office: Office, file: Path, now: float) -> Dva:
 # --- what is remembered --------------------------------------------------------------------
 
 
-def test_an_empty_file_knows_nothing(file: Path) -> None:
+def test_an_empty_file_knows_nothing(file):
     memory = Store(file)
     assert not memory.recall(Office().new_desk(), 0.0)
     memory.close()
 
 
-def test_the_next_life_knows_events_devices_permissions_and_who_works_on_what(file: Path) -> None:
+def test_the_next_life_knows_events_devices_permissions_and_who_works_on_what(file):
     office, memory = Office(rules=RULES), Store(file)
     office.fire(12, now=1.0)
     office.fire(80, now=2.0, kind="flood")
@@ -75,7 +75,7 @@ def test_the_next_life_knows_events_devices_permissions_and_who_works_on_what(fi
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_after_any_day_the_next_life_knows_all_that_was_kept(seed: int, tmp_path: Path) -> None:
+def test_after_any_day_the_next_life_knows_all_that_was_kept(seed, tmp_path):
     day = Walk(seed, tmp_path)
     for _ in range(80):
         day.step()
@@ -83,7 +83,7 @@ def test_after_any_day_the_next_life_knows_all_that_was_kept(seed: int, tmp_path
     day.memory.close()
 
 
-def test_the_order_of_registration_lasts_when_a_device_moves(file: Path) -> None:
+def test_the_order_of_registration_lasts_when_a_device_moves(file):
     office, memory = Office(), Store(file)
     keep(office, memory)
     office.say(GUARD, m.Registration("guard", "Guard", "10.0.0.7"))
@@ -94,9 +94,7 @@ def test_the_order_of_registration_lasts_when_a_device_moves(file: Path) -> None
 
 
 @pytest.mark.parametrize("now", [0.0, 500.0, 1e6])
-def test_what_has_waited_has_waited_as_long_for_the_next_life_whatever_its_clock_shows(
-    file: Path, now: float
-) -> None:
+def test_what_has_waited_has_waited_as_long_for_the_next_life_whatever_its_clock_shows(file, now):
     """The event has waited for 20 of 60 seconds when the DVA is killed."""
     office, memory = Office(rules=RULES), Store(file)
     office.busy(GUARD, ROBOT, OPERATOR)
@@ -112,7 +110,7 @@ def test_what_has_waited_has_waited_as_long_for_the_next_life_whatever_its_clock
     assert office.event().state is State.ESCALATED
 
 
-def test_how_late_it_is_is_kept_though_nothing_changes(file: Path) -> None:
+def test_how_late_it_is_is_kept_though_nothing_changes(file):
     """A DVA that is killed again and again escalates in the end."""
     office, memory = Office(rules=RULES), Store(file)
     office.busy(GUARD, ROBOT, OPERATOR)
@@ -133,7 +131,7 @@ def test_how_late_it_is_is_kept_though_nothing_changes(file: Path) -> None:
     assert office.event().state is State.ESCALATED
 
 
-def test_a_file_of_an_older_version_goes_on_where_its_newest_event_stood(file: Path) -> None:
+def test_a_file_of_an_older_version_goes_on_where_its_newest_event_stood(file):
     """Its times are by the wall clock, and nothing in it tells how late it was in the end."""
     office, memory = Office(rules=RULES), Store(file)
     office.busy(GUARD, ROBOT, OPERATOR)
@@ -147,7 +145,7 @@ def test_a_file_of_an_older_version_goes_on_where_its_newest_event_stood(file: P
     assert office.event().waiting_since == pytest.approx(30.0)
 
 
-def test_devices_have_their_time_out_to_show_that_they_are_there(file: Path) -> None:
+def test_devices_have_their_time_out_to_show_that_they_are_there(file):
     office, memory = Office(), Store(file)
     office.ok(office.fire(12))
     keep(office, memory)
@@ -159,7 +157,7 @@ def test_devices_have_their_time_out_to_show_that_they_are_there(file: Path) -> 
     assert office.working == {}
 
 
-def test_sessions_go_on_growing(file: Path) -> None:
+def test_sessions_go_on_growing(file):
     office, memory = Office(), Store(file)
     ask = m.PermissionRequest(ROBOT, "teleoperation")
     first = office.say(OPERATOR, ask)[0].content
@@ -174,9 +172,7 @@ def test_sessions_go_on_growing(file: Path) -> None:
     assert second.session > first.session
 
 
-def test_a_permission_that_no_rule_allows_any_longer_ends_when_it_is_remembered(
-    file: Path,
-) -> None:
+def test_a_permission_that_no_rule_allows_any_longer_ends_when_it_is_remembered(file):
     office, memory = Office(), Store(file)
     content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))[0].content
     keep(office, memory)
@@ -198,13 +194,13 @@ def killed_before_the_robot_hears(file: Path) -> tuple[Office, Store, Send]:
     return office, memory, Send(ROBOT, over)
 
 
-def test_a_robot_that_has_not_heard_of_an_end_is_told_by_the_next_life(file: Path) -> None:
+def test_a_robot_that_has_not_heard_of_an_end_is_told_by_the_next_life(file):
     office, memory, untold = killed_before_the_robot_hears(file)
     memory.close()
     assert next_life(office, file, 1.0).go_on() == [untold]
 
 
-def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file: Path) -> None:
+def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file):
     office, memory, untold = killed_before_the_robot_hears(file)
     for life in range(3):
         office.no([untold], life)
@@ -219,7 +215,7 @@ def test_a_robot_that_did_not_answer_is_told_by_every_life_until_it_does(file: P
     assert next_life(office, file, 4.0).go_on() == []
 
 
-def test_what_has_not_changed_is_not_written_again(file: Path) -> None:
+def test_what_has_not_changed_is_not_written_again(file):
     office, memory = Office(), Store(file)
     office.fire(12)
     keep(office, memory)
@@ -234,9 +230,7 @@ def test_what_has_not_changed_is_not_written_again(file: Path) -> None:
 # --- kills ---------------------------------------------------------------------------------
 
 
-def test_a_copy_of_the_file_taken_at_any_moment_knows_what_was_kept_until_then(
-    tmp_path: Path,
-) -> None:
+def test_a_copy_of_the_file_taken_at_any_moment_knows_what_was_kept_until_then(tmp_path):
     """The file and its log, as a kill leaves them: nothing was closed."""
     day = Walk(7, tmp_path)
     for step in range(60):
@@ -264,7 +258,7 @@ while True:
 """
 
 
-def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file: Path) -> None:
+def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
     """Three kills, each amid the writing."""
     for enough in (3, 17, 60):
         command = [sys.executable, "-c", SAYS_WHAT_IT_KEPT, str(file)]
@@ -288,7 +282,7 @@ def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file: Path) -
 # --- files that do not work ----------------------------------------------------------------
 
 
-def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file: Path) -> None:
+def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file):
     office, memory = Office(), Store(file)
     keep(office, memory)
     pages = memory._file.execute("PRAGMA page_count").fetchone()[0]
@@ -297,7 +291,8 @@ def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file: Pa
     for number in range(40):
         office.fire(20.0 * number)
         problems.add(keep(office, memory))
-    assert problems - {None} == {"cannot keep its memory: database or disk is full"}
+    (problem,) = problems - {None}
+    assert problem.endswith("disk is full")
     memory._file.execute("PRAGMA max_page_count = 100000")
     office.register(OTHER_GUARD, "Guard", 5)
     assert keep(office, memory) is None
@@ -307,12 +302,12 @@ def test_a_full_disk_is_one_line_and_work_goes_on_and_is_caught_up_with(file: Pa
     assert snapshot(next_life(office, file, 0.0)) == before
 
 
-def test_a_file_that_another_holds_is_one_line_and_caught_up_with_later(file: Path) -> None:
+def test_a_file_that_another_holds_is_one_line_and_caught_up_with_later(file):
     office, memory = Office(), Store(file)
     other = sqlite3.connect(file, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     office.fire(12)
-    assert keep(office, memory) == "cannot keep its memory: database is locked"
+    assert keep(office, memory).endswith(": database is locked")
     other.execute("ROLLBACK")
     other.close()
     assert keep(office, memory) is None
@@ -329,51 +324,49 @@ def refusal(file: Path) -> str:
     return line.removeprefix(f"{file}: ")
 
 
-def test_a_folder_is_no_memory(tmp_path: Path) -> None:
-    assert refusal(tmp_path) == "cannot be used as the DVA's memory: unable to open database file"
+def test_a_folder_is_no_memory(tmp_path):
+    assert refusal(tmp_path).endswith("database file")
 
 
-def test_a_file_in_a_folder_that_is_not_there_is_no_memory(tmp_path: Path) -> None:
+def test_a_file_in_a_folder_that_is_not_there_is_no_memory(tmp_path):
     assert "unable to open" in refusal(tmp_path / "nowhere" / "state.sqlite")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="to root no file is read-only")
-def test_a_file_that_may_only_be_read_is_no_memory(file: Path) -> None:
+def test_a_file_that_may_only_be_read_is_no_memory(file):
     Store(file).close()
     file.chmod(0o444)
     assert "readonly" in refusal(file)
 
 
-def test_a_text_is_no_memory_and_stays_as_it_is(file: Path) -> None:
+def test_a_text_is_no_memory_and_stays_as_it_is(file):
     file.write_text("dear diary, " * 100)
-    assert refusal(file) == "cannot be used as the DVA's memory: file is not a database"
+    assert refusal(file).endswith(": file is not a database")
     assert file.read_text() == "dear diary, " * 100
 
 
-def test_the_database_of_something_else_is_no_memory_and_stays_as_it_is(file: Path) -> None:
+def test_the_database_of_something_else_is_no_memory_and_stays_as_it_is(file):
     with sqlite3.connect(file) as other:
         other.execute("CREATE TABLE events (title TEXT)")
     other.close()
     before = file.read_bytes()
-    assert refusal(file) == "is not a DVA's memory of format 2"
+    assert refusal(file).endswith("memory of format 2")
     assert file.read_bytes() == before
 
 
 @pytest.mark.parametrize("value", [0, 3])
-def test_a_memory_of_another_format_is_refused(file: Path, value: int) -> None:
+def test_a_memory_of_another_format_is_refused(file, value):
     memory = Store(file)
     memory._file.execute("UPDATE about SET value = ? WHERE name = 'format'", (value,))
     memory.close()
-    assert refusal(file) == "is not a DVA's memory of format 2"
+    assert refusal(file).endswith("memory of format 2")
 
 
-def test_a_file_that_another_holds_cannot_be_opened(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_another_holds_cannot_be_opened(file, monkeypatch):
     monkeypatch.setattr("dva_sim.core.store.OPEN_WITHIN", 0.01)
     other = sqlite3.connect(file, isolation_level=None)
     other.execute("BEGIN EXCLUSIVE")
-    assert refusal(file) == "cannot be used as the DVA's memory: database is locked"
+    assert refusal(file).endswith(": database is locked")
     other.close()
 
 
@@ -388,21 +381,19 @@ def test_a_file_that_another_holds_cannot_be_opened(
         "DROP TABLE grants",
     ],
 )
-def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(
-    file: Path, damage: str
-) -> None:
+def test_a_memory_whose_content_makes_no_sense_is_refused_in_one_line(file, damage):
     office, memory = Office(), Store(file)
     office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"))
     office.fire(12)
     keep(office, memory)
     memory._file.execute(damage)
-    with pytest.raises(ConfigError, match="cannot be used as the DVA's memory") as refused:
+    with pytest.raises(ConfigError, match="DVA's memory") as refused:
         memory.recall(office.new_desk(), 0.0)
     assert "\n" not in str(refused.value)
     memory.close()
 
 
-def test_a_label_of_any_letters_is_kept_as_it_is(file: Path) -> None:
+def test_a_label_of_any_letters_is_kept_as_it_is(file):
     office, memory = Office(), Store(file)
     office.say(GUARD, m.Registration("Zoë's 'guard' \U0001f525 \"1\"", "Guard", ADDRESS))
     keep(office, memory)

@@ -119,5 +119,5 @@ def test_an_installed_package_can_offer_policies(monkeypatch):
     monkeypatch.setattr(plugins, "entry_points", offered)
     assert isinstance(load_policy("theirs"), MinEta)
     assert {"theirs", "min_eta"} < set(known_policies())
-    with pytest.raises(ConfigError, match="no_such_package:X cannot be loaded: ModuleNotFound"):
+    with pytest.raises(ConfigError, match=r"no_such_package:X .*ModuleNotFound"):
         load_policy("gone")

@@ -36,7 +36,7 @@ def test_what_nobody_can_go_to_is_left_out():
 
 
 def test_events_out_of_order_are_refused():
-    with pytest.raises(ValueError, match="in order of release"):
+    with pytest.raises(ValueError, match="order of release"):
         instance([5, 4], [[1], [1]], [[2], [2]])
 
 
@@ -115,9 +115,9 @@ def test_a_unit_waits_for_what_its_plan_serves_first():
 
 
 def test_it_cannot_be_made_without_foresight():
-    with pytest.raises(ConfigError, match="knowledge of the future"):
+    with pytest.raises(ConfigError, match="the future"):
         OraclePolicy()
-    with pytest.raises(ConfigError, match="the plan is for 1 units; given 2"):
+    with pytest.raises(ConfigError, match="1 units; given 2"):
         OraclePolicy(solve(HOLD), ("a", "b"))
 
 
