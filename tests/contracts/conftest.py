@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from helpers.network.transports import GUARD, NODES, VIRTUAL, SocketWorld, VirtualWorld, World
+from helpers.network.transports import (
+    GUARD,
+    LOSSY,
+    NODES,
+    VIRTUAL,
+    SocketWorld,
+    VirtualWorld,
+    World,
+)
 
 from dva_sim.network.keys import KeyRing, create_keys
 
@@ -15,9 +23,6 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     folder = tmp_path_factory.mktemp("keys")
     create_keys(folder, [*NODES, GUARD])
     return KeyRing(folder)
-
-
-LOSSY = "virtual segments with loss"  # what is promised, TCP keeps through losses
 
 
 @pytest.fixture(params=[*VIRTUAL, LOSSY, "sockets", "sockets with keys"])

@@ -27,8 +27,6 @@ from helpers.processes.search_settings import search
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dva_sim.network.keys import KeyRing
-
 pytestmark = pytest.mark.contract
 
 plans = st.builds(Plan, st.floats(0, 0.9), st.floats(0, 1), st.floats(0, 5 * BRIEF))
@@ -64,22 +62,19 @@ def ask_in_trouble(
 
 
 @pytest.mark.parametrize("kind", VIRTUAL)
-@search()
+@search(40)
 @given(
     seed=st.integers(0, 2**32),
     plan=plans,
     window=st.integers(1, 8),
     attempts=st.integers(1, 4),
 )
-def test_each_request_ends_once_in_virtual_time(
-    kind: str, seed: int, plan: Plan, window: int, attempts: int
-) -> None:
+def test_each_request_ends_once_in_virtual_time(kind, seed, plan, window, attempts):
     ask_in_trouble(VirtualWorld(VIRTUAL[kind]()), seed, plan, window, attempts)
 
 
-@pytest.mark.parametrize("window", [1, 3])
-@pytest.mark.parametrize("keys", [False, True], ids=["plain", "with keys"])
-def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: bool) -> None:
+@pytest.mark.parametrize(("window", "keys"), [(1, False), (3, True)], ids=["plain", "with keys"])
+def test_each_request_ends_once_over_sockets(ring, window, keys):
     world = SocketWorld(ring if keys else None)
     try:
         plan = Plan(lose=0.25, double=0.5, hold=1.5 * BRIEF)
@@ -89,7 +84,7 @@ def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: b
 
 
 @pytest.mark.parametrize("kind", VIRTUAL)
-@search(50)
+@search(25)
 @given(
     seed=st.integers(0, 2**32),
     absences=st.lists(
@@ -98,8 +93,8 @@ def test_each_request_ends_once_over_sockets(ring: KeyRing, window: int, keys: b
     window=st.integers(1, 4),
 )
 def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
-    kind: str, seed: int, absences: list[tuple[str, float, float]], window: int
-) -> None:
+    kind, seed, absences, window
+):
     world = VirtualWorld(VIRTUAL[kind]())
     for node, at, duration in absences:
         world.clock.call_at(at, world.leave, node)
@@ -107,11 +102,8 @@ def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
     ask_in_trouble(world, seed, Plan(lose=0.1, double=0.3, hold=BRIEF), window)
 
 
-@pytest.mark.parametrize("window", [1, 3])
-@pytest.mark.parametrize("keys", [False, True], ids=["plain", "with keys"])
-def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(
-    ring: KeyRing, window: int, keys: bool
-) -> None:
+@pytest.mark.parametrize(("window", "keys"), [(1, False), (3, True)], ids=["plain", "with keys"])
+def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(ring, window, keys):
     world = SocketWorld(ring if keys else None)
     try:
         for at in (0.3, 0.9):

@@ -61,7 +61,7 @@ class Acting:
         return m.Reply(message.message_id, m.OK, "")
 
 
-def test_a_request_that_is_sent_again_or_doubled_acts_once(world: World) -> None:
+def test_a_request_that_is_sent_again_or_doubled_acts_once(world):
     robot = Acting(world, Meddler(world.clock, 1, TROUBLE))
     ends: dict[tuple[str, int], list[m.Reply | None]] = {}
     for node in (PHONE, TABLET, DVA):
@@ -79,7 +79,7 @@ def test_a_request_that_is_sent_again_or_doubled_acts_once(world: World) -> None
             assert robot.acts[node, number] == 1
 
 
-def test_an_emergency_acts_whenever_it_comes(world: World) -> None:
+def test_an_emergency_acts_whenever_it_comes(world):
     """A button may send the same bytes all its life; other requests of the same bytes act once."""
     robot = Acting(world)
     button = Asker(world.network)
@@ -93,7 +93,7 @@ def test_an_emergency_acts_whenever_it_comes(world: World) -> None:
     assert {code_of(reply) for ends in button.ends.values() for reply in ends} == {m.OK}
 
 
-def test_an_emergency_does_not_wait_behind_a_request_that_is_not_answered(world: World) -> None:
+def test_an_emergency_does_not_wait_behind_a_request_that_is_not_answered(world):
     robot, phone = Acting(world), small_device(world, PHONE)
 
     def answer_emergencies(request: Request) -> None:
@@ -110,9 +110,7 @@ def test_an_emergency_does_not_wait_behind_a_request_that_is_not_answered(world:
     assert len(robot.acts) == 1
 
 
-def test_a_device_registers_as_soon_as_the_dva_is_there(
-    world: World, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_device_registers_as_soon_as_the_dva_is_there(world, monkeypatch):
     monkeypatch.setattr(device, "REGISTER_AGAIN", BRIEF)
     robot = small_device(world, ROBOT, BRIEF)
     known: list[str] = []
@@ -137,7 +135,7 @@ def test_a_device_registers_as_soon_as_the_dva_is_there(
 # --- whose key it is ----------------------------------------------------------------------
 
 
-def test_who_speaks_for_another_is_refused_where_there_are_keys(world: World) -> None:
+def test_who_speaks_for_another_is_refused_where_there_are_keys(world):
     robot = Acting(world)
     impostor = Asker(world.network, node=TABLET)
     impostor.ask(Outbox(PHONE).encode(ROBOT, m.StopTeleOp(), 0.0))
@@ -150,7 +148,7 @@ def test_who_speaks_for_another_is_refused_where_there_are_keys(world: World) ->
 
 
 @pytest.mark.invariant("S5")
-def test_an_emergency_is_obeyed_whoever_it_says_it_is_from(world: World) -> None:
+def test_an_emergency_is_obeyed_whoever_it_says_it_is_from(world):
     robot = Acting(world)
     impostor = Asker(world.network, node=TABLET)
     impostor.ask(Outbox(PHONE).encode(ROBOT, m.Emergency(), 0.0))
@@ -159,7 +157,7 @@ def test_an_emergency_is_obeyed_whoever_it_says_it_is_from(world: World) -> None
     assert robot.acts == {(PHONE, 1): 1}
 
 
-def test_a_reply_in_the_name_of_another_is_not_believed(world: World) -> None:
+def test_a_reply_in_the_name_of_another_is_not_believed(world):
     """Whatever the transport, who was asked must be who answers."""
     phone, said = small_device(world, PHONE), Outbox(TABLET)
     world.serve(
@@ -284,9 +282,7 @@ def check_what_was_obeyed(robot: DrivenRobot) -> None:
     ],
     ids=["published", "pipelined", "one at a time"],
 )
-def test_a_robot_obeys_only_new_commands_however_they_are_delayed(
-    world: World, pattern: str, codes: set[int]
-) -> None:
+def test_a_robot_obeys_only_new_commands_however_they_are_delayed(world, pattern, codes):
     robot = DrivenRobot(world)
     window = 4 if pattern == "pipelined" else 1
     requester = Requester(world.network, PHONE, ROBOT, BRIEF, window=window)
@@ -317,7 +313,7 @@ def _answers(reply: bytes) -> int:
 
 
 @pytest.mark.invariant("S3")
-def test_after_an_emergency_nothing_that_was_held_back_moves_the_robot(world: World) -> None:
+def test_after_an_emergency_nothing_that_was_held_back_moves_the_robot(world):
     robot = DrivenRobot(world)
     robot.await_publications()
     robot.meddler.plan = Plan(double=0.5, hold=0.2)

@@ -77,9 +77,7 @@ def site_with(
     return site, device
 
 
-def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
-    world: World, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(world, monkeypatch):
     site, phone = site_with(PHONE, world, monkeypatch)
     site.beating.add(PHONE)
     site.hears(PHONE)
@@ -97,9 +95,7 @@ def test_who_falls_silent_is_left_and_heard_again_from_its_next_word_on(
     assert not site.is_silent(PHONE)
 
 
-def test_who_is_forgotten_learns_that_and_registers_again(
-    world: World, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_is_forgotten_learns_that_and_registers_again(world, monkeypatch):
     site, phone = site_with(PHONE, world, monkeypatch)
     site.be_quick()
     world.run_until(lambda: PHONE not in site.entries)
@@ -112,9 +108,7 @@ def test_who_is_forgotten_learns_that_and_registers_again(
     assert codes == [m.NOT_REGISTERED, m.OK]
 
 
-def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(
-    world: World, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_device_was_asked_before_it_was_forgotten_has_failed(world, monkeypatch):
     site, _ = site_with(ROBOT, world, monkeypatch)
     world.leave(ROBOT)
     failed: list[bool] = []
@@ -129,7 +123,7 @@ FILES = Path("/proc/self/fd")
 
 
 @pytest.mark.skipif(not FILES.exists(), reason="no list of open files")
-def test_waves_of_devices_that_vanish_leave_no_file_open(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waves_of_devices_that_vanish_leave_no_file_open(monkeypatch):
     world = SocketWorld()
     try:
         site = Site(world, monkeypatch)
@@ -146,9 +140,7 @@ def memory() -> float:
 
 
 @pytest.mark.skipif(not FILES.exists(), reason="no list of memory")
-def test_the_memory_of_connections_that_are_closed_goes_back(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_memory_of_connections_that_are_closed_goes_back(monkeypatch):
     monkeypatch.setattr(sockets, "GIVE_BACK", 0.1)
     network = sockets.SocketNetwork(LiveClock())
     try:

@@ -54,9 +54,7 @@ def others_are_served(world: SocketWorld) -> None:
 
 
 @pytest.mark.parametrize("form", BAD_FORMS)
-def test_a_request_of_any_number_of_frames_but_one_is_a_bad_message(
-    served: SocketWorld, form: str
-) -> None:
+def test_a_request_of_any_number_of_frames_but_one_is_a_bad_message(served, form):
     program = served.program(zmq.DEALER, DVA)
     program.send_multipart([b"tag", b"", *BAD_FORMS[form]])
     *route, reply = served.receive(program)
@@ -68,7 +66,7 @@ def test_a_request_of_any_number_of_frames_but_one_is_a_bad_message(
 
 
 @pytest.mark.invariant("S11")
-def test_a_request_without_an_empty_frame_is_dropped_and_counted(served: SocketWorld) -> None:
+def test_a_request_without_an_empty_frame_is_dropped_and_counted(served):
     program = served.program(zmq.DEALER, DVA)
     for frames in ([b"x"], [b"a", b"b"], numbered(1000)):
         program.send_multipart(frames)
@@ -77,7 +75,7 @@ def test_a_request_without_an_empty_frame_is_dropped_and_counted(served: SocketW
     assert program.poll(0) == 0
 
 
-def test_a_route_of_a_thousand_frames_is_given_back(served: SocketWorld) -> None:
+def test_a_route_of_a_thousand_frames_is_given_back(served):
     program = served.program(zmq.DEALER, DVA)
     route = numbered(1000, "hop")
     program.send_multipart([*route, b"", b"<msg>"])
@@ -89,7 +87,7 @@ def test_a_route_of_a_thousand_frames_is_given_back(served: SocketWorld) -> None
 @pytest.mark.parametrize(
     "data", [b"", b"\0", b"<msg/>", b"<!DOCTYPE x><msg/>", b"\xff" * 9000, b"x" * (LARGEST - 100)]
 )
-def test_bytes_that_are_no_message_are_refused_in_words(served: SocketWorld, data: bytes) -> None:
+def test_bytes_that_are_no_message_are_refused_in_words(served, data):
     program = served.program(zmq.REQ, DVA)
     program.send(data)
     body = decode(served.receive(program)[0]).body
@@ -98,9 +96,7 @@ def test_bytes_that_are_no_message_are_refused_in_words(served: SocketWorld, dat
     others_are_served(served)
 
 
-def test_who_sends_more_than_64_kilobytes_is_cut_off_and_others_are_served(
-    served: SocketWorld,
-) -> None:
+def test_who_sends_more_than_64_kilobytes_is_cut_off_and_others_are_served(served):
     program = served.program(zmq.DEALER, DVA)
     monitor = program.get_monitor_socket(zmq.EVENT_DISCONNECTED)
     program.send_multipart([b"", b"x" * (LARGEST + 1)])
@@ -112,7 +108,7 @@ def test_who_sends_more_than_64_kilobytes_is_cut_off_and_others_are_served(
 
 
 @WINDOWS
-def test_a_reply_of_more_than_64_kilobytes_is_none(sockets: SocketWorld, window: int) -> None:
+def test_a_reply_of_more_than_64_kilobytes_is_none(sockets, window):
     sockets.serve(ROBOT, lambda request: request.answer(bytes(LARGEST + 1)))
     sockets.serve(DVA, echo)
     asker = Asker(sockets.network, BRIEF, window, peer=ROBOT)
@@ -143,9 +139,7 @@ GARBAGE = {
 
 @pytest.mark.parametrize("kind", GARBAGE)
 @pytest.mark.parametrize("published", [False, True], ids=["requests", "publications"])
-def test_whatever_speaks_no_zeromq_at_a_port_harms_nobody(
-    served: SocketWorld, talkers: ExitStack, kind: str, published: bool
-) -> None:
+def test_whatever_speaks_no_zeromq_at_a_port_harms_nobody(served, talkers, kind, published):
     """Twenty connections stay open all the time."""
     for _ in range(20):
         line = tcp.create_connection(("127.0.0.1", served.port(DVA, published)), timeout=PATIENCE_S)
@@ -158,9 +152,7 @@ def test_whatever_speaks_no_zeromq_at_a_port_harms_nobody(
 # --- services of other programs -----------------------------------------------------------
 
 
-def test_replies_of_another_form_are_none_and_the_right_one_still_counts(
-    sockets: SocketWorld,
-) -> None:
+def test_replies_of_another_form_are_none_and_the_right_one_still_counts(sockets):
     program = sockets.replace(GUARD, zmq.ROUTER)
     asker = Asker(sockets.network, window=4, peer=GUARD)
     asker.ask(b"well?")
@@ -184,9 +176,7 @@ ROUTELESS = {"an empty frame": [b""], "a word": [b"x"], "1000 frames": numbered(
 
 
 @pytest.mark.parametrize("form", BAD_FORMS | ROUTELESS)
-def test_one_at_a_time_a_reply_of_another_form_costs_no_more_than_an_attempt(
-    sockets: SocketWorld, form: str
-) -> None:
+def test_one_at_a_time_a_reply_of_another_form_costs_no_more_than_an_attempt(sockets, form):
     """ZeroMQ hangs up on some, and takes others for the reply: the next attempt mends it."""
     program = sockets.replace(GUARD, zmq.ROUTER)
     asker = Asker(sockets.network, BRIEF, attempts=1000, peer=GUARD)
@@ -202,7 +192,7 @@ def test_one_at_a_time_a_reply_of_another_form_costs_no_more_than_an_attempt(
     assert asker.replies() == [b"well."]
 
 
-def test_a_program_of_fifteen_lines_is_served(sockets: SocketWorld) -> None:
+def test_a_program_of_fifteen_lines_is_served(sockets):
     """REQ without any options, as the specification describes it."""
     sockets.serve(PHONE, echo)
     program = sockets.program(zmq.REQ, PHONE)

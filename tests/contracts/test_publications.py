@@ -18,7 +18,6 @@ from helpers.network.transports import (
     Listener,
     Meddler,
     Plan,
-    SocketWorld,
     VirtualWorld,
     World,
     echo,
@@ -40,7 +39,7 @@ def publish(world: World, topic: str, *payloads: bytes, node: str = PHONE) -> No
         world.network.publish(node, topic, payload, len(payload))
 
 
-def test_subscribers_get_everything_once_and_in_order(world: World) -> None:
+def test_subscribers_get_everything_once_and_in_order(world):
     listeners = [Listener(world, "robot-1|", node=node) for node in (ROBOT, TABLET, DVA)]
     for listener in listeners:
         listener.await_a_mark()
@@ -51,7 +50,7 @@ def test_subscribers_get_everything_once_and_in_order(world: World) -> None:
         assert listener.got == numbered(500)
 
 
-def test_topics_do_not_match_by_accident(world: World) -> None:
+def test_topics_do_not_match_by_accident(world):
     one, ten = Listener(world, "robot-1|"), Listener(world, "robot-10|")
     one.await_a_mark()
     ten.await_a_mark()
@@ -63,7 +62,7 @@ def test_topics_do_not_match_by_accident(world: World) -> None:
     assert ten.got == [b"robot-10|"]
 
 
-def test_who_wants_a_prefix_gets_all_that_begin_with_it(world: World) -> None:
+def test_who_wants_a_prefix_gets_all_that_begin_with_it(world):
     everything, robots = Listener(world, ""), Listener(world, "robot-1")
     everything.await_a_mark()
     robots.await_a_mark()
@@ -76,7 +75,7 @@ def test_who_wants_a_prefix_gets_all_that_begin_with_it(world: World) -> None:
     assert robots.got == [b"robot-1|", b"robot-10|"]
 
 
-def test_two_subscriptions_of_one_node_to_one_topic_both_hear_it(world: World) -> None:
+def test_two_subscriptions_of_one_node_to_one_topic_both_hear_it(world):
     pair = [Listener(world, "news|"), Listener(world, "news|")]
     for listener in pair:
         listener.await_a_mark()
@@ -90,7 +89,7 @@ def test_two_subscriptions_of_one_node_to_one_topic_both_hear_it(world: World) -
     assert pair[1].got == [b"extra", b"late edition"]
 
 
-def test_to_publish_to_nobody_does_no_harm(world: World) -> None:
+def test_to_publish_to_nobody_does_no_harm(world):
     publish(world, "news|", *numbered(3000))
     publish(world, "news|", b"from nobody", node=STRANGER)
     assert not world.network.ready(PHONE, "news|", 10)
@@ -102,7 +101,7 @@ def test_to_publish_to_nobody_does_no_harm(world: World) -> None:
     assert listener.got == [b"extra"]
 
 
-def test_a_publisher_knows_whether_somebody_wants_a_topic(world: World) -> None:
+def test_a_publisher_knows_whether_somebody_wants_a_topic(world):
     listener = Listener(world, "frame|")
     listener.await_a_mark()
     world.run_until(lambda: world.network.ready(PHONE, "frame|", 10))
@@ -111,7 +110,7 @@ def test_a_publisher_knows_whether_somebody_wants_a_topic(world: World) -> None:
     world.run_until(lambda: not world.network.ready(PHONE, "frame|", 10))
 
 
-def test_a_subscription_to_nobody_hears_nothing_and_harms_nobody(world: World) -> None:
+def test_a_subscription_to_nobody_hears_nothing_and_harms_nobody(world):
     lost = Listener(world, "news|", publisher=STRANGER)
     well = Listener(world, "news|")
     well.await_a_mark()
@@ -122,7 +121,7 @@ def test_a_subscription_to_nobody_hears_nothing_and_harms_nobody(world: World) -
     assert well.got == [b"extra"]
 
 
-def test_a_subscription_works_again_when_its_publisher_is_back(world: World) -> None:
+def test_a_subscription_works_again_when_its_publisher_is_back(world):
     listener = Listener(world, "news|")
     listener.await_a_mark()
     publish(world, "news|", *numbered(3, "before"))
@@ -138,7 +137,7 @@ def test_a_subscription_works_again_when_its_publisher_is_back(world: World) -> 
     assert listener.got == [*numbered(3, "before"), *after]
 
 
-def test_who_never_left_and_comes_back_loses_nothing() -> None:
+def test_who_never_left_and_comes_back_loses_nothing():
     world = VirtualWorld()
     listener = Listener(world, "news|")
     listener.await_a_mark()
@@ -148,9 +147,7 @@ def test_who_never_left_and_comes_back_loses_nothing() -> None:
     assert listener.got == numbered(10)
 
 
-def test_a_subscription_made_while_its_publisher_is_away_works_when_it_is_back(
-    world: World,
-) -> None:
+def test_a_subscription_made_while_its_publisher_is_away_works_when_it_is_back(world):
     world.leave(PHONE)
     listener = Listener(world, "news|")
     world.run_for(0.05)
@@ -161,7 +158,7 @@ def test_a_subscription_made_while_its_publisher_is_away_works_when_it_is_back(
     assert listener.got == [b"extra"]
 
 
-def test_nothing_comes_after_a_subscription_is_closed(world: World) -> None:
+def test_nothing_comes_after_a_subscription_is_closed(world):
     closing, other = Listener(world, "news|"), Listener(world, "news|")
     closing.await_a_mark()
     other.await_a_mark()
@@ -177,7 +174,7 @@ def test_nothing_comes_after_a_subscription_is_closed(world: World) -> None:
     closing.subscription.close()  # once more does no harm
 
 
-def test_who_closes_in_the_middle_of_a_publication_hears_nothing_more(world: World) -> None:
+def test_who_closes_in_the_middle_of_a_publication_hears_nothing_more(world):
     got: list[bytes] = []
 
     def first(payload: bytes) -> None:
@@ -193,7 +190,7 @@ def test_who_closes_in_the_middle_of_a_publication_hears_nothing_more(world: Wor
     assert other.got == numbered(100)
 
 
-def test_meddled_publications_are_those_that_were_made(world: World) -> None:
+def test_meddled_publications_are_those_that_were_made(world):
     got: list[bytes] = []
     meddler = Meddler(world.clock, 1, Plan(lose=0.2, double=0.2, hold=0.1))
     listener = Listener(world, "news|", meddler.handler(got.append))
@@ -229,7 +226,7 @@ EMERGENCY = encode(m.Message(ROBOT, 9, TABLET, "12:00:00", 0, m.Emergency()))
 COMMANDS = numbered(40, "<SetTeleOp>")
 
 
-def test_a_slow_subscriber_gets_the_newest_where_the_latest_wins(world: World) -> None:
+def test_a_slow_subscriber_gets_the_newest_where_the_latest_wins(world):
     robot = SlowRobot(world, latest_wins=True)
     publish(world, "robot|", *COMMANDS)
     world.run_until(lambda: robot.done and robot.done[-1] == COMMANDS[-1])
@@ -237,7 +234,7 @@ def test_a_slow_subscriber_gets_the_newest_where_the_latest_wins(world: World) -
     assert robot.inbox.superseded == 40 - len(robot.done) > 0
 
 
-def test_a_slow_subscriber_gets_everything_in_order_where_nothing_is_dropped(world: World) -> None:
+def test_a_slow_subscriber_gets_everything_in_order_where_nothing_is_dropped(world):
     robot = SlowRobot(world, latest_wins=False)
     publish(world, "robot|", *COMMANDS)
     world.run_until(lambda: len(robot.done) == 40)
@@ -246,9 +243,7 @@ def test_a_slow_subscriber_gets_everything_in_order_where_nothing_is_dropped(wor
 
 
 @pytest.mark.parametrize("latest_wins", [True, False])
-def test_requests_overtake_what_is_published_and_emergencies_overtake_both(
-    world: World, latest_wins: bool
-) -> None:
+def test_requests_overtake_what_is_published_and_emergencies_overtake_both(world, latest_wins):
     robot = SlowRobot(world, latest_wins)
     control = Asker(world.network, window=5)
     emergency = Asker(world.network)
@@ -275,7 +270,7 @@ def test_requests_overtake_what_is_published_and_emergencies_overtake_both(
 # --- other programs -----------------------------------------------------------------------
 
 
-def test_publications_of_another_form_are_dropped_and_counted(sockets: SocketWorld) -> None:
+def test_publications_of_another_form_are_dropped_and_counted(sockets):
     program = sockets.replace(GUARD, zmq.PUB, published=True)
     listener = Listener(sockets, "news|", publisher=GUARD)
 
@@ -293,7 +288,7 @@ def test_publications_of_another_form_are_dropped_and_counted(sockets: SocketWor
     assert sockets.network.counters["publications of another form"] == 3
 
 
-def test_what_is_said_to_a_publisher_does_no_harm(sockets: SocketWorld) -> None:
+def test_what_is_said_to_a_publisher_does_no_harm(sockets):
     """A subscriber says what it wants, and nothing keeps it from saying anything else."""
     program = sockets.program(zmq.XSUB, PHONE, published=True)
     for said in (b"", b"\x02", b"\x00never wanted", b"\x01\xff\xfe", b"\xff" * 60_000):
@@ -307,7 +302,7 @@ def test_what_is_said_to_a_publisher_does_no_harm(sockets: SocketWorld) -> None:
     assert listener.got == [b"extra"]
 
 
-def test_every_node_publishes_and_serves_at_once(world: World) -> None:
+def test_every_node_publishes_and_serves_at_once(world):
     listeners = [
         Listener(world, "news|", node=a, publisher=b) for a in NODES for b in NODES if a != b
     ]

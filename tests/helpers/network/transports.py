@@ -53,6 +53,8 @@ VIRTUAL: dict[str, Callable[[], Connector]] = {
 }
 """What carries messages in virtual time."""
 
+LOSSY = "virtual segments with loss"  # what is promised, TCP keeps through losses
+
 
 class World:
     """Four nodes that can ask and tell each other."""
