@@ -1,6 +1,7 @@
 """What holds of the modules of the program, whatever is in them."""
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -34,22 +35,30 @@ def imports_of(nodes: Iterable[ast.AST]) -> Iterator[str]:
             yield from (name.name for name in node.names if name.name in MODULES)
 
 
-def imported(path: Path) -> Iterator[str]:
-    """Every module of ours that a file imports: also inside functions, also for types alone."""
-    return imports_of(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def late_in(path: Path) -> list[ast.ImportFrom]:
+    """The imports of ours inside functions and below conditions."""
+    if not re.search(r"^ +(from|import) dva_sim", path.read_text(encoding="utf-8"), re.MULTILINE):
+        return []
+    inner = [node for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom)]
+    return [node for node in inner if node.col_offset and set(imports_of([node]))]
 
 
 @cache
 def imported_early() -> dict[str, set[str]]:
     """What each module imports when it is imported."""
-    return {
-        name: set(imports_of(ast.parse(path.read_text(encoding="utf-8")).body))
-        for name, path in MODULES.items()
-    }
+    return {name: set(imports_of(tree_of(path).body)) for name, path in MODULES.items()}
 
 
 def test_no_module_is_part_of_a_circle_of_imports():
-    graph = {name: set(imported(path)) - {name} for name, path in MODULES.items()}
+    early = imported_early()
+    graph = {name: {*early[name], *imports_of(late_in(path))} for name, path in MODULES.items()}
+    graph = {name: imported - {name} for name, imported in graph.items()}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -60,13 +69,10 @@ def test_a_late_import_is_for_start_up_and_says_so():
     """One of what is loaded by then anyway would save nothing."""
     early, late = imported_early(), []
     for name, path in MODULES.items():
-        text = path.read_text(encoding="utf-8")
-        tree, lines = ast.parse(text), text.splitlines()
+        lines = path.read_text(encoding="utf-8").splitlines()
+        typing = for_types(path) if late_in(path) else set()
         late += [
-            (name, node, lines[node.lineno - 1])
-            for node in ast.walk(tree)
-            if isinstance(node, ast.ImportFrom) and node.col_offset and set(imports_of([node]))
-            if not is_for_types(node, tree)
+            (name, node, lines[node.lineno - 1]) for node in late_in(path) if node not in typing
         ]
     unmarked = [f"{name}:{node.lineno}" for name, node, line in late if MARK not in line]
     assert unmarked == []
@@ -83,13 +89,14 @@ def test_a_late_import_is_for_start_up_and_says_so():
 MARK = "# late: start-up"
 
 
-def is_for_types(wanted: ast.AST, tree: ast.Module) -> bool:
-    """Whether an import stands below `if TYPE_CHECKING`."""
-    return any(
-        wanted in ast.walk(node)
-        for node in ast.walk(tree)
+def for_types(path: Path) -> set[ast.AST]:
+    """All that stands below `if TYPE_CHECKING`."""
+    return {
+        inner
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    )
+        for inner in ast.walk(node)
+    }
 
 
 def loaded_with(name: str, early: dict[str, set[str]]) -> set[str]:
@@ -123,7 +130,7 @@ def test_no_module_is_longer_than_600_lines():
 def test_a_public_class_name_means_one_thing():
     homes = defaultdict(list)
     for name, path in MODULES.items():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree_of(path).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes[node.name].append(name)
     assert {name for name, rooms in homes.items() if len(rooms) > 1} == set(SHARED_NAMES)
@@ -132,4 +139,4 @@ def test_a_public_class_name_means_one_thing():
 def test_each_package_says_what_it_is():
     for name, path in MODULES.items():
         if path.name == "__init__.py":
-            assert ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))), name
+            assert ast.get_docstring(tree_of(path)), name
