@@ -15,8 +15,6 @@ name of its module first. Two copies of the working tree are at work side by sid
 as noticed if a test fails, or if they all take longer than `PATIENCE_S`.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import hashlib

@@ -1,7 +1,5 @@
 """Lanes past others, who goes first, and where to step aside: a corridor of 2.4 m along x."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -30,7 +28,7 @@ def choose(avoidance: Avoidance, *others: Nearby, last: float = 0.0) -> Lane | B
     return avoidance.lane(ROUTE, HERE[0], HERE, others, last)
 
 
-def test_with_nobody_in_the_way_the_lane_is_the_planned_way() -> None:
+def test_with_nobody_in_the_way_the_lane_is_the_planned_way():
     lane = choose(corridor(), robot(1, 5.0, 3.0))
     assert isinstance(lane, Lane)
     assert lane.side == 0.0
@@ -38,27 +36,27 @@ def test_with_nobody_in_the_way_the_lane_is_the_planned_way() -> None:
 
 
 @pytest.mark.parametrize("vx", [0.0, -0.5])
-def test_who_stands_or_comes_in_the_middle_is_passed_on_the_right(vx: float) -> None:
+def test_who_stands_or_comes_in_the_middle_is_passed_on_the_right(vx):
     lane = choose(corridor(), robot(1, 5.0, 0.0, vx))
     assert isinstance(lane, Lane)
     assert -0.85 < lane.side < -0.6
     assert np.abs(lane.points[:, 1]).max() <= HALF - 0.30
 
 
-def test_who_is_on_the_right_is_passed_on_the_left() -> None:
+def test_who_is_on_the_right_is_passed_on_the_left():
     lane = choose(corridor(), robot(1, 5.0, -0.6))
     assert isinstance(lane, Lane)
     assert lane.side > 0.0
 
 
-def test_a_choice_is_kept_while_it_is_as_good() -> None:
+def test_a_choice_is_kept_while_it_is_as_good():
     """Both sides are free: who has begun to pass on the left goes on there."""
     lane = choose(corridor(), robot(1, 5.0, 0.0), last=0.7)
     assert isinstance(lane, Lane)
     assert lane.side > 0.6
 
 
-def test_two_who_meet_choose_sides_that_suit_each_other() -> None:
+def test_two_who_meet_choose_sides_that_suit_each_other():
     mine = choose(corridor("robot-1"), robot(2, 5.0, 0.0, -0.5))
     back = Route(np.array([[20.0, 0.0], [0.0, 0.0]]))
     other = corridor("robot-2").lane(back, 15.0, (5.0, 0.0), [robot(1, 2.0, 0.0, 0.5)], 0.0)
@@ -68,14 +66,14 @@ def test_two_who_meet_choose_sides_that_suit_each_other() -> None:
     assert other.points[:, 1].max() > 0.6
 
 
-def test_in_a_corridor_of_one_and_a_half_metres_nobody_can_be_passed() -> None:
+def test_in_a_corridor_of_one_and_a_half_metres_nobody_can_be_passed():
     blocked = choose(corridor(half=0.75), robot(1, 5.0, 0.0))
     assert isinstance(blocked, Blocked)
     assert blocked.by.name == "robot-1"
     assert blocked.distance == pytest.approx(5.0 - 2.0 - 0.60 - KEEP_ROBOT, abs=0.25)
 
 
-def test_people_are_given_more_room_than_robots() -> None:
+def test_people_are_given_more_room_than_robots():
     """0.82 m to the side leaves a robot 0.22 m and a person 0.27 m: enough for one alone."""
     assert isinstance(choose(corridor(), robot(1, 5.0, 0.0)), Lane)
     blocked = choose(corridor(), person(5.0, 0.0))
@@ -83,7 +81,7 @@ def test_people_are_given_more_room_than_robots() -> None:
     assert isinstance(choose(corridor(), person(5.0, 0.95)), Lane)
 
 
-def test_who_goes_first() -> None:
+def test_who_goes_first():
     wide, narrow = corridor("robot-5"), corridor("robot-5", half=0.55)
     assert wide.yields_to(HERE, [person(5.0, 0.0)]) == [True]
     assert wide.yields_to(HERE, [robot(4, 5.0, 0.0)]) == [True]
@@ -92,7 +90,7 @@ def test_who_goes_first() -> None:
     assert narrow.yields_to(HERE, [robot(4, 5.0, 0.0)]) == [True]
 
 
-def test_who_is_in_the_narrow_part_goes_first_whatever_its_number() -> None:
+def test_who_is_in_the_narrow_part_goes_first_whatever_its_number():
     def door(points: np.ndarray) -> np.ndarray:
         return np.where(np.abs(points[:, 0] - 5.0) < 0.5, 0.55, 2.0)
 
@@ -101,7 +99,7 @@ def test_who_is_in_the_narrow_part_goes_first_whatever_its_number() -> None:
     assert inside.yields_to((5.0, 0.0), [robot(1, 2.0, 0.0)]) == [False]
 
 
-def test_a_refuge_is_beside_the_way_with_room_for_who_passes() -> None:
+def test_a_refuge_is_beside_the_way_with_room_for_who_passes():
     way = np.stack([np.arange(-4.0, 8.0, 0.2), np.zeros(60)], 1)
     place = corridor().refuge(HERE, way, [robot(1, 5.0, 0.0, -0.5)])
     assert place is not None
@@ -113,11 +111,11 @@ def test_a_refuge_is_beside_the_way_with_room_for_who_passes() -> None:
     ("gap", "speed"),
     [(SOCIAL, 0.5), (2.0, 0.5), (PERSONAL, CREEP), (0.1, CREEP), (0.825, (0.5 + CREEP) / 2)],
 )
-def test_beside_people_a_robot_slows_between_1_2_and_0_45_metres(gap: float, speed: float) -> None:
+def test_beside_people_a_robot_slows_between_1_2_and_0_45_metres(gap, speed):
     beside = person(0.0, 0.30 + 0.25 + gap)
     assert pace_among([beside], (0.0, 0.0), 0.30, 0.5) == pytest.approx(speed)
 
 
-def test_robots_slow_nobody_and_nobody_is_made_faster() -> None:
+def test_robots_slow_nobody_and_nobody_is_made_faster():
     assert pace_among([robot(1, 0.7, 0.0)], (0.0, 0.0), 0.30, 0.5) == 0.5
     assert pace_among([person(0.6, 0.0)], (0.0, 0.0), 0.30, 0.05) == 0.05

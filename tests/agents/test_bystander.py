@@ -1,7 +1,5 @@
 """People who work at a site and leave it when the alarm sounds or danger shows."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The collision guard: never faster, never turning, and able to stop before whatever is ahead."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -35,32 +33,32 @@ def somebody(x: float, y: float, keep: float = PERSONAL) -> Nearby:
 OPEN = before_a_wall(1e6)
 
 
-def test_in_the_open_a_command_passes_as_it_is() -> None:
+def test_in_the_open_a_command_passes_as_it_is():
     assert OPEN.limit((0.0, 0.0, 0.0), 0.5, 0.3) == 0.5
     assert OPEN.limit((0.0, 0.0, 0.0), 0.0, 0.3) == 0.0
 
 
 @pytest.mark.parametrize("gap", [0.05, 0.1, 0.2, 0.3, 0.4])
-def test_speed_falls_with_the_clearance_ahead(gap: float) -> None:
+def test_speed_falls_with_the_clearance_ahead(gap):
     guard = before_a_wall(RADIUS + KEEP_WALL + gap)
     speed = guard.limit((0.0, 0.0, 0.0), TOP, 0.0)
     assert 0.0 <= speed <= gap / TIME_TO_CONTACT + 1e-9
     assert guard.stopping_distance(speed) <= gap
 
 
-def test_far_enough_from_the_wall_it_may_go_at_full_speed() -> None:
+def test_far_enough_from_the_wall_it_may_go_at_full_speed():
     guard = before_a_wall(RADIUS + KEEP_WALL + TOP * TIME_TO_CONTACT + 0.1)
     assert guard.limit((0.0, 0.0, 0.0), TOP, 0.0) == TOP
 
 
-def test_at_the_wall_it_may_leave_but_not_go_on() -> None:
+def test_at_the_wall_it_may_leave_but_not_go_on():
     guard = before_a_wall(RADIUS + 0.005)
     assert guard.limit((0.0, 0.0, 0.0), TOP, 0.0) == 0.0
     assert guard.limit((0.0, 0.0, math.pi), TOP, 0.0) == TOP
     assert guard.limit((0.0, 0.0, math.pi / 2), TOP, 0.0) == TOP  # along the wall
 
 
-def test_it_is_the_arc_that_counts_not_the_heading() -> None:
+def test_it_is_the_arc_that_counts_not_the_heading():
     guard = before_a_wall(RADIUS + 0.2)
     straight = guard.limit((0.0, 0.0, math.pi / 3), 0.4, 0.0)
     away = guard.limit((0.0, 0.0, math.pi / 3), 0.4, 0.5)
@@ -68,7 +66,7 @@ def test_it_is_the_arc_that_counts_not_the_heading() -> None:
     assert towards < straight <= away == 0.4
 
 
-def test_a_robot_stops_before_a_person_and_passes_beside_one() -> None:
+def test_a_robot_stops_before_a_person_and_passes_beside_one():
     ahead, beside = somebody(1.05, 0.0), somebody(1.05, RADIUS + 0.25 + PERSONAL + 0.01)
     assert OPEN.limit((0.0, 0.0, 0.0), TOP, 0.0, [ahead]) < 0.06
     assert OPEN.limit((0.0, 0.0, 0.0), TOP, 0.0, [beside]) == TOP
@@ -81,11 +79,8 @@ poses = st.tuples(st.floats(0.0, 40.0), st.floats(0.0, 24.0), st.floats(-4.0, 4.
 @search(300)
 @given(poses, st.floats(0.0, TOP), st.floats(-0.6, 0.6), poses)
 def test_it_never_makes_anything_faster_and_what_it_allows_can_be_braked(
-    pose: tuple[float, float, float],
-    speed: float,
-    turn_rate: float,
-    other: tuple[float, float, float],
-) -> None:
+    pose, speed, turn_rate, other
+):
     guard = CollisionGuard(RADIUS, DECELERATION, map_of_caparica().room_at)
     others = [somebody(other[0], other[1])]
     allowed = guard.limit(pose, speed, turn_rate, others)
@@ -96,7 +91,7 @@ def test_it_never_makes_anything_faster_and_what_it_allows_can_be_braked(
 
 
 @pytest.mark.parametrize("speed", [math.nan, -0.3])
-def test_what_is_no_speed_is_none(speed: float) -> None:
+def test_what_is_no_speed_is_none(speed):
     assert OPEN.limit((0.0, 0.0, 0.0), speed, 0.0) == 0.0
 
 
@@ -120,7 +115,7 @@ def joystick(seed: int, guarded: bool) -> tuple[int, float, float]:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_whoever_drives_wildly_touches_nothing_with_the_guard_and_much_without(seed: int) -> None:
+def test_whoever_drives_wildly_touches_nothing_with_the_guard_and_much_without(seed):
     contacts, impulse, way = joystick(seed, guarded=True)
     assert (contacts, impulse) == (0, 0.0)
     assert way > 3.0

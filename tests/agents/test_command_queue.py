@@ -1,7 +1,5 @@
 """A robot's computer: what overtakes what, and what only pretends to."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """What a robot obeys, and what it refuses."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.permissions import confirmation, hear
 from helpers.paths import ROOT

@@ -1,7 +1,5 @@
 """What every device does with requests and replies, whatever carries them."""
 
-from __future__ import annotations
-
 import pytest
 
 from dva_sim.agents.device import AgentDevice, Handler

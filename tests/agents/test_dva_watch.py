@@ -1,7 +1,5 @@
 """Devices notice by its heartbeats that the DVA is gone, and go on with what they do."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.wording import counted
 
@@ -21,7 +19,7 @@ ROBOT = id_of("robot", 1)
 # --- what decides --------------------------------------------------------------------------
 
 
-def test_the_dva_is_silent_only_after_its_time_has_passed() -> None:
+def test_the_dva_is_silent_only_after_its_time_has_passed():
     watch = DvaWatch()
     watch.beat(5.0)
     assert not watch.look(5.0 + SILENT_AFTER)
@@ -34,7 +32,7 @@ def test_the_dva_is_silent_only_after_its_time_has_passed() -> None:
     assert not watch.silent
 
 
-def test_a_dva_that_has_never_published_a_heartbeat_is_judged_by_its_answers_alone() -> None:
+def test_a_dva_that_has_never_published_a_heartbeat_is_judged_by_its_answers_alone():
     watch = DvaWatch()
     watch.answered(1.0)
     assert not watch.look(1000.0)
@@ -45,7 +43,7 @@ def test_a_dva_that_has_never_published_a_heartbeat_is_judged_by_its_answers_alo
     assert not watch.silent
 
 
-def test_a_heartbeat_does_not_make_up_for_a_request_that_was_not_answered() -> None:
+def test_a_heartbeat_does_not_make_up_for_a_request_that_was_not_answered():
     watch = DvaWatch()
     watch.beat(1.0)
     watch.failed()
@@ -101,7 +99,7 @@ class Silenced:
         ]
 
 
-def test_everybody_says_that_the_dva_is_silent_and_that_it_is_back() -> None:
+def test_everybody_says_that_the_dva_is_silent_and_that_it_is_back():
     drill = Silenced()
     drill.until(20.0)
     assert drill.run.field.robots[ROBOT].device.dva_watch.beats
@@ -120,7 +118,7 @@ def test_everybody_says_that_the_dva_is_silent_and_that_it_is_back() -> None:
     assert not drill.run.recorder.violations
 
 
-def test_a_robot_registers_at_once_when_the_dva_is_back() -> None:
+def test_a_robot_registers_at_once_when_the_dva_is_back():
     """Its renewal waits at its socket until the DVA can be reached."""
     drill = Silenced()
     drill.until(21.0)
@@ -134,7 +132,7 @@ def test_a_robot_registers_at_once_when_the_dva_is_back() -> None:
     assert drill.told("robot-1", "hears the DVA again")
 
 
-def test_a_drive_goes_on_while_the_dva_is_silent() -> None:
+def test_a_drive_goes_on_while_the_dva_is_silent():
     drill = Silenced("drive-to-event")
     drill.until(1.0)
     while not (drives := drill.run.recorder.drives) or drives[0].started is None:
@@ -153,7 +151,7 @@ def forged() -> bytes:
 
 
 @pytest.mark.parametrize("by", ["the DVA", "another"])
-def test_forged_heartbeats_hide_a_silence_only_until_a_request_is_not_answered(by: str) -> None:
+def test_forged_heartbeats_hide_a_silence_only_until_a_request_is_not_answered(by):
     drill = Silenced()
     drill.until(20.0)
     drill.unplug()
@@ -172,7 +170,7 @@ def test_forged_heartbeats_hide_a_silence_only_until_a_request_is_not_answered(b
     assert drill.told("robot-1", "hears the DVA again") == []
 
 
-def test_no_heartbeat_feeds_the_watchdog_of_the_motors() -> None:
+def test_no_heartbeat_feeds_the_watchdog_of_the_motors():
     """The DVA's come all the time; a robot whose driver has gone stops all the same."""
     drill = Silenced("drive-to-event")
     drill.until(1.0)
@@ -188,6 +186,6 @@ def test_no_heartbeat_feeds_the_watchdog_of_the_motors() -> None:
     assert abs(robot.body.speed) < 0.01
 
 
-def test_a_heartbeat_of_the_dva_has_no_session() -> None:
+def test_a_heartbeat_of_the_dva_has_no_session():
     assert b"SessionID" not in forged()
     assert HEARTBEAT == "heartbeat|"

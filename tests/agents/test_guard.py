@@ -1,8 +1,6 @@
 """What a guard does for the DVA. It walks one metre a second, gets ready in 10 s, looks for 3 s
 and deals with something in 20 s; its post is at (1.4, 12), the west end of a straight corridor."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """When a robot asks the DVA what, and what an answer settles."""
 
-from __future__ import annotations
-
 import math
 import random
 

@@ -1,7 +1,5 @@
 """A robot in somebody's hand, at the robot itself: what the controller decides."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -4,8 +4,6 @@ The main corridor runs along y = 12 m; the door between control room and server 
 at (33.15, 18.2); the canteen has doors at (19.65, 10.8) and (26, 8.8).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ order, the robot has no owner but one that the DVA has given it and that it has 
 over; and once all is quiet, it has the one that the DVA has.
 """
 
-from __future__ import annotations
-
 import random
 from collections import deque
 

@@ -1,8 +1,6 @@
 """What an operator does when the DVA changes its mind. The robots stand in their bay, in the
 middle of the building; who drives is the first person of the population."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

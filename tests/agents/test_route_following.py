@@ -1,7 +1,5 @@
 """Where one is on a route: however finely it is cut, however seldom one looks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensor subscriptions: how often, for whom, how long."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

@@ -1,7 +1,5 @@
 """What sensors make of what is there: lag, noise, range, resolution; and how they fail."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -42,7 +40,7 @@ def grid(rate: float, seconds: float) -> list[float]:
     return [n / rate for n in range(round(seconds * rate))]
 
 
-def test_without_noise_it_shows_what_is_there_at_its_resolution_and_within_its_range() -> None:
+def test_without_noise_it_shows_what_is_there_at_its_resolution_and_within_its_range():
     made = sensor(lambda now: (20.0 + now, -500.0), resolution=0.5, low=-40.0)
     assert made.read(0.0) == (20.0, -40.0)
     assert made.read(0.3) == (20.5, -40.0)
@@ -50,14 +48,14 @@ def test_without_noise_it_shows_what_is_there_at_its_resolution_and_within_its_r
 
 
 @pytest.mark.parametrize("resolution", [1.0, 0.5, 0.1, 0.001, 0.0025])
-def test_values_are_spelt_with_no_more_digits_than_the_resolution_has(resolution: float) -> None:
+def test_values_are_spelt_with_no_more_digits_than_the_resolution_has(resolution):
     made = sensor(lambda now: (20.0 + now / 7,), resolution=resolution)
     for time in grid(10.0, 5.0):
         (value,) = made.read(time)
         assert len(repr(value).partition(".")[2]) <= max(1, math.ceil(-math.log10(resolution)))
 
 
-def test_noise_has_its_standard_deviation_and_no_bias() -> None:
+def test_noise_has_its_standard_deviation_and_no_bias():
     made = sensor(lambda now: (20.0,), noise=0.3, rate_hz=20.0)
     shown = np.array(readings(made, grid(20.0, 300.0)))
     assert shown.mean() == pytest.approx(20.0, abs=4 * 0.3 / math.sqrt(6000))
@@ -66,7 +64,7 @@ def test_noise_has_its_standard_deviation_and_no_bias() -> None:
     assert abs(later) < 4 / math.sqrt(6000)
 
 
-def test_a_lag_is_a_first_order_step_response() -> None:
+def test_a_lag_is_a_first_order_step_response():
     made = sensor(lambda now: (20.0 if now < 10.0 else 120.0,), lag_s=5.0)
     shown = dict(zip(grid(10.0, 40.0), readings(made, grid(10.0, 40.0)), strict=True))
     assert shown[9.9] == (20.0,)
@@ -75,7 +73,7 @@ def test_a_lag_is_a_first_order_step_response() -> None:
         assert shown[10.0 + after][0] == pytest.approx(expected, abs=0.01)
 
 
-def test_between_its_samples_it_shows_the_last_one() -> None:
+def test_between_its_samples_it_shows_the_last_one():
     made = sensor(lambda now: (now,), rate_hz=2.0, low=0.0)
     assert readings(made, [0.0, 0.2, 0.45, 0.5, 0.9, 1.0]) == [
         (0.0,),
@@ -87,7 +85,7 @@ def test_between_its_samples_it_shows_the_last_one() -> None:
     ]
 
 
-def test_the_noise_of_a_sample_hangs_neither_on_how_often_it_is_read_nor_on_other_sensors() -> None:
+def test_the_noise_of_a_sample_hangs_neither_on_how_often_it_is_read_nor_on_other_sensors():
     often = sensor(lambda now: (20.0,), noise=0.3, rate_hz=10.0)
     seldom = sensor(lambda now: (20.0,), noise=0.3, rate_hz=10.0)
     each = dict(zip(grid(10.0, 60.0), readings(often, grid(10.0, 60.0)), strict=True))
@@ -104,30 +102,30 @@ def test_the_noise_of_a_sample_hangs_neither_on_how_often_it_is_read_nor_on_othe
         assert both["temperature"].read(time) == alone.read(time)
 
 
-def test_two_sensors_of_one_robot_have_luck_of_their_own() -> None:
+def test_two_sensors_of_one_robot_have_luck_of_their_own():
     names = ("smoke", "water")
     configs = [SensorConfig(name=name, noise=1.0, low=-9.0) for name in names]
     ports = make_ports(configs, {n: (lambda now: (0.0,)) for n in names}, Streams(7).fresh)
     assert ports["smoke"].read(0.0) != ports["water"].read(0.0)
 
 
-def test_a_lost_sensor_gives_nothing_from_then_on() -> None:
+def test_a_lost_sensor_gives_nothing_from_then_on():
     made = sensor(lambda now: (20.0,), faults=[{"kind": "lost", "at_s": 3.0}])
     assert readings(made, [2.9, 3.0, 100.0]) == [(20.0,), (), ()]
 
 
-def test_a_stuck_sensor_gives_its_last_values_for_ever() -> None:
+def test_a_stuck_sensor_gives_its_last_values_for_ever():
     made = sensor(lambda now: (now,), noise=0.1, low=0.0, faults=[{"kind": "stuck", "at_s": 3.0}])
     last = readings(made, grid(10.0, 3.0))[-1]
     assert set(readings(made, [3.0, 5.0, 500.0])) == {last}
 
 
-def test_a_sensor_that_was_stuck_before_anybody_read_it_is_stuck_at_its_first_value() -> None:
+def test_a_sensor_that_was_stuck_before_anybody_read_it_is_stuck_at_its_first_value():
     made = sensor(lambda now: (now,), faults=[{"kind": "stuck", "at_s": 3.0}])
     assert readings(made, [10.0, 20.0]) == [(10.0,), (10.0,)]
 
 
-def test_faults_by_chance_come_after_their_mean_time_on_average() -> None:
+def test_faults_by_chance_come_after_their_mean_time_on_average():
     def lost_at(seed: int) -> float:
         made = sensor(lambda now: (1.0,), seed, faults=[{"kind": "lost", "mean_time_s": 50.0}])
         return made._lost_at
@@ -148,18 +146,18 @@ def test_faults_by_chance_come_after_their_mean_time_on_average() -> None:
         ({"name": "smoke", "colour": 1}, "colour"),
     ],
 )
-def test_a_mistake_in_the_configuration_is_told(config: dict[str, object], told: str) -> None:
+def test_a_mistake_in_the_configuration_is_told(config, told):
     with pytest.raises(ValidationError, match=told):
         SensorConfig.model_validate(config)
 
 
-def test_two_sensors_of_one_name_are_one_too_many() -> None:
+def test_two_sensors_of_one_name_are_one_too_many():
     twice = [SensorConfig(name="smoke"), SensorConfig(name="smoke")]
     with pytest.raises(ConfigError, match="sensor 'smoke'"):
         make_ports(twice, {"smoke": lambda now: (0.0,)}, Streams(1).fresh)
 
 
-def test_a_fault_is_either_scheduled_or_drawn() -> None:
+def test_a_fault_is_either_scheduled_or_drawn():
     luck = Streams(1).fresh("x")
     assert FaultConfig(kind="lost", at_s=0.0).time(luck) == 0.0
     assert FaultConfig(kind="lost", mean_time_s=10.0).time(luck) > 0.0
@@ -173,7 +171,7 @@ class Burning:
         return Conditions(80.0, 2.5, 0.7, 100.0, 0.01, 0.2) if hot else Conditions()
 
 
-def test_each_kind_measures_what_it_is_called_by_where_the_robot_is() -> None:
+def test_each_kind_measures_what_it_is_called_by_where_the_robot_is():
     fleet = Fleet()
     robot = fleet.robot(1, (12.0, 12.0, 0.0), EMPTY)
     lidar = Lidar(fleet.world)
@@ -194,7 +192,7 @@ def test_each_kind_measures_what_it_is_called_by_where_the_robot_is() -> None:
     assert ranges[27] == pytest.approx(1.2, abs=0.001) or ranges[27] > 1.2
 
 
-def test_a_lidar_sees_a_person_at_the_side_of_the_first_quarter_turn() -> None:
+def test_a_lidar_sees_a_person_at_the_side_of_the_first_quarter_turn():
     """Rays go counter-clockwise from the heading on: the tenth looks to the left."""
     fleet = Fleet()
     robot = fleet.robot(1, (8.0, 12.0, 0.0), EMPTY)

@@ -1,7 +1,5 @@
 """How long a robot's computer takes: laws with their mean and spread, and a cold start."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
@@ -27,19 +25,19 @@ def draws(count: int = 40_000, **law: Any) -> np.ndarray:
         ({"law": "gamma", "mean_s": 0.2, "cv": 2.0}, 2.0),
     ],
 )
-def test_a_law_has_the_mean_and_the_spread_that_it_names(law: dict[str, Any], cv: float) -> None:
+def test_a_law_has_the_mean_and_the_spread_that_it_names(law, cv):
     times = draws(**law)
     assert times.min() >= 0.0
     assert times.mean() == pytest.approx(0.2, rel=0.03)
     assert times.std() == pytest.approx(0.2 * cv, rel=0.06)
 
 
-def test_a_cold_start_makes_the_first_message_take_longer_and_only_that() -> None:
+def test_a_cold_start_makes_the_first_message_take_longer_and_only_that():
     times = draws(4, law="constant", mean_s=0.2, first_s=3.0)
     assert times.tolist() == [3.0, 0.2, 0.2, 0.2]
 
 
-def test_a_number_is_always_the_same() -> None:
+def test_a_number_is_always_the_same():
     times = service_times(0.05, np.random.default_rng(1))
     assert [times(), times()] == [0.05, 0.05]
     assert mean_of(0.05) == 0.05
@@ -60,12 +58,12 @@ def test_a_number_is_always_the_same() -> None:
         (-1, "robot.processing_s: should be at least 0"),
     ],
 )
-def test_a_law_that_cannot_be_is_refused(wrong: object, told: str) -> None:
+def test_a_law_that_cannot_be_is_refused(wrong, told):
     with pytest.raises(ConfigError, match=told):
         scenarios.build({}, {"robot.processing_s": wrong})
 
 
-def test_robots_draw_their_own_times_the_same_for_the_same_seed() -> None:
+def test_robots_draw_their_own_times_the_same_for_the_same_seed():
     law = ServiceLaw(law="gamma", mean_s=0.2, cv=0.5)
     first, again, other = (
         list(itertools.islice(iter(service_times(law, np.random.default_rng(seed)), None), 5))

@@ -1,7 +1,5 @@
 """How people walk: alone, past each other, through doors, and out of what holds them up."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from functools import partial

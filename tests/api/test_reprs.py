@@ -1,7 +1,5 @@
 """What a prompt shows of results fits a screen, and says what to ask them for."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.studies.small_study import cheap, study_in
 

@@ -25,7 +25,7 @@ SCENES: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_picture_of_320_by_240(benchmark: Any, scene: str) -> None:
+def test_a_picture_of_320_by_240(benchmark, scene):
     site = load_site("caparica")
     west, south, east, north = site.extent
     options = dict(SCENES[scene])

@@ -13,7 +13,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
-from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -156,7 +155,7 @@ def block(hand: Hand, place: str, token: str, slow: bool) -> float:
         return float(np.percentile(hand.delays, 99))
 
 
-def test_slow_clients_cost_a_driver_nothing(tmp_path: Path) -> None:
+def test_slow_clients_cost_a_driver_nothing(tmp_path):
     with console(tmp_path) as running:
         place, token = running.place
         hand = Hand(place, token)

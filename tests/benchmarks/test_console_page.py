@@ -9,7 +9,6 @@ from __future__ import annotations
 import resource
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -56,7 +55,7 @@ def turn_by_keys(page: Page) -> np.ndarray[Any, Any]:
     return np.array(page.evaluate("probe.delays"))
 
 
-def test_from_a_key_to_the_set_point(tmp_path: Path) -> None:
+def test_from_a_key_to_the_set_point(tmp_path):
     with console(tmp_path) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/drive")
         page.get_by_role("button", name="Take control").click()
@@ -74,7 +73,7 @@ def test_from_a_key_to_the_set_point(tmp_path: Path) -> None:
             goal(f"p95 at {delay_ms} ms [ms]", high, most=MOST_MS[delay_ms])
 
 
-def test_from_the_command_to_the_drawn_map(tmp_path: Path) -> None:
+def test_from_the_command_to_the_drawn_map(tmp_path):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with chromium() as browser:
         begun = time.monotonic()
@@ -95,7 +94,7 @@ def test_from_the_command_to_the_drawn_map(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("robots", "people", "site"), [(10, 10, "caparica"), (200, 100, "campus")])
-def test_what_a_page_costs(tmp_path: Path, robots: int, people: int, site: str) -> None:
+def test_what_a_page_costs(tmp_path, robots, people, site):
     words = ("--robots", str(robots), "--people", str(people), "--site", site)
     with console(tmp_path, *words, program=FAKE) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/map")
@@ -135,7 +134,7 @@ def shares(running: Console, page: Page) -> str:
     return ", ".join(f"{name} {(now[name] - first[name]) / took:.1%}" for name in now)
 
 
-def test_what_each_process_costs(tmp_path: Path) -> None:
+def test_what_each_process_costs(tmp_path):
     words = ("--set", "camera.rate_hz=10")
     with console(tmp_path, *words) as running, chromium() as browser:
         page = visit(browser, f"{running.address}#/map")

@@ -19,7 +19,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -116,7 +115,7 @@ def measure(what: str, press: Callable[[str], object]) -> list[float]:
 
 
 @pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
-def test_an_emergency_stop_under_a_flood_of_connections(tmp_path: Path, tls: bool) -> None:
+def test_an_emergency_stop_under_a_flood_of_connections(tmp_path, tls):
     with serving_phones(tmp_path) as served, ExitStack() as stack:
         port = served.phones_port if tls else served.port
         page = Supervisor(served, port, tls, stack)

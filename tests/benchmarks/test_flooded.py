@@ -192,7 +192,7 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
     yield from all_gone_after(tmp_path)
 
 
-def test_commands_and_emergencies_of_a_robot_that_is_flooded(programs: Programs) -> None:
+def test_commands_and_emergencies_of_a_robot_that_is_flooded(programs):
     dva = f"127.0.0.1:{free_port()}"
     quiet = ("--set", "events=[{kind: fire, at_s: 5000}]", "--set", "horizon_s=6000")
     for part in ("dva", "world"):

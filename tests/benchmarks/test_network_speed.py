@@ -59,9 +59,7 @@ def answer(request: Request) -> None:
 
 @pytest.mark.parametrize("pattern", ["pub-sub", "req-rep"])
 @pytest.mark.parametrize("loss", [0.0, 0.05])
-def test_segments_of_a_command_stream_against_real_time(
-    benchmark: Any, pattern: str, loss: float
-) -> None:
+def test_segments_of_a_command_stream_against_real_time(benchmark, pattern, loss):
     seconds = 300.0
     run = commands(pattern, seconds, delay_s=0.03, loss=loss)
     speed = seconds / min(run() for _ in range(3))

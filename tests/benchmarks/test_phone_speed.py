@@ -216,7 +216,7 @@ def swing(phone: Phone, steps: int) -> None:
         phone.hold(LEFT if number % 2 else RIGHT, STEP_S)
 
 
-def test_from_the_hand_to_the_robots_set_point(tmp_path: Path) -> None:
+def test_from_the_hand_to_the_robots_set_point(tmp_path):
     with console(tmp_path) as at:
         phone = Phone(at, "my phone")
         phone.take(0)
@@ -252,7 +252,7 @@ def in_threads(what: Callable[[Phone], object], phones: list[Phone]) -> None:
 
 
 @pytest.mark.parametrize("many", [2, MANY])
-def test_what_phones_cost_and_what_they_lose(tmp_path: Path, many: int) -> None:
+def test_what_phones_cost_and_what_they_lose(tmp_path, many):
     """Two drive, as `hands-on` has two robots; what the others tell is shown on their screens."""
     with console(tmp_path) as at:
         phones = [Phone(at, f"phone {n}") for n in range(many)]
@@ -317,7 +317,7 @@ def hand(tmp_path: Path) -> Iterator[tuple[Hand, list[int]]]:
         browser.close()
 
 
-def test_what_the_browser_adds(hand: tuple[Hand, list[int]]) -> None:
+def test_what_the_browser_adds(hand):
     """From the sensor to the socket, and from the robot's camera to the screen."""
     phone, weights = hand
     weight = sum(weights)

@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from benchmarks.goals import goal
@@ -43,9 +42,7 @@ def load() -> str:
     return f"load {os.getloadavg()[0]:.1f} on {executors.cores()} cores"
 
 
-def test_the_runner_costs_little_beside_runs_of_a_tenth_of_a_second(
-    tmp_path: Path, benchmark: Any
-) -> None:
+def test_the_runner_costs_little_beside_runs_of_a_tenth_of_a_second(tmp_path, benchmark):
     """Everything from the design to the manifest, in one process."""
     study = kit.study_in(tmp_path, "persons=20")  # 280 runs
     begun = time.process_time()
@@ -59,7 +56,7 @@ def test_the_runner_costs_little_beside_runs_of_a_tenth_of_a_second(
     benchmark(lambda: None)
 
 
-def test_handing_runs_to_processes_costs_the_parent_little(tmp_path: Path, benchmark: Any) -> None:
+def test_handing_runs_to_processes_costs_the_parent_little(tmp_path, benchmark):
     study = kit.study_in(tmp_path, "persons=20")
     begun = time.process_time()
     out = run_study(study, tmp_path / "out", jobs=2, episode=kit.busy)
@@ -79,7 +76,7 @@ def cpu_used_s() -> float:
     return sum(map(int, (user, nice, system, *interrupts))) / os.sysconf("SC_CLK_TCK")
 
 
-def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path: Path, benchmark: Any) -> None:
+def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path, benchmark):
     """By the wall clock, so it is judged only if the cores had little else to do meanwhile.
 
     What else they did is all CPU time that the machine has spent but for that of the runs
@@ -108,9 +105,7 @@ def test_two_processes_are_nearly_twice_as_fast_as_one(tmp_path: Path, benchmark
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_ten_thousand_short_runs_fit_in_little_memory(
-    tmp_path: Path, benchmark: Any, jobs: int
-) -> None:
+def test_ten_thousand_short_runs_fit_in_little_memory(tmp_path, benchmark, jobs):
     if not Path("/proc/self/status").exists():
         pytest.skip("this system does not tell the most memory a process has had")
     words = [sys.executable, "-c", MEMORY, str(tmp_path), str(jobs)]

@@ -98,9 +98,7 @@ def theirs(
 
 @pytest.mark.filterwarnings("ignore")  # theirs
 @pytest.mark.parametrize("collisions", ["stop", "contact"])
-def test_ten_robots_against_ir_sim(
-    benchmark: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, collisions: str
-) -> None:
+def test_ten_robots_against_ir_sim(benchmark, tmp_path, monkeypatch, collisions):
     """The same plan (the walls of caparica), the same circles, the same tick, asked every tick.
 
     ir-sim moves robots by velocity alone, and looks for collisions; in mode `stop` what collides
@@ -159,7 +157,7 @@ def crowd(site: Site, count: int) -> tuple[World, Callable[[float], None]]:
     return world, advance
 
 
-def test_two_hundred_robots_with_lidar_in_an_office_block(benchmark: Any) -> None:
+def test_two_hundred_robots_with_lidar_in_an_office_block(benchmark):
     """36 rays at 10 Hz for each robot; CPU seconds for a simulated second."""
     world, _ = crowd(offices(20), 200)
     lidar = Lidar(world, rays=36, reach=8.0)
@@ -181,7 +179,7 @@ def test_two_hundred_robots_with_lidar_in_an_office_block(benchmark: Any) -> Non
 
 
 @pytest.mark.parametrize("walls", ["office block", "open hall"])
-def test_a_thousand_robots(benchmark: Any, walls: str) -> None:
+def test_a_thousand_robots(benchmark, walls):
     """They move and meet; CPU seconds for a simulated second."""
     world, advance = crowd(offices(40) if walls == "office block" else hall(80.0, 80.0), 1000)
     advance(3.0)

@@ -1,7 +1,5 @@
 """Pictures between processes: whole, in any pieces, and found again after a crash."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

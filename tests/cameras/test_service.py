@@ -1,7 +1,5 @@
 """The cameras of a run in real time, looked at by programs that know nothing of ours."""
 
-from __future__ import annotations
-
 import http.client
 import io
 import os
@@ -133,7 +131,7 @@ def pictures(port: int, path: str, count: int) -> list[tuple[dict[str, str], byt
     return found
 
 
-def test_the_url_that_a_robot_tells_is_a_stream_that_any_player_shows(world: LiveWorld) -> None:
+def test_the_url_that_a_robot_tells_is_a_stream_that_any_player_shows(world):
     told = world.robots[ROBOT].controller.camera_url
     assert told == f"http://127.0.0.1:{world.port}/camera/robot-1.mjpg"
     assert m.SensorInfo(told, ()).camera_url == told
@@ -150,7 +148,7 @@ def test_the_url_that_a_robot_tells_is_a_stream_that_any_player_shows(world: Liv
     assert numbers == sorted(set(numbers))
 
 
-def test_a_single_picture_and_what_there_is_not(world: LiveWorld) -> None:
+def test_a_single_picture_and_what_there_is_not(world):
     status, data = world.asked("/camera/robot-2.jpg")
     assert status == 200
     assert data.startswith(b"\xff\xd8")
@@ -161,7 +159,7 @@ def test_a_single_picture_and_what_there_is_not(world: LiveWorld) -> None:
     assert world.asked("/camera/..%2f..%2fetc/passwd.jpg")[0] == 404
 
 
-def test_more_viewers_than_there_is_room_for_are_refused(world: LiveWorld) -> None:
+def test_more_viewers_than_there_is_room_for_are_refused(world):
     viewers = [socket.create_connection(("127.0.0.1", world.port)) for _ in range(MOST_VIEWERS)]
 
     def look() -> None:
@@ -182,7 +180,7 @@ def test_more_viewers_than_there_is_room_for_are_refused(world: LiveWorld) -> No
         pass
 
 
-def test_the_world_waits_for_nobody_who_draws(world: LiveWorld) -> None:
+def test_the_world_waits_for_nobody_who_draws(world):
     """While the process is stopped and reads nothing, hundreds of frames are told to it."""
     world.let(lambda: pictures(world.port, "/camera/robot-1.mjpg", 1))
     os.kill(world.process, signal.SIGSTOP)
@@ -199,9 +197,7 @@ def test_the_world_waits_for_nobody_who_draws(world: LiveWorld) -> None:
         os.kill(world.process, signal.SIGCONT)
 
 
-def test_a_process_is_there_while_somebody_looks_and_replaced_when_it_was_killed(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_process_is_there_while_somebody_looks_and_replaced_when_it_was_killed(monkeypatch):
     monkeypatch.setattr(cameras, "AGAIN_AFTER", 0.05)
     world, taken = LiveWorld(), list[float]()
     robot = world.robots[ROBOT]
@@ -231,7 +227,7 @@ def test_a_process_is_there_while_somebody_looks_and_replaced_when_it_was_killed
         os.kill(second, 0)
 
 
-def test_a_port_that_is_taken_is_replaced_by_a_free_one() -> None:
+def test_a_port_that_is_taken_is_replaced_by_a_free_one():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         world = LiveWorld(port)
@@ -239,7 +235,7 @@ def test_a_port_that_is_taken_is_replaced_by_a_free_one() -> None:
         world.close()
 
 
-def test_who_runs_with_keys_shows_no_pictures_unless_asked_to(tmp_path) -> None:
+def test_who_runs_with_keys_shows_no_pictures_unless_asked_to(tmp_path):
     assert LiveOptions("fire-drill").shows_pictures
     assert not LiveOptions("fire-drill", keys=tmp_path).shows_pictures
     assert LiveOptions("fire-drill", keys=tmp_path, camera_port=0).shows_pictures

@@ -1,7 +1,5 @@
 """Ctrl-C ends a command in one line at any moment, also while the program is still being loaded."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

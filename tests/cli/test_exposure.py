@@ -1,9 +1,5 @@
 """What a command opens to a network without keys or tokens is said, and nothing else."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from helpers.processes.command_line import call
 
@@ -55,8 +51,8 @@ def said(monkeypatch: pytest.MonkeyPatch) -> object:
     ],
 )
 def test_devices_that_listen_beyond_this_machine_without_keys_are_said_in_a_line(
-    said, command: str, names: str, closed_by: str
-) -> None:
+    said, command, names, closed_by
+):
     (line,) = said(command)
     assert names in line
     assert FORGERS in line
@@ -73,9 +69,7 @@ def test_devices_that_listen_beyond_this_machine_without_keys_are_said_in_a_line
         (f"console --dva 127.0.0.1:5600 --no-token --host {LAN}", LAN),
     ],
 )
-def test_a_page_beyond_this_machine_without_a_token_is_said_in_a_line(
-    said, command: str, names: str
-) -> None:
+def test_a_page_beyond_this_machine_without_a_token_is_said_in_a_line(said, command, names):
     (line,) = said(command)
     assert names in line
     assert TOKEN in line
@@ -102,16 +96,16 @@ def test_a_page_beyond_this_machine_without_a_token_is_said_in_a_line(
         f"robot --host {LAN} --keys keys",
     ],
 )
-def test_nothing_is_said_on_this_machine_or_with_keys_or_a_token(said, command: str) -> None:
+def test_nothing_is_said_on_this_machine_or_with_keys_or_a_token(said, command):
     assert said(command) == []
 
 
-def test_both_are_said_where_both_are_open(said) -> None:
+def test_both_are_said_where_both_are_open(said):
     lines = said(f"console --links real --no-token --host {LAN}")
     assert [TOKEN in lines[0], FORGERS in lines[1]] == [True, True]
 
 
-def test_an_address_of_which_nobody_knows_is_not_taken_for_this_machine(tmp_path: Path) -> None:
+def test_an_address_of_which_nobody_knows_is_not_taken_for_this_machine(tmp_path):
     assert not exposure.is_local("no-such-host.invalid")
     assert exposure.is_local("[::1]")
 
@@ -121,7 +115,7 @@ def test_an_address_of_which_nobody_knows_is_not_taken_for_this_machine(tmp_path
     [("--camera-port 0", True), ("--camera-port 0 --only dva", False), ("", False)],
 )
 def test_pictures_beyond_this_machine_are_said_though_devices_have_keys(
-    said, tmp_path: Path, more: str, is_open: bool
-) -> None:
+    said, tmp_path, more, is_open
+):
     found = said(f"live drive-to-event --host {LAN} --keys {tmp_path} {more}")
     assert [LAN in line and "leave out --camera-port" in line for line in found] == [True] * is_open

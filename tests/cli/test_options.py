@@ -1,7 +1,5 @@
 """Options of commands are those of the functions of their names, declared once."""
 
-from __future__ import annotations
-
 import inspect
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What commands print: lists that do not wrap, JSON alone for other programs, less and more."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import re

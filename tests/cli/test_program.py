@@ -1,7 +1,5 @@
 """How the program is called: options, help, exit codes; all in this process."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """What is said before, during and after a run: plans, progress, and how to go on."""
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path
@@ -20,11 +18,11 @@ from dva_sim.experiments.execution.runner import RunRequest, run_study
     ("seconds", "words"),
     [(0.2, "0 s"), (89, "89 s"), (90, "2 min"), (3600, "60 min"), (5400, "1 h 30 min")],
 )
-def test_durations_are_said_as_people_would(seconds: float, words: str) -> None:
+def test_durations_are_said_as_people_would(seconds, words):
     assert duration(seconds) == words
 
 
-def test_the_rate_counts_what_this_session_made_not_what_was_done_before() -> None:
+def test_the_rate_counts_what_this_session_made_not_what_was_done_before():
     clock = iter([100.0, 110.0, 130.0])
     pace = RunPace(lambda: next(clock))
     assert pace.line(600, 1000) == "600/1000 runs"
@@ -32,14 +30,14 @@ def test_the_rate_counts_what_this_session_made_not_what_was_done_before() -> No
     assert pace.line(1000, 1000) == "1000/1000 runs, 13.3 runs/s"
 
 
-def test_slow_runs_are_counted_by_the_minute() -> None:
+def test_slow_runs_are_counted_by_the_minute():
     clock = iter([0.0, 120.0])
     pace = RunPace(lambda: next(clock))
     pace.line(0, 10)
     assert pace.line(3, 10) == "3/10 runs, 1.5 runs/min, 5 min left"
 
 
-def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path: Path) -> None:
+def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path):
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", jobs=2, probe=kit.cheap)
     assert (plan.runs, plan.done, plan.workers) == (kit.RUNS, 0, 2)
     assert plan.tried == 5  # the reference and four cells; both parts share them
@@ -47,17 +45,13 @@ def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
-def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_probe_ends_when_its_time_is_up_but_not_after_one_or_two(tmp_path, monkeypatch):
     monkeypatch.setattr("dva_sim.experiments.execution.dry_run.PROBE_S", 0.0)
     plan = dry_run(kit.study_in(tmp_path), tmp_path / "out", probe=kit.cheap)
     assert plan.tried == 3
 
 
-def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(tmp_path, monkeypatch):
     def never(job: object) -> kit.Tables:
         while True:
             time.thread_time()
@@ -70,7 +64,7 @@ def test_a_run_that_does_not_end_in_time_costs_as_much_at_least(
     assert plan.estimate_s > 0
 
 
-def test_a_run_that_fails_when_tried_is_told(tmp_path: Path) -> None:
+def test_a_run_that_fails_when_tried_is_told(tmp_path):
     def falls(job: object) -> kit.Tables:
         raise RuntimeError("fell\ndeep")
 
@@ -103,26 +97,24 @@ def test_a_run_that_fails_when_tried_is_told(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_an_estimate_says_what_it_rests_on(plan: DryRun, words: str) -> None:
+def test_an_estimate_says_what_it_rests_on(plan, words):
     assert study_runs._time(plan) == words
 
 
-def test_a_plan_says_that_a_study_may_stop_early() -> None:
+def test_a_plan_says_that_a_study_may_stop_early():
     plan = DryRun(42, 7, 9, 4, 2, 30.0, 0, "")
     told = study_runs._plan(plan, Path("out"))
     assert unnamed(told, "at most 42 runs in 9", "up to 4 rounds", "7 of them", "into out") == []
 
 
-def test_a_probe_spreads_over_the_design() -> None:
+def test_a_probe_spreads_over_the_design():
     for count in (1, 2, 3, 9, 100, 101):
         assert sorted(_spread(count)) == list(range(count))
     first = _spread(100)[:5]
     assert min(abs(a - b) for a in first for b in first if a != b) >= 10
 
 
-def test_what_is_stopped_names_the_command_that_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_stopped_names_the_command_that_goes_on(tmp_path, monkeypatch, capsys):
     study = kit.write_study(tmp_path)
     monkeypatch.setattr(sys, "argv", ["dva-sim", "run", "my study.yaml", "--set", "seed=3"])
 
@@ -137,9 +129,7 @@ def test_what_is_stopped_names_the_command_that_goes_on(
     assert how.endswith("dva-sim run 'my study.yaml' --set seed=3")
 
 
-def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(tmp_path, monkeypatch):
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 

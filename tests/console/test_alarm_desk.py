@@ -1,7 +1,5 @@
 """What in a run becomes an alarm: open events, escalations, robots lost in drive, nobody left."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -38,20 +36,20 @@ def texts(desk: AlarmDesk, *events: Any, robots: Any = (), now_ms: int = 10_000)
     return [row["text"] for row in desk.look(events, robots, now_ms)["alarms"]]
 
 
-def test_an_open_event_is_an_alarm_as_grave_as_it_is(desk: AlarmDesk) -> None:
+def test_an_open_event_is_an_alarm_as_grave_as_it_is(desk):
     (row,) = desk.look([event()], [], 10_000)["alarms"]
 
     assert (row["text"], row["priority"], row["since_ms"]) == ("Gas leak, Lab", "high", 5000)
     assert row["event"] == 1
 
 
-def test_what_the_dva_says_was_acknowledged_is(desk: AlarmDesk) -> None:
+def test_what_the_dva_says_was_acknowledged_is(desk):
     (row,) = desk.look([event(acknowledged={"label": "ana"})], [], 10_000)["alarms"]
 
     assert (row["state"], row["seen_by"]) == ("acknowledged", "ana")
 
 
-def test_an_escalation_is_critical_for_a_minute_and_then_returned(desk: AlarmDesk) -> None:
+def test_an_escalation_is_critical_for_a_minute_and_then_returned(desk):
     over = event(state="escalated", over=True, since_ms=10_000)
     (row,) = desk.look([over], [], 10_000)["alarms"]
     assert (row["priority"], row["state"]) == ("critical", "unacknowledged")
@@ -63,7 +61,7 @@ def test_an_escalation_is_critical_for_a_minute_and_then_returned(desk: AlarmDes
     assert texts(desk, over, now_ms=later) == []
 
 
-def test_a_robot_whose_watchdog_has_stopped_it_is_lost(desk: AlarmDesk) -> None:
+def test_a_robot_whose_watchdog_has_stopped_it_is_lost(desk):
     assert texts(desk, robots=[robot(0), robot(1)]) == []
     lost = robot(0, watchdog_left_s=0.0)
     (text,) = texts(desk, robots=[lost])
@@ -71,9 +69,7 @@ def test_a_robot_whose_watchdog_has_stopped_it_is_lost(desk: AlarmDesk) -> None:
 
 
 @pytest.mark.invariant("S4")
-def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_seen_it(
-    page: PhonePage, desk: AlarmDesk
-) -> None:
+def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_seen_it(page, desk):
     assert texts(desk) == []
     run = page.world.run
     body = next(iter(run.field.robots.values())).body
@@ -91,15 +87,13 @@ def test_a_safety_rule_that_is_broken_is_a_critical_alarm_until_somebody_has_see
     assert again[asked] == "acknowledged"
 
 
-def test_a_robot_that_waits_for_its_first_command_is_not(desk: AlarmDesk) -> None:
+def test_a_robot_that_waits_for_its_first_command_is_not(desk):
     waits = robot(0, watchdog_left_s=0.0, stands="waits for the first command: ...")
 
     assert texts(desk, robots=[waits]) == []
 
 
-def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(
-    page: PhonePage, desk: AlarmDesk
-) -> None:
+def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(page, desk):
     waits = event(state="pending")
     assert texts(desk, waits) == ["Gas leak, Lab"]  # somebody is free
     for entry in page.world.run.dva.desk.registry.entries.values():
@@ -110,6 +104,6 @@ def test_nobody_left_to_send_is_an_alarm_only_while_something_waits(
     assert [row["state"] for row in rows if row["key"] == "nobody"] == ["returned"]
 
 
-def test_a_row_that_is_gone_is_none_to_act_on(desk: AlarmDesk) -> None:
+def test_a_row_that_is_gone_is_none_to_act_on(desk):
     with pytest.raises(Refused, match="none any more"):
         desk.members("event 1")

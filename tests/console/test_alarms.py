@@ -1,7 +1,5 @@
 """Alarms: their states, one list by priority, shelves with an end, floods that fold."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from hypothesis import settings
@@ -33,7 +31,7 @@ def texts(alarms: Alarms, now: float = 100.0) -> list[str]:
     return [row["text"] for row in alarms.rows(now)]
 
 
-def test_a_condition_is_unacknowledged_until_somebody_has_seen_it() -> None:
+def test_a_condition_is_unacknowledged_until_somebody_has_seen_it():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     assert states(alarms) == {"event 1": "unacknowledged"}
@@ -44,7 +42,7 @@ def test_a_condition_is_unacknowledged_until_somebody_has_seen_it() -> None:
     assert alarms.rows(1.0)[0]["seen_by"] == "ana"
 
 
-def test_what_is_over_and_seen_is_no_alarm_any_more() -> None:
+def test_what_is_over_and_seen_is_no_alarm_any_more():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.acknowledge("event 1", "ana")
@@ -53,7 +51,7 @@ def test_what_is_over_and_seen_is_no_alarm_any_more() -> None:
     assert states(alarms) == {}
 
 
-def test_what_is_over_before_anybody_saw_it_stays_as_returned_until_somebody_does() -> None:
+def test_what_is_over_before_anybody_saw_it_stays_as_returned_until_somebody_does():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.update([], 1.0)
@@ -63,7 +61,7 @@ def test_what_is_over_before_anybody_saw_it_stays_as_returned_until_somebody_doe
     assert states(alarms) == {}
 
 
-def test_what_comes_back_is_new_again() -> None:
+def test_what_comes_back_is_new_again():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.update([], 10.0)
@@ -73,7 +71,7 @@ def test_what_comes_back_is_new_again() -> None:
     assert alarms.rows(21.0)[0]["is_new"]
 
 
-def test_an_alarm_that_becomes_graver_has_to_be_seen_again() -> None:
+def test_an_alarm_that_becomes_graver_has_to_be_seen_again():
     alarms = Alarms()
     alarms.update([fire(priority="medium")], 0.0)
     alarms.acknowledge("event 1", "ana")
@@ -85,7 +83,7 @@ def test_an_alarm_that_becomes_graver_has_to_be_seen_again() -> None:
     assert states(alarms) == {"event 1": "acknowledged"}
 
 
-def test_what_was_seen_by_a_message_to_the_dva_is_seen_here() -> None:
+def test_what_was_seen_by_a_message_to_the_dva_is_seen_here():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.update([fire(seen_by="ben")], 1.0)
@@ -94,7 +92,7 @@ def test_what_was_seen_by_a_message_to_the_dva_is_seen_here() -> None:
     assert alarms.rows(1.0)[0]["seen_by"] == "ben"
 
 
-def test_only_a_new_alarm_stands_out_and_only_for_5_seconds() -> None:
+def test_only_a_new_alarm_stands_out_and_only_for_5_seconds():
     alarms = Alarms()
     alarms.update([fire(1), fire(2)], 0.0)
     alarms.acknowledge("event 2", "ana")
@@ -103,7 +101,7 @@ def test_only_a_new_alarm_stands_out_and_only_for_5_seconds() -> None:
     assert [row["is_new"] for row in alarms.rows(5.0)] == [False, False]
 
 
-def test_the_list_has_the_gravest_first_then_what_nobody_saw_then_the_newest() -> None:
+def test_the_list_has_the_gravest_first_then_what_nobody_saw_then_the_newest():
     alarms = Alarms()
     alarms.update([fire(1, "low"), fire(2, "critical"), fire(3, "critical")], 0.0)
     alarms.acknowledge("event 2", "ana")
@@ -113,7 +111,7 @@ def test_the_list_has_the_gravest_first_then_what_nobody_saw_then_the_newest() -
     assert [row["key"] for row in alarms.rows(9.0)] == ["event 4", "event 3", "event 2", "event 1"]
 
 
-def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new() -> None:
+def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.shelve("event 1", 60.0, "ana", 0.0)
@@ -127,7 +125,7 @@ def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new() -> None
     assert alarms.rows(60.0)[0]["is_new"]
 
 
-def test_no_shelf_lasts_longer_than_a_shift() -> None:
+def test_no_shelf_lasts_longer_than_a_shift():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.shelve("event 1", 1e9, "ana", 0.0)
@@ -135,7 +133,7 @@ def test_no_shelf_lasts_longer_than_a_shift() -> None:
     assert alarms.known["event 1"].shelved_until == LONGEST_SHELF
 
 
-def test_what_returns_on_the_shelf_stays_shelved_when_it_comes_back() -> None:
+def test_what_returns_on_the_shelf_stays_shelved_when_it_comes_back():
     alarms = Alarms()
     alarms.update([fire()], 0.0)
     alarms.shelve("event 1", 60.0, "ana", 0.0)
@@ -146,7 +144,7 @@ def test_what_returns_on_the_shelf_stays_shelved_when_it_comes_back() -> None:
     assert len(alarms.shelved(20.0)) == 1
 
 
-def test_ten_alarms_in_ten_minutes_are_a_flood_and_alike_ones_fold() -> None:
+def test_ten_alarms_in_ten_minutes_are_a_flood_and_alike_ones_fold():
     alarms = Alarms()
     nine = [fire(number) for number in range(7)]
     nine += [fire(number, place="Hall") for number in (7, 8)]
@@ -158,7 +156,7 @@ def test_ten_alarms_in_ten_minutes_are_a_flood_and_alike_ones_fold() -> None:
     assert alarms.is_flood
 
 
-def test_a_folded_row_stands_for_all_its_alarms_and_is_as_grave_as_the_gravest() -> None:
+def test_a_folded_row_stands_for_all_its_alarms_and_is_as_grave_as_the_gravest():
     alarms = Alarms()
     many = [fire(number, "low") for number in range(9)]
     alarms.update([*many, fire(9, "critical")], 0.0)
@@ -170,7 +168,7 @@ def test_a_folded_row_stands_for_all_its_alarms_and_is_as_grave_as_the_gravest()
     assert set(states(alarms).values()) == {"acknowledged"}
 
 
-def test_a_flood_ends_with_fewer_than_five_alarms_in_ten_minutes() -> None:
+def test_a_flood_ends_with_fewer_than_five_alarms_in_ten_minutes():
     alarms = Alarms()
     first = [fire(number) for number in range(6)]
     alarms.update(first, 0.0)
@@ -183,7 +181,7 @@ def test_a_flood_ends_with_fewer_than_five_alarms_in_ten_minutes() -> None:
     assert len(texts(alarms)) == 10
 
 
-def test_of_more_alarms_than_there_may_be_the_gravest_are_kept() -> None:
+def test_of_more_alarms_than_there_may_be_the_gravest_are_kept():
     alarms = Alarms()
     many = [fire(number, "low") for number in range(MOST_ALARMS)]
     alarms.update([*many, fire(9999, "critical")], 0.0)
@@ -193,7 +191,7 @@ def test_of_more_alarms_than_there_may_be_the_gravest_are_kept() -> None:
     assert alarms.left_out == 1
 
 
-def test_alarms_that_came_and_went_unseen_do_not_fill_the_memory() -> None:
+def test_alarms_that_came_and_went_unseen_do_not_fill_the_memory():
     alarms = Alarms()
     for number in range(3 * MOST_ALARMS):
         alarms.update([fire(number)], float(number))

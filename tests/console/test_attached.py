@@ -1,7 +1,5 @@
 """A console at a DVA that runs elsewhere: what messages tell, and nothing that they do not."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal
@@ -161,7 +159,7 @@ def live(programs: Programs, dva: str, part: str, *words: str) -> Program:
 
 
 @pytest.mark.system
-def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
+def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     dva = f"127.0.0.1:{free_port()}"
     first = live(programs, dva, "dva")
     live(programs, dva, "world")
@@ -198,9 +196,7 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs: Programs):
 
 
 @pytest.mark.system
-def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(
-    programs: Programs, tmp_path: Path
-):
+def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(programs, tmp_path):
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])
     role = "dva.control_rooms={control-room-1: dispatch}"

@@ -1,7 +1,5 @@
 """Alarms of an attached console: by messages alone, and through a restart of the DVA."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,7 +27,7 @@ def lists(page: AttachedPage) -> list[list[str]]:
     ]
 
 
-def test_an_open_event_is_an_alarm_and_seen_by_a_message_to_the_dva(page: AttachedPage) -> None:
+def test_an_open_event_is_an_alarm_and_seen_by_a_message_to_the_dva(page):
     assert page.alarms() == [FIRE]
     assert page.ask("alarm_acknowledge", alarm="event 1")["ok"]
     page.let(1.0)
@@ -41,7 +39,7 @@ def test_an_open_event_is_an_alarm_and_seen_by_a_message_to_the_dva(page: Attach
     assert {("acknowledge", "ana"), ("alarm acknowledge", "ana")} <= rows
 
 
-def test_an_alarm_is_shelved_by_name_and_comes_back(page: AttachedPage) -> None:
+def test_an_alarm_is_shelved_by_name_and_comes_back(page):
     page.alarms()
     assert page.ask("alarm_shelve", alarm="event 1", for_s=60.0)["ok"]
     assert page.alarms() == []
@@ -51,7 +49,7 @@ def test_an_alarm_is_shelved_by_name_and_comes_back(page: AttachedPage) -> None:
     assert page.alarms() == [FIRE]
 
 
-def test_while_the_dva_does_not_answer_alarms_stay_and_none_comes(page: AttachedPage) -> None:
+def test_while_the_dva_does_not_answer_alarms_stay_and_none_comes(page):
     page.alarms()
     told = len(lists(page))
     assert page.world.do("server_stop")[0]
@@ -64,9 +62,7 @@ def test_while_the_dva_does_not_answer_alarms_stay_and_none_comes(page: Attached
     assert {tuple(each) for each in lists(page)[told:]} <= {(f"{FIRE}: unacknowledged",)}
 
 
-def test_after_a_restart_of_the_dva_alarms_neither_vanish_nor_come_back(
-    page: AttachedPage,
-) -> None:
+def test_after_a_restart_of_the_dva_alarms_neither_vanish_nor_come_back(page):
     page.alarms()
     told = len(lists(page))
     listed, page.system.agent.on_list = page.system.agent.on_list, lambda: None
@@ -81,7 +77,7 @@ def test_after_a_restart_of_the_dva_alarms_neither_vanish_nor_come_back(
     assert all(line["events"] for line in page.told("events")[1:])
 
 
-def test_a_robot_of_which_nothing_is_heard_since_it_was_driven_is_lost(page: AttachedPage) -> None:
+def test_a_robot_of_which_nothing_is_heard_since_it_was_driven_is_lost(page):
     assert page.world.do("take", robots=["robot-1"])[0]
     assert page.world.do("start")[0]
     robot = page.world.robot()
@@ -93,9 +89,7 @@ def test_a_robot_of_which_nothing_is_heard_since_it_was_driven_is_lost(page: Att
     assert any(unnamed(text, robot.device.label, "lost") == [] for text in page.alarms())
 
 
-def test_nobody_is_left_to_send_once_all_were_sent(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_nobody_is_left_to_send_once_all_were_sent(monkeypatch, tmp_path):
     raised = [("flood", 20.0), ("gas_leak", 20.0), ("flood", 36.0)]
     everybody = ("guard-1", "guard-2", "robot-1")
     with attached(monkeypatch, tmp_path, robot__count=1) as page:

@@ -1,7 +1,5 @@
 """The audit log of an attached console: its own decisions by their answers, others by the DVA's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,9 +31,7 @@ def silence_records(page: AttachedPage) -> None:
     page.world.world.run.network.publish = lossy  # type: ignore[method-assign]
 
 
-def test_a_decision_is_one_row_by_the_person_at_the_page_with_what_the_policy_advised(
-    page: AttachedPage,
-) -> None:
+def test_a_decision_is_one_row_by_the_person_at_the_page_with_what_the_policy_advised(page):
     assert page.ask("event_acknowledge", event=1)["ok"]
     assert page.ask("event_assign", event=1, device="guard-1", reason="is near")["ok"]
     rows = page.written()
@@ -51,7 +47,7 @@ def test_a_decision_is_one_row_by_the_person_at_the_page_with_what_the_policy_ad
     assert verify(page.keeper.path).problem is None
 
 
-def test_a_decision_whose_record_is_lost_is_a_row_all_the_same(page: AttachedPage) -> None:
+def test_a_decision_whose_record_is_lost_is_a_row_all_the_same(page):
     silence_records(page)
     assert page.ask("event_assign", event=1, device="guard-1", reason="is near")["ok"]
     rows = page.written()
@@ -63,7 +59,7 @@ def test_a_decision_whose_record_is_lost_is_a_row_all_the_same(page: AttachedPag
     assert measured(rows)["overrides"] == 0
 
 
-def test_a_refusal_is_one_row_with_its_reason(page: AttachedPage) -> None:
+def test_a_refusal_is_one_row_with_its_reason(page):
     refused = page.ask("event_assign", event=77, device="guard-1")
     page.let(1.0)
 
@@ -71,7 +67,7 @@ def test_a_refusal_is_one_row_with_its_reason(page: AttachedPage) -> None:
     assert (row.author, row.outcome, row.text) == ("ana", "refused", refused["text"])
 
 
-def test_whether_an_order_was_done_that_nobody_answered_is_unknown(page: AttachedPage) -> None:
+def test_whether_an_order_was_done_that_nobody_answered_is_unknown(page):
     assert page.world.do("server_stop")[0]
     answer = page.ask("event_assign", event=1, device="guard-1", reason="is near")
     assert (answer["ok"], "DVA" in answer["text"]) == (False, True)
@@ -80,7 +76,7 @@ def test_whether_an_order_was_done_that_nobody_answered_is_unknown(page: Attache
     assert (row.author, row.outcome, row.text) == ("ana", "unknown", answer["text"])
 
 
-def test_what_others_and_the_policy_decide_is_a_row_by_the_dvas_record(page: AttachedPage) -> None:
+def test_what_others_and_the_policy_decide_is_a_row_by_the_dvas_record(page):
     world = page.world
     world.do("room_join", name="bob", role="supervise")
     world.do("event_acknowledge", event=1, role="supervise")
@@ -92,9 +88,7 @@ def test_what_others_and_the_policy_decide_is_a_row_by_the_dvas_record(page: Att
     assert {("bob", "acknowledge"), ("bob", "set dispatch"), ("min_eta", "assign")} <= rows
 
 
-def test_what_was_decided_without_an_answer_is_told_once_the_dva_publishes_it(
-    page: AttachedPage,
-) -> None:
+def test_what_was_decided_without_an_answer_is_told_once_the_dva_publishes_it(page):
     record = m.AuditRecord(OWN, "control room", "escalate", "", m.OK, "", "supervise", 1)
     page.pages.audited.heard(record)
 
@@ -102,7 +96,7 @@ def test_what_was_decided_without_an_answer_is_told_once_the_dva_publishes_it(
     assert (row.author, row.outcome) == ("control room", "done")
 
 
-def test_without_a_name_one_is_called_by_ones_page(page: AttachedPage) -> None:
+def test_without_a_name_one_is_called_by_ones_page(page):
     assert page.ask("event_note", client="program-drive", event=1, text="smoke")["ok"]
     assert page.ask("room_join", client="c2", name="")["text"].startswith("you are supervise-1")
     page.actions.take({"id": "bye-1", "client": "c2", "do": "release"})
@@ -115,7 +109,7 @@ def test_without_a_name_one_is_called_by_ones_page(page: AttachedPage) -> None:
     assert "release" not in [row.action for row in rows]
 
 
-def test_pages_are_told_how_the_log_stands(page: AttachedPage) -> None:
+def test_pages_are_told_how_the_log_stands(page):
     assert page.ask("event_acknowledge", event=1)["ok"]
     page.let(0.5)
     stands = page.told("audit")[-1]

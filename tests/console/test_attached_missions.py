@@ -1,7 +1,5 @@
 """Robots sent on missions, and taken from their holders, from an attached console."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,7 +31,7 @@ def said_by(page: AttachedPage) -> list[bytes]:
     return [data for source, _, data in page.world.heard if source == OWN]
 
 
-def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page: AttachedPage) -> None:
+def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page):
     done = page.ask("mission", robot=number(page, "robot-1"), event=1)
     assert done["ok"]
     assert unnamed(done["text"], "robot-1", "event 1") == []
@@ -53,7 +51,7 @@ def test_a_robot_goes_and_looks_by_itself_and_is_given_back(page: AttachedPage) 
     assert (row.author, row.subject, row.event, row.outcome) == ("ana", "robot-1", 1, "done")
 
 
-def test_a_robot_that_does_not_answer_may_be_on_its_way_or_not(page: AttachedPage) -> None:
+def test_a_robot_that_does_not_answer_may_be_on_its_way_or_not(page):
     number_ = number(page, "robot-1")
     page.world.world.run.network.leave(page.world.robot().device.id_tag)
     refused = page.ask("mission", robot=number_, event=1)
@@ -64,7 +62,7 @@ def test_a_robot_that_does_not_answer_may_be_on_its_way_or_not(page: AttachedPag
     assert row.outcome == "unknown"
 
 
-def test_a_robot_that_falls_silent_on_its_way_is_given_back(page: AttachedPage) -> None:
+def test_a_robot_that_falls_silent_on_its_way_is_given_back(page):
     robot = page.world.robot()
     assert page.ask("mission", robot=number(page, "robot-1"), event=1)["ok"]
     page.world.world.run.network.leave(robot.device.id_tag)
@@ -79,11 +77,11 @@ def test_a_robot_that_falls_silent_on_its_way_is_given_back(page: AttachedPage) 
     ("about", "words"),
     [({"robot": 99, "event": 1}, "no robot 99"), ({"robot": 0, "event": 7}, "no event 7")],
 )
-def test_what_is_not_there_is_refused(page: AttachedPage, about: dict, words: str) -> None:
+def test_what_is_not_there_is_refused(page, about, words):
     assert words in page.ask("mission", **about)["text"]
 
 
-def test_a_robot_is_taken_from_its_driver_and_goes_on_by_itself(page: AttachedPage) -> None:
+def test_a_robot_is_taken_from_its_driver_and_goes_on_by_itself(page):
     assert page.ask("event_assign", event=1, device="robot-1")["ok"]
     assert page.world.do("take", robots=["robot-1"])[0]
     assert page.world.do("start")[0]
@@ -99,7 +97,7 @@ def test_a_robot_is_taken_from_its_driver_and_goes_on_by_itself(page: AttachedPa
     assert {("revoke", "control room", "done"), ("take over", "ana", "done")} <= rows
 
 
-def test_a_robot_that_was_sent_nowhere_is_nobodys_then(page: AttachedPage) -> None:
+def test_a_robot_that_was_sent_nowhere_is_nobodys_then(page):
     assert page.world.do("take", robots=["robot-1"])[0]
     taken = page.ask("take_over", robot=number(page, "robot-1"), reason="it is needed")
 
@@ -108,9 +106,7 @@ def test_a_robot_that_was_sent_nowhere_is_nobodys_then(page: AttachedPage) -> No
     assert page.world.robot().controller.grant is None
 
 
-def test_the_dva_refuses_both_to_who_may_only_look(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_dva_refuses_both_to_who_may_only_look(monkeypatch, tmp_path):
     with attached(monkeypatch, tmp_path, role="look") as page:
         page.until(lambda: len(page.system.numbers) >= 4)
         robot = number(page, "robot-1")

@@ -1,7 +1,5 @@
 """Sensor values at an attached console: of robots that somebody looks at, as the DVA permits."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,14 +31,14 @@ def look(page: AttachedPage, *robots: int) -> None:
     page.actions.take({"do": "watch", "robots": list(robots)})
 
 
-def test_what_nobody_looks_at_is_unknown(page: AttachedPage) -> None:
+def test_what_nobody_looks_at_is_unknown(page):
     page.let(5.0)
 
     assert set(readings(page).values()) == {"unknown"}
     assert OWN not in page.world.robot().controller.observers
 
 
-def test_values_come_while_somebody_looks_and_end_with_that(page: AttachedPage) -> None:
+def test_values_come_while_somebody_looks_and_end_with_that(page):
     look(page, robot_1(page))
     page.until(lambda: "unknown" not in readings(page).values())
     shown = readings(page)
@@ -58,14 +56,14 @@ def test_values_come_while_somebody_looks_and_end_with_that(page: AttachedPage) 
     ] == []
 
 
-def test_values_go_on_beyond_what_a_subscription_lasts_for(page: AttachedPage) -> None:
+def test_values_go_on_beyond_what_a_subscription_lasts_for(page):
     look(page, robot_1(page))
     page.let(5 * RENEW)
 
     assert "unknown" not in readings(page).values()
 
 
-def test_a_value_that_does_not_come_any_more_is_unknown(page: AttachedPage) -> None:
+def test_a_value_that_does_not_come_any_more_is_unknown(page):
     look(page, robot_1(page))
     page.until(lambda: "unknown" not in readings(page).values())
     page.world.world.run.network.leave(page.world.robot().device.id_tag)
@@ -74,9 +72,7 @@ def test_a_value_that_does_not_come_any_more_is_unknown(page: AttachedPage) -> N
     assert set(readings(page).values()) == {"unknown"}
 
 
-def test_only_what_the_dva_permits_is_shown(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_only_what_the_dva_permits_is_shown(monkeypatch, tmp_path):
     rules = [{"levels": ["sensors"], "sensors": ["temperature"]}]
     with attached(monkeypatch, tmp_path, access=rules) as page:
         page.until(lambda: readings(page))
@@ -87,9 +83,7 @@ def test_only_what_the_dva_permits_is_shown(
         assert known == {"temperature"}
 
 
-def test_whoever_looks_before_the_sensors_are_known_gets_their_values_too(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_whoever_looks_before_the_sensors_are_known_gets_their_values_too(monkeypatch, tmp_path):
     with attached(monkeypatch, tmp_path) as page:
         page.until(lambda: page.world.robot().device.id_tag in page.system.numbers)
         assert readings(page) == {}

@@ -1,7 +1,5 @@
 """The console's audit log: rows told done when they are on the disk, and disks that are full."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,7 +30,7 @@ def told(keeper: AuditKeeper, action: str) -> list[str]:
     return said
 
 
-def test_who_waits_for_a_row_is_told_when_it_is_in_the_file(keeper: AuditKeeper) -> None:
+def test_who_waits_for_a_row_is_told_when_it_is_in_the_file(keeper):
     seen: list[AuditRow] = []
     keeper.on_rows = seen.extend
 
@@ -45,9 +43,7 @@ def test_who_waits_for_a_row_is_told_when_it_is_in_the_file(keeper: AuditKeeper)
     assert (keeper.number, keeper.head) == (2, rows[1].hash)
 
 
-def test_a_console_that_ends_writes_what_waits_and_says_that_it_ended(
-    keeper: AuditKeeper,
-) -> None:
+def test_a_console_that_ends_writes_what_waits_and_says_that_it_ended(keeper):
     for number in range(1200):
         keeper.put(keeper.entry(f"step {number}"))
     keeper.close()
@@ -57,9 +53,7 @@ def test_a_console_that_ends_writes_what_waits_and_says_that_it_ended(
     assert verify(keeper.path).is_ended
 
 
-def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(
-    keeper: AuditKeeper, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(keeper, monkeypatch):
     monkeypatch.setattr(audit_keeper, "AGAIN", 0.01)
     assert told(keeper, "before") == [""]
     keeper._log._file.execute("PRAGMA max_page_count = 1")
@@ -75,9 +69,7 @@ def test_on_a_full_disk_nobody_is_told_that_it_is_done_and_nothing_is_lost(
     assert [row.action for row in read_rows(keeper.path)] == [BEGIN, "before", "assign"]
 
 
-def test_what_waits_for_a_full_disk_is_bounded_and_what_was_lost_is_told(
-    keeper: AuditKeeper, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_waits_for_a_full_disk_is_bounded_and_what_was_lost_is_told(keeper, monkeypatch):
     monkeypatch.setattr(audit_keeper, "MOST_WAITING", 0)
     said: list[str] = []
     keeper.put(keeper.entry("one too many"), said.append)
@@ -88,7 +80,7 @@ def test_what_waits_for_a_full_disk_is_bounded_and_what_was_lost_is_told(
     assert re.search(r"\b1\b", read_rows(keeper.path)[-1].text)
 
 
-def test_without_a_file_the_log_is_gone_with_the_console() -> None:
+def test_without_a_file_the_log_is_gone_with_the_console():
     kept = AuditKeeper(None, lambda: 0.0, {})
     assert not kept.is_lasting
     assert told(kept, "note") == [""]
@@ -102,8 +94,6 @@ def test_without_a_file_the_log_is_gone_with_the_console() -> None:
     ("name", "words"),
     [("audit.txt", "should end in .sqlite"), ("no/folder.sqlite", "does not exist")],
 )
-def test_where_no_log_can_be_kept_is_told_before_anything_starts(
-    tmp_path: Path, name: str, words: str
-) -> None:
+def test_where_no_log_can_be_kept_is_told_before_anything_starts(tmp_path, name, words):
     with pytest.raises(ConfigError, match=words):
         check_target(tmp_path / name)

@@ -1,7 +1,5 @@
 """Camera pictures of a run in real time, from the robot's lens to a player."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """People at a console's control rooms: what they decide goes by messages, and the DVA judges it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -64,7 +62,7 @@ def sent_by(one: PhonePage, label: str) -> list[bytes]:
     return [data for source, _, data in one.heard if source in ids and isinstance(data, bytes)]
 
 
-def test_an_event_is_acknowledged_once_and_the_second_is_told_by_whom(room: PhonePage) -> None:
+def test_an_event_is_acknowledged_once_and_the_second_is_told_by_whom(room):
     assert room.do("event_acknowledge", event=1)[0]
     assert event(room)["acknowledged"]["label"] == "ana"
 
@@ -74,7 +72,7 @@ def test_an_event_is_acknowledged_once_and_the_second_is_told_by_whom(room: Phon
     assert "acknowledged by ana" in text
 
 
-def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room: PhonePage) -> None:
+def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room):
     done, _ = room.do("event_proposal", event=1)
     assert done
     proposal = room.told("done")[-1]["proposal"]
@@ -91,9 +89,7 @@ def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room: Phon
     assert event(room)["decided"]["reason"] == "knows the place"
 
 
-def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(
-    room: PhonePage,
-) -> None:
+def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(room):
     about = {"kind": "flood", "severity": "low", "x_m": 8.0, "y_m": 12.0}
     assert room.do("event_raise", **about)[0]
     number = room.told("done")[-1]["event"]
@@ -107,9 +103,7 @@ def test_who_is_at_another_event_is_not_free_and_the_dva_refuses_to_send_it(
     assert "guard-1" in text
 
 
-def test_of_two_who_decide_with_the_same_knowledge_the_second_changes_nothing(
-    room: PhonePage,
-) -> None:
+def test_of_two_who_decide_with_the_same_knowledge_the_second_changes_nothing(room):
     assert room.do("room_join", client="b1", name="ben", role="dispatch")[0]
     seen = event(room)["decisions"]
     assert room.do("event_assign", event=1, device="guard-1", decisions=seen)[0]
@@ -128,16 +122,14 @@ def test_of_two_who_decide_with_the_same_knowledge_the_second_changes_nothing(
         ("event_escalate", {"reason": "too large for us"}, State.ESCALATED),
     ],
 )
-def test_an_event_is_ended_by_a_decision(
-    room: PhonePage, what: str, about: dict[str, str], state: State
-) -> None:
+def test_an_event_is_ended_by_a_decision(room, what, about, state):
     done, text = room.do(what, event=1, **about)
 
     assert done, text
     assert event(room)["state"] == str(state)
 
 
-def test_who_was_sent_is_taken_off_and_a_note_is_for_all(room: PhonePage) -> None:
+def test_who_was_sent_is_taken_off_and_a_note_is_for_all(room):
     assert room.do("event_assign", event=1, device="guard-1")[0]
     assert room.do("event_take_off", event=1, device="guard-1", reason="needed here")[0]
     assert event(room)["assigned"] == []
@@ -145,7 +137,7 @@ def test_who_was_sent_is_taken_off_and_a_note_is_for_all(room: PhonePage) -> Non
     assert event(room)["note"] == "the door is locked"
 
 
-def test_an_event_is_raised_at_a_place_and_nowhere_else(room: PhonePage) -> None:
+def test_an_event_is_raised_at_a_place_and_nowhere_else(room):
     about = {"kind": "flood", "severity": "critical", "x_m": 20.0, "y_m": 12.0}
     assert room.do("event_raise", **about)[0]
     number = room.told("done")[-1]["event"]
@@ -157,9 +149,7 @@ def test_an_event_is_raised_at_a_place_and_nowhere_else(room: PhonePage) -> None
 
 
 @pytest.mark.parametrize("role", ["look", "drive"])
-def test_the_dva_refuses_what_a_role_does_not_allow_though_the_web_let_it_pass(
-    monkeypatch: pytest.MonkeyPatch, role: str
-) -> None:
+def test_the_dva_refuses_what_a_role_does_not_allow_though_the_web_let_it_pass(monkeypatch, role):
     one = page(monkeypatch)
     fire(one)
     assert one.do("room_join", name="eve", role=role)[0]
@@ -174,9 +164,7 @@ def test_the_dva_refuses_what_a_role_does_not_allow_though_the_web_let_it_pass(
         assert f"eve has the role {role}" in text
 
 
-def test_a_dispatcher_does_not_take_a_robot_from_its_holder(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_dispatcher_does_not_take_a_robot_from_its_holder(monkeypatch):
     one = page(monkeypatch)
     assert one.do("room_join", name="dan", role="dispatch")[0]
     done, text = one.do("take_over", robot="robot-1", reason="mine")
@@ -185,7 +173,7 @@ def test_a_dispatcher_does_not_take_a_robot_from_its_holder(
     assert "needs supervise" in text
 
 
-def test_the_policy_acts_by_itself_once_it_is_let(room: PhonePage) -> None:
+def test_the_policy_acts_by_itself_once_it_is_let(room):
     assert event(room)["assigned"] == []
     assert room.told("control")[-1]["dispatch"]["mode"] == "ask_first"
     assert room.do("dispatch_mode", mode="automatic")[0]
@@ -196,9 +184,7 @@ def test_the_policy_acts_by_itself_once_it_is_let(room: PhonePage) -> None:
     assert (told["mode"], told["switched"]["label"]) == ("automatic", "ana")
 
 
-def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(
-    room: PhonePage,
-) -> None:
+def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(room):
     assert room.do("take", client="b1", robots=["robot-1"], role="drive")[0]
     assert room.do("start", client="b1", within=60)[0]
     done, text = room.do("take_over", robot="robot-1", reason="ben is away", role="supervise")
@@ -210,9 +196,7 @@ def test_a_robot_that_another_drives_is_taken_over_with_what_it_was_sent_to(
 
 
 @pytest.mark.parametrize("wait", [0.0, 8.0], ids=["before it is held", "while it is driven"])
-def test_a_robot_is_taken_over_from_an_operator_with_the_event_it_was_sent_to(
-    monkeypatch: pytest.MonkeyPatch, wait: float
-) -> None:
+def test_a_robot_is_taken_over_from_an_operator_with_the_event_it_was_sent_to(monkeypatch, wait):
     one = page(monkeypatch, operator__count=2)
     assert one.do("room_join", name="ana", role="supervise")[0]
     fire(one)
@@ -228,7 +212,7 @@ def test_a_robot_is_taken_over_from_an_operator_with_the_event_it_was_sent_to(
     assert one.seat()["drives"][0]["phase"] == "held"
 
 
-def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room: PhonePage) -> None:
+def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room):
     done, text = room.do("mission", robot="robot-1", event=1)
     assert done, text
     assert room.robot(0).controller.mode is Mode.MISSION
@@ -239,7 +223,7 @@ def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room: PhonePage) -> 
     assert room.robot(0).controller.grant is None
 
 
-def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room: PhonePage) -> None:
+def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room):
     (alarm,) = [one for one in alarms(room) if one["event"] == 1]
     assert alarm["state"] == "unacknowledged"
     assert alarm["text"] == "Fire, North office"
@@ -250,7 +234,7 @@ def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room: PhonePage
     assert event(room)["acknowledged"]["label"] == "ana"
 
 
-def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room: PhonePage) -> None:
+def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room):
     (alarm,) = [one for one in alarms(room) if one["event"] == 1]
     assert room.do("alarm_shelve", alarm=alarm["key"], for_s=60)[0]
     assert not [one for one in alarms(room) if one["event"] == 1]
@@ -261,14 +245,14 @@ def test_a_shelved_alarm_comes_back_and_a_row_that_is_gone_is_told(room: PhonePa
     assert not done
 
 
-def test_a_page_that_is_gone_for_good_has_no_room_any_more(room: PhonePage) -> None:
+def test_a_page_that_is_gone_for_good_has_no_room_any_more(room):
     room.actions.take({"id": "bye-release-a1", "client": "a1", "do": "release"})
     room.let(1.0)
 
     assert room.told("control")[-1]["rooms"] == []
 
 
-def test_every_message_of_a_control_room_keeps_the_schema(room: PhonePage) -> None:
+def test_every_message_of_a_control_room_keeps_the_schema(room):
     room.do("event_acknowledge", event=1)
     room.do("event_assign", event=1, device="guard-1", reason='<b>why & "how"</b>')
     room.do("event_note", event=1, text="<script>alert(1)</script>")
@@ -299,7 +283,7 @@ def written(one: PhonePage) -> list[AuditRow]:
     return read_rows(keeper.path)
 
 
-def test_each_action_is_a_row_with_author_role_cause_and_outcome(logged: PhonePage) -> None:
+def test_each_action_is_a_row_with_author_role_cause_and_outcome(logged):
     logged.do("event_acknowledge", event=1, role="supervise")
     logged.do("event_assign", event=1, device="guard-1", reason="is near", role="supervise")
     logged.do("take", robots=["robot-1"], role="supervise")
@@ -317,9 +301,7 @@ def test_each_action_is_a_row_with_author_role_cause_and_outcome(logged: PhonePa
     assert rows["assign", "refused"].text == "no event 77"
 
 
-def test_nothing_new_is_done_while_the_log_cannot_be_written_but_whatever_stops_is(
-    logged: PhonePage,
-) -> None:
+def test_nothing_new_is_done_while_the_log_cannot_be_written_but_whatever_stops_is(logged):
     assert logged.world.audited is not None
     keeper = logged.world.audited.keeper
     assert logged.do("take", robots=["robot-1"], role="drive")[0]
@@ -343,7 +325,7 @@ def test_nothing_new_is_done_while_the_log_cannot_be_written_but_whatever_stops_
     assert found.index("emergency") < found.index("assign")
 
 
-def test_the_log_of_a_run_holds(logged: PhonePage) -> None:
+def test_the_log_of_a_run_holds(logged):
     logged.do("event_acknowledge", event=1)
     path = logged.world.audited.keeper.path if logged.world.audited else Path()
     written(logged)

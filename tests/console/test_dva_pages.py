@@ -1,7 +1,5 @@
 """The DVA under a person's hand: its server, fake devices, permissions."""
 
-from __future__ import annotations
-
 import re
 import socket
 

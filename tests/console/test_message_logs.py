@@ -1,7 +1,5 @@
 """Logs of messages: bounded at each step from the network to a page, and only for who looks."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The files of the pages: what they are made of, how long they are, what they may not say."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import shutil
@@ -23,7 +21,7 @@ LIST = tomllib.loads((HERE / "vendor.toml").read_text())
 IMPORT = re.compile(r"^(?:import|export)\b[^;]*?from '([^']+)';|^import '([^']+)';", re.MULTILINE)
 
 
-def test_vendored_files_are_those_of_the_list() -> None:
+def test_vendored_files_are_those_of_the_list():
     found = {
         f"{place}/{file.name}": hashlib.sha256(file.read_bytes()).hexdigest()
         for place, folder in VENDORED.items()
@@ -34,14 +32,14 @@ def test_vendored_files_are_those_of_the_list() -> None:
     assert found == LIST["written"]
 
 
-def test_every_vendored_package_that_is_shipped_has_its_licence() -> None:
+def test_every_vendored_package_that_is_shipped_has_its_licence():
     licences = (VENDORED["shipped"] / "LICENSES.txt").read_text()
     for package in LIST["package"]:
         title = f"{package['name']} {package['version']} ({package['licence']})"
         assert (title in licences) != package.get("only_tests", False)
 
 
-def test_colours_are_those_that_the_palette_writes() -> None:
+def test_colours_are_those_that_the_palette_writes():
     for name, text in palette.FILES.items():
         assert (STATIC / name).read_text(encoding="utf-8") == text(), (
             f"{name} is old: python -m dva_sim.console.palette"
@@ -49,18 +47,18 @@ def test_colours_are_those_that_the_palette_writes() -> None:
 
 
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
-def test_what_is_to_be_read_stands_out(theme: int) -> None:
+def test_what_is_to_be_read_stands_out(theme):
     colours = palette.palettes()[theme]
     for front, ground, least in palette.NEEDED:
         assert palette.contrast(colours[front], colours[ground]) >= least, (front, ground)
 
 
-def test_contrast_is_that_of_the_standard() -> None:
+def test_contrast_is_that_of_the_standard():
     assert palette.contrast("#ffffff", "#000000") == pytest.approx(21)
     assert palette.contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
 
 
-def test_colours_are_named_only_in_the_palette() -> None:
+def test_colours_are_named_only_in_the_palette():
     """Black and white over pictures aside, which are the same in both themes."""
     allowed = {"#000", "#fff", "#8a0000"}
     for file in [*OWN, *(STATIC / "css").iterdir()]:
@@ -72,7 +70,7 @@ def test_colours_are_named_only_in_the_palette() -> None:
 UNSAFE = re.compile(r"innerHTML|outerHTML|AdjacentHTML|dangerouslySet|document\.write|https?://")
 
 
-def test_modules_of_the_pages_say_what_they_are_for_and_write_no_html() -> None:
+def test_modules_of_the_pages_say_what_they_are_for_and_write_no_html():
     for file in OWN:
         text = file.read_text(encoding="utf-8")
         assert text.startswith(("/**", "//")), file
@@ -86,7 +84,7 @@ def imports(file: Path) -> set[Path]:
     return {(file.parent / name).resolve() for name in found if "vendor" not in name}
 
 
-def test_no_module_of_the_pages_is_part_of_a_circle() -> None:
+def test_no_module_of_the_pages_is_part_of_a_circle():
     left = {file.resolve(): imports(file) for file in OWN}
     assert all(path in left for paths in left.values() for path in paths)
 
@@ -97,7 +95,7 @@ def test_no_module_of_the_pages_is_part_of_a_circle() -> None:
     assert not left
 
 
-def test_every_module_and_icon_of_the_pages_is_used() -> None:
+def test_every_module_and_icon_of_the_pages_is_used():
     pages = "".join(file.read_text() for file in STATIC.glob("*.html"))
     begins = {(STATIC / name).resolve() for name in re.findall(r'src="/static/([^"]+)"', pages)}
     used = {path for file in OWN for path in imports(file)} | begins
@@ -110,7 +108,7 @@ def test_every_module_and_icon_of_the_pages_is_used() -> None:
     assert {name for name in names if f"'{name}'" in texts or f'"{name}"' in texts} == names
 
 
-def test_types_of_the_pages_hold() -> None:
+def test_types_of_the_pages_hold():
     own = Path(sys.prefix) / "node_modules" / ".bin"
     tsc = shutil.which("tsc", path=str(own)) or shutil.which("tsc")
     if tsc is None:

@@ -1,7 +1,5 @@
 """The process that draws: what was watched, what was true, and no more than there is time for."""
 
-from __future__ import annotations
-
 import io
 import json
 import socket

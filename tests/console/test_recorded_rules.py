@@ -1,7 +1,5 @@
 """A console's recording is judged as the console itself was, whatever people do to its robots."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any
@@ -49,9 +47,7 @@ class Recorded:
         return [{verdict.rule: verdict.state for verdict in some} for some in both]
 
 
-def test_an_answer_that_is_lost_was_given_all_the_same(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_an_answer_that_is_lost_was_given_all_the_same(monkeypatch, tmp_path):
     """The robot obeys an emergency, nobody hears of it, and is driven on by a new order."""
     console = Recorded(monkeypatch, tmp_path / "run.mcap")
     faults = console.world.windows.by_id[ROBOT].faults
@@ -73,8 +69,8 @@ def test_an_answer_that_is_lost_was_given_all_the_same(
 
 @pytest.mark.parametrize("is_deaf", [False, True])
 def test_hands_faults_and_a_dva_that_is_stopped_are_part_of_the_recording(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, is_deaf: bool
-) -> None:
+    monkeypatch, tmp_path, is_deaf
+):
     """Driven by hand, stopped by its button, hung, slowed; then again, by a robot that is deaf."""
     if is_deaf:
         monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))

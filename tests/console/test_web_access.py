@@ -1,7 +1,5 @@
 """Who may do what: decided for each request, before anything else looks at it."""
 
-from __future__ import annotations
-
 import ipaddress
 import socket
 

@@ -1,7 +1,5 @@
 """The audit log by plain requests: rows, measures, verification, export, and who may ask."""
 
-from __future__ import annotations
-
 import csv
 import io
 import shutil
@@ -62,7 +60,7 @@ def served(file: Path) -> Iterator[Served]:
         yield one
 
 
-def test_rows_come_by_the_thousand_after_a_number(served: Served) -> None:
+def test_rows_come_by_the_thousand_after_a_number(served):
     first = served.ask("/api/audit", token=served.look).json
     rest = served.ask("/api/audit?after=1000", token=served.look).json
 
@@ -71,19 +69,19 @@ def test_rows_come_by_the_thousand_after_a_number(served: Served) -> None:
     assert rest["rows"][0]["before"] == first["rows"][-1]["hash"]
 
 
-def test_a_number_that_is_none_is_refused(served: Served) -> None:
+def test_a_number_that_is_none_is_refused(served):
     for after in ("-1", "x", "1e3", "9" * 13):
         assert served.ask(f"/api/audit?after={after}", token=served.look).status == 400, after
 
 
-def test_nobody_reads_it_without_a_token_and_without_a_log_there_is_none(served: Served) -> None:
+def test_nobody_reads_it_without_a_token_and_without_a_log_there_is_none(served):
     for path in ("", "/check", "/measures", ".csv", ".json"):
         assert served.ask(f"/api/audit{path}").status == 401
     with serving() as without:
         assert without.ask("/api/audit", token=without.look).status == 404
 
 
-def test_a_change_is_told_and_so_is_a_file_that_is_gone(file: Path, tmp_path: Path) -> None:
+def test_a_change_is_told_and_so_is_a_file_that_is_gone(file, tmp_path):
     copy = Path(shutil.copy(file, tmp_path))
     with serving("--audit", str(copy)) as served:
         assert served.ask("/api/audit/check", token=served.look).json["problem"] is None
@@ -98,7 +96,7 @@ def test_a_change_is_told_and_so_is_a_file_that_is_gone(file: Path, tmp_path: Pa
             assert served.ask(f"/api/audit{path}", token=served.look).status == 503
 
 
-def test_what_a_spreadsheet_would_compute_is_exported_as_words() -> None:
+def test_what_a_spreadsheet_would_compute_is_exported_as_words():
     words = ["=cmd|' /C calc'!A0", "+1", "-1", "@SUM(1)", "\t=1", "plain"]
     text = csv_of(rows(*(entry("note", text=word) for word in words)))
 
@@ -106,7 +104,7 @@ def test_what_a_spreadsheet_would_compute_is_exported_as_words() -> None:
     assert found == [f"'{word}" for word in words[:-1]] + ["plain"]
 
 
-def test_the_export_holds_every_row(served: Served, file: Path) -> None:
+def test_the_export_holds_every_row(served, file):
     answer = served.ask("/api/audit.csv", token=served.look)
 
     assert "attachment" in answer.headers["content-disposition"]
@@ -114,7 +112,7 @@ def test_the_export_holds_every_row(served: Served, file: Path) -> None:
     assert [row["hash"] for row in found] == [row.hash for row in read_rows(file)]
 
 
-def test_times_count_the_first_time_for_each_event_and_overrides_are_told() -> None:
+def test_times_count_the_first_time_for_each_event_and_overrides_are_told():
     found = measured(
         rows(
             entry("acknowledge", event=1, details={"waited_s": 4.0}),
@@ -135,7 +133,7 @@ def test_times_count_the_first_time_for_each_event_and_overrides_are_told() -> N
     assert [one["advised"] for one in found["newest_overrides"]] == ["robot-2", None]
 
 
-def test_of_a_log_without_decisions_there_is_nothing_to_measure() -> None:
+def test_of_a_log_without_decisions_there_is_nothing_to_measure():
     found = measured(rows(entry(BEGIN)))
 
     assert found["acknowledge"] == {"events": 0, "median_s": None, "largest_s": None}

@@ -1,7 +1,5 @@
 """Camera pictures over HTTP: streams for browsers and players, drawn only while somebody looks."""
 
-from __future__ import annotations
-
 import io
 import json
 import select

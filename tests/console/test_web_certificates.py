@@ -1,7 +1,5 @@
 """The certificates by which phones know this machine: what they say, and when they are renewed."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import stat

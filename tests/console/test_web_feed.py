@@ -1,7 +1,5 @@
 """What a page gets: the newest of what it lacks, however rarely it asks."""
 
-from __future__ import annotations
-
 import json
 
 from helpers.console.served_console import places, scene

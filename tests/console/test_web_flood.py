@@ -1,7 +1,5 @@
 """Connections that ask for nothing keep nobody out: an emergency stop and a page get through."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import socket

@@ -1,7 +1,5 @@
 """The sockets of pages: who is let in."""
 
-from __future__ import annotations
-
 import asyncio
 
 from starlette.responses import Response

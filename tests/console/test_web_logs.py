@@ -1,7 +1,5 @@
 """Logs by plain requests of a running web process: who may read them, whole, and as a file."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

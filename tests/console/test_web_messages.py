@@ -1,7 +1,5 @@
 """What clients say, read with suspicion; and what of it waits for the simulation."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

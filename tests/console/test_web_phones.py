@@ -1,7 +1,5 @@
 """The address for phones: https, a role of its own, and what a phone may not."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import ssl

@@ -1,7 +1,5 @@
 """A seat opens with its key alone: names are public, and a lesser token does nothing in it."""
 
-from __future__ import annotations
-
 import json
 from concurrent.futures import ThreadPoolExecutor
 

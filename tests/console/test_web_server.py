@@ -1,7 +1,5 @@
 """The web process over real sockets: what it lets in, and that nobody delays anybody."""
 
-from __future__ import annotations
-
 import json
 import signal
 import socket

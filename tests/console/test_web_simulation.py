@@ -1,7 +1,5 @@
 """What is known of the simulation, and what is asked of it: alive, hung, ended."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import socket

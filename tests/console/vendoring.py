@@ -7,8 +7,6 @@ a tarball or a written file that differs from its hash there is refused. After a
 `--accept` notes the hashes of the written files anew.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Worlds for the contract tests: every promise is held against every transport."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """Whatever is lost, doubled, late or overtaken: each request ends once, and in its own reply."""
 
-from __future__ import annotations
-
 from random import Random
 
 import pytest

@@ -1,7 +1,5 @@
 """What devices make of it: requests act once, emergencies always, and old commands never."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 

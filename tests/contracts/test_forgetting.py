@@ -1,7 +1,5 @@
 """A DVA leaves who is silent, hears who is back, and keeps nothing open for who is gone."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What other programs may send to a node, and how little that matters to everybody else."""
 
-from __future__ import annotations
-
 import socket as tcp
 from collections.abc import Iterator
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """What every messaging pattern promises a drive, over every transport."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -21,7 +19,7 @@ def small_drive(world: World, pattern: Pattern, **of_drive: Any) -> TriedDrive:
 
 
 @pytest.mark.parametrize("name", [*PATTERNS, EXAMPLE])
-def test_commands_come_in_their_order_and_each_is_accounted_for(world: World, name: str) -> None:
+def test_commands_come_in_their_order_and_each_is_accounted_for(world, name):
     options = {"every": 5} if name == EXAMPLE else {}
     drive = small_drive(world, load_pattern(name, options)(), rate_hz=50.0, timeout=PATIENCE_S)
     drive.begin()
@@ -33,7 +31,7 @@ def test_commands_come_in_their_order_and_each_is_accounted_for(world: World, na
     assert 0 <= drive.held <= 1
 
 
-def test_who_asks_now_and_then_finds_out_that_the_robot_is_gone(world: World) -> None:
+def test_who_asks_now_and_then_finds_out_that_the_robot_is_gone(world):
     brief = 1.0
     pattern = load_pattern(EXAMPLE, {"every": 3, "timeout_s": brief})()
     drive = small_drive(world, pattern, attempts=2)
@@ -49,7 +47,7 @@ def test_who_asks_now_and_then_finds_out_that_the_robot_is_gone(world: World) ->
 
 
 @pytest.mark.parametrize("name", ["req-rep", "pipelined", EXAMPLE])
-def test_who_asks_finds_out_that_it_is_refused(world: World, name: str) -> None:
+def test_who_asks_finds_out_that_it_is_refused(world, name):
     pattern = load_pattern(name, {"every": 3} if name == EXAMPLE else {})()
     drive = small_drive(world, pattern, refuses=4, timeout=PATIENCE_S)
     drive.begin()

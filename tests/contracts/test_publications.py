@@ -1,7 +1,5 @@
 """What publishers and subscribers are promised, whatever carries the publications."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

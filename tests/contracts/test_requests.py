@@ -1,7 +1,5 @@
 """What whoever asks is promised, whatever carries the request."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.network.transports import (
     BRIEF,

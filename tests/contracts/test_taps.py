@@ -1,7 +1,5 @@
 """Whoever looks at what a node is asked and answers sees it as it is, and changes nothing."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.network.transports import BRIEF, PATIENT, PHONE, ROBOT, Asker, World, echo, numbered
 
@@ -17,7 +15,7 @@ def tapped(world: World, node: str) -> list[Exchange]:
     return seen
 
 
-def test_each_request_is_seen_once_with_the_answer_that_was_given(world: World) -> None:
+def test_each_request_is_seen_once_with_the_answer_that_was_given(world):
     seen = tapped(world, ROBOT)
     world.serve(ROBOT, echo)
     asker = Asker(world.network)
@@ -30,7 +28,7 @@ def test_each_request_is_seen_once_with_the_answer_that_was_given(world: World) 
     assert all(one.service_s is not None and 0.0 <= one.service_s < PATIENT for one in seen)
 
 
-def test_an_answer_that_comes_later_is_told_with_the_time_it_took(world: World) -> None:
+def test_an_answer_that_comes_later_is_told_with_the_time_it_took(world):
     seen = tapped(world, ROBOT)
     replies: list[bytes | None] = []
     world.network.taps[ROBOT] = Tap(
@@ -46,7 +44,7 @@ def test_an_answer_that_comes_later_is_told_with_the_time_it_took(world: World) 
     assert seen[0].service_s > 0.0499
 
 
-def test_a_request_without_an_answer_is_seen_all_the_same(world: World) -> None:
+def test_a_request_without_an_answer_is_seen_all_the_same(world):
     seen = tapped(world, ROBOT)
 
     def silent(_: Request) -> None:
@@ -59,7 +57,7 @@ def test_a_request_without_an_answer_is_seen_all_the_same(world: World) -> None:
     assert [(one.data, one.reply, one.service_s) for one in seen] == [(b"hello?", None, None)]
 
 
-def test_publications_are_seen_by_the_tap_of_who_hears_them(world: World) -> None:
+def test_publications_are_seen_by_the_tap_of_who_hears_them(world):
     seen, got = tapped(world, PHONE), list[bytes]()
     world.network.subscribe(PHONE, ROBOT, "news|", got.append)
 
@@ -72,7 +70,7 @@ def test_publications_are_seen_by_the_tap_of_who_hears_them(world: World) -> Non
     assert [(one.data, one.published, one.peer) for one in seen] == [(b"an event", True, ROBOT)]
 
 
-def test_a_tap_that_wants_no_publications_counts_none(world: World) -> None:
+def test_a_tap_that_wants_no_publications_counts_none(world):
     seen, got = tapped(world, PHONE), list[bytes]()
     world.network.taps[PHONE].publications = False
     world.network.subscribe(PHONE, ROBOT, "news|", got.append)
@@ -81,7 +79,7 @@ def test_a_tap_that_wants_no_publications_counts_none(world: World) -> None:
     assert seen == []
 
 
-def test_without_its_tap_a_node_is_as_before(world: World) -> None:
+def test_without_its_tap_a_node_is_as_before(world):
     seen = tapped(world, ROBOT)
     del world.network.taps[ROBOT]
     world.serve(ROBOT, echo)

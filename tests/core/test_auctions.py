@@ -1,7 +1,5 @@
 """Tasks on offer: who is asked, whose bid counts, and what becomes of an award."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -39,7 +37,7 @@ def office() -> Office:
     return office
 
 
-def test_the_task_goes_to_the_earliest_arrival_when_all_have_bid(office: Office) -> None:
+def test_the_task_goes_to_the_earliest_arrival_when_all_have_bid(office):
     assert office.bids(GUARD, 30.0, 0.5)[1] == []
     assert office.bids(ROBOT, 50.0, 0.6)[1] == []
     assert office.bids(OTHER_GUARD, 20.0, 1.0)[1] == [Send(OTHER_GUARD, AWARD)]
@@ -47,24 +45,24 @@ def test_the_task_goes_to_the_earliest_arrival_when_all_have_bid(office: Office)
     assert office.event().sent == {OTHER_GUARD}
 
 
-def test_when_the_time_is_up_the_best_of_those_who_have_bid_gets_it(office: Office) -> None:
+def test_when_the_time_is_up_the_best_of_those_who_have_bid_gets_it(office):
     office.bids(GUARD, 30.0, 0.5)
     assert office.tick(1.9) == []
     assert office.desk.next_deadline() == 2.0
     assert office.tick(2.0) == [Send(GUARD, AWARD)]
 
 
-def test_arrival_counts_from_when_the_bid_came(office: Office) -> None:
+def test_arrival_counts_from_when_the_bid_came(office):
     office.bids(OTHER_GUARD, 20.0, 0.1)
     office.bids(GUARD, 19.0, 1.9)
     assert office.tick(2.0) == [Send(OTHER_GUARD, AWARD)]
 
 
-def test_a_bid_that_comes_too_late_is_refused(office: Office) -> None:
+def test_a_bid_that_comes_too_late_is_refused(office):
     assert office.bids(GUARD, 5.0, 2.1)[0].code == m.UNKNOWN_EVENT
 
 
-def test_of_two_bids_the_first_counts_and_the_second_is_refused(office: Office) -> None:
+def test_of_two_bids_the_first_counts_and_the_second_is_refused(office):
     office.bids(GUARD, 30.0, 0.5)
     office.bids(OTHER_GUARD, 20.0, 0.6)
     assert office.bids(GUARD, 1.0, 0.7)[0].code == m.UNKNOWN_EVENT
@@ -72,17 +70,17 @@ def test_of_two_bids_the_first_counts_and_the_second_is_refused(office: Office) 
 
 
 @pytest.mark.parametrize(("who", "event"), [(OPERATOR, 1), (DETECTOR, 1), (GUARD, 2)])
-def test_a_bid_that_nobody_asked_for_is_refused(office: Office, who: str, event: int) -> None:
+def test_a_bid_that_nobody_asked_for_is_refused(office, who, event):
     assert office.bids(who, 5.0, 0.5, event)[0].code == m.UNKNOWN_EVENT
 
 
-def test_who_cannot_be_reached_is_not_waited_for(office: Office) -> None:
+def test_who_cannot_be_reached_is_not_waited_for(office):
     office.bids(GUARD, 30.0, 0.5)
     assert office.no([Send(OTHER_GUARD, OFFER)], 0.6) == []
     assert office.no([Send(ROBOT, OFFER)], 0.7) == [Send(GUARD, AWARD)]
 
 
-def test_an_award_that_is_refused_is_offered_again_to_the_others(office: Office) -> None:
+def test_an_award_that_is_refused_is_offered_again_to_the_others(office):
     office.bids(GUARD, 30.0, 0.5)
     award = office.tick(2.0)
     assert office.no(award, 2.5) == []
@@ -93,7 +91,7 @@ def test_an_award_that_is_refused_is_offered_again_to_the_others(office: Office)
     assert office.event().attempts == 0
 
 
-def test_where_nobody_bids_the_task_is_offered_again_until_its_deadline(office: Office) -> None:
+def test_where_nobody_bids_the_task_is_offered_again_until_its_deadline(office):
     now = 0.0
     while office.event().open:
         now += 2.0
@@ -103,7 +101,7 @@ def test_where_nobody_bids_the_task_is_offered_again_until_its_deadline(office: 
     assert office.desk.counters["auctions"] >= 15
 
 
-def test_a_robots_award_is_followed_by_the_order_to_its_operator(office: Office) -> None:
+def test_a_robots_award_is_followed_by_the_order_to_its_operator(office):
     office.bids(ROBOT, 5.0, 0.5)
     award = office.tick(2.0)
     assert award == [Send(ROBOT, AWARD)]
@@ -115,21 +113,21 @@ def test_a_robots_award_is_followed_by_the_order_to_its_operator(office: Office)
     assert office.event().attempts == 1
 
 
-def test_a_robot_that_refuses_its_award_frees_its_operator(office: Office) -> None:
+def test_a_robot_that_refuses_its_award_frees_its_operator(office):
     office.bids(ROBOT, 5.0, 0.5)
     office.no(office.tick(2.0), 2.1)
     assert office.working == {}
     assert office.event().state is State.PENDING
 
 
-def test_an_operator_that_declines_frees_the_robot_that_was_awarded(office: Office) -> None:
+def test_an_operator_that_declines_frees_the_robot_that_was_awarded(office):
     office.bids(ROBOT, 5.0, 0.5)
     office.no(office.ok(office.tick(2.0), 2.1), 2.2)
     assert office.working == {}
     assert office.event().state is State.PENDING
 
 
-def test_an_award_answered_after_its_event_was_settled_binds_nobody(office: Office) -> None:
+def test_an_award_answered_after_its_event_was_settled_binds_nobody(office):
     """Somebody sent earlier has found out: the operator was never told, and is free."""
     office.event().sent.add(GUARD)
     office.bids(ROBOT, 5.0, 0.5)
@@ -139,7 +137,7 @@ def test_an_award_answered_after_its_event_was_settled_binds_nobody(office: Offi
     assert office.working == {}
 
 
-def test_an_auction_ends_with_its_event(office: Office) -> None:
+def test_an_auction_ends_with_its_event(office):
     office.bids(GUARD, 30.0, 0.5)
     office.withdraw(12, now=1.0)
     assert office.event().state is State.EXPIRED
@@ -149,7 +147,7 @@ def test_an_auction_ends_with_its_event(office: Office) -> None:
     assert office.desk.next_deadline() > 2.0
 
 
-def test_an_auction_whose_only_bidder_has_gone_begins_anew() -> None:
+def test_an_auction_whose_only_bidder_has_gone_begins_anew():
     """Else an event with endless patience would wait for a bidder for ever."""
     office = Office(Auction(), Rules(escalate_after=math.inf))
     office.busy(ROBOT, OPERATOR)
@@ -162,7 +160,7 @@ def test_an_auction_whose_only_bidder_has_gone_begins_anew() -> None:
     assert sends == [Send(OTHER_GUARD, OFFER)]
 
 
-def test_without_anybody_idle_an_auction_that_is_over_is_no_deadline() -> None:
+def test_without_anybody_idle_an_auction_that_is_over_is_no_deadline():
     office = Office(Auction(), Rules(escalate_after=math.inf))
     office.busy(ROBOT, OPERATOR)
     office.fire(12)
@@ -171,14 +169,14 @@ def test_without_anybody_idle_an_auction_that_is_over_is_no_deadline() -> None:
     assert office.desk.next_deadline() > 2.0
 
 
-def test_idle_devices_only_are_asked() -> None:
+def test_idle_devices_only_are_asked():
     office = Office(Auction())
     office.register(OTHER_GUARD, "Guard", 80)
     office.busy(GUARD, OPERATOR)
     assert [send.to for send in office.fire(12)] == [OTHER_GUARD]
 
 
-def test_while_one_task_is_on_offer_the_next_one_waits_its_turn(office: Office) -> None:
+def test_while_one_task_is_on_offer_the_next_one_waits_its_turn(office):
     assert office.fire(90, now=0.5) == []
     office.bids(GUARD, 30.0, 0.6)
     sends = office.tick(2.0)
@@ -197,7 +195,7 @@ class Chaos(Policy):
         return [Announcement(0), Announcement(0), Assignment(0, 0), Announcement(0)]
 
 
-def test_a_task_is_announced_once_and_not_at_all_when_it_is_given() -> None:
+def test_a_task_is_announced_once_and_not_at_all_when_it_is_given():
     office = Office(Chaos())
     office.register(OTHER_OPERATOR, "TeleOp")
     sends = office.fire(12)

@@ -1,7 +1,5 @@
 """Confirmed is not over: somebody deals with the event, and may have stood by for that."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

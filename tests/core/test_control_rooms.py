@@ -1,7 +1,5 @@
 """Control rooms: who may decide what, who wins, and what the rules hold whatever is decided."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.dispatch_desk import (
     DVA,

@@ -1,7 +1,5 @@
 """Nothing hangs: waits that are too long, orders that come to nothing, last words that are lost."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

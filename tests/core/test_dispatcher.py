@@ -1,7 +1,5 @@
 """What a policy sees, and what becomes of its advice, good or bad."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The book of events: reports become events, each in one state, its times in order."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.dispatch_desk import (
     DETECTOR,
@@ -37,7 +35,7 @@ def waiting_office() -> Office:
 # --- reports -------------------------------------------------------------------------------
 
 
-def test_reports_of_one_kind_within_8_metres_are_one_event(office: Office) -> None:
+def test_reports_of_one_kind_within_8_metres_are_one_event(office):
     office.fire(12)
     office.fire(19.9)
     office.fire(20.1)
@@ -45,21 +43,21 @@ def test_reports_of_one_kind_within_8_metres_are_one_event(office: Office) -> No
     assert {e.number: e.reports for e in office.desk.book.open.values()} == {1: 2, 2: 1, 3: 1}
 
 
-def test_where_reports_are_not_merged_each_is_an_event() -> None:
+def test_where_reports_are_not_merged_each_is_an_event():
     office = Office(rules=Rules(merge_distance=0.0))
     office.fire(12)
     office.fire(12)
     assert office.desk.book.total == 2
 
 
-def test_an_event_that_is_over_takes_no_more_reports(office: Office) -> None:
+def test_an_event_that_is_over_takes_no_more_reports(office):
     office.fire(12)
     office.finds(OPERATOR, "refuted", 3.0)
     office.fire(12, now=4.0)
     assert (office.event(1).reports, office.event(2).reports) == (1, 1)
 
 
-def test_a_report_said_twice_by_one_source_is_not_more_certain(office: Office) -> None:
+def test_a_report_said_twice_by_one_source_is_not_more_certain(office):
     office.fire(12, confidence=0.6)
     office.fire(12, confidence=0.6)
     assert office.event().confidence == pytest.approx(0.6)
@@ -67,19 +65,19 @@ def test_a_report_said_twice_by_one_source_is_not_more_certain(office: Office) -
     assert office.event().confidence == pytest.approx(0.7)
 
 
-def test_two_sources_of_06_and_05_that_err_independently_make_08(office: Office) -> None:
+def test_two_sources_of_06_and_05_that_err_independently_make_08(office):
     office.fire(12, confidence=0.6)
     office.fire(12, confidence=0.5, source=OTHER_DETECTOR)
     assert office.event().confidence == pytest.approx(0.8)
 
 
-def test_an_event_is_as_severe_as_the_worst_report(office: Office) -> None:
+def test_an_event_is_as_severe_as_the_worst_report(office):
     for severity in (0.3, 0.9, 0.5):
         office.fire(12, severity=severity)
     assert office.event().severity == 0.9
 
 
-def test_of_one_event_at_most_64_sources_are_told_apart() -> None:
+def test_of_one_event_at_most_64_sources_are_told_apart():
     book = EventBook()
     event = book.add("fire", HERE, 0.5, 0.0)
     for number in range(MOST_SOURCES + 10):
@@ -89,8 +87,8 @@ def test_of_one_event_at_most_64_sources_are_told_apart() -> None:
 
 @pytest.mark.invariant("S10")
 def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_event_is_not(
-    office: Office, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    office, monkeypatch
+):
     monkeypatch.setattr("dva_sim.core.events.MOST_OPEN", 1)
     office.fire(12)
     new = m.EventReport(None, "fire", east(90), 0.5, 0.9, "detected")
@@ -103,7 +101,7 @@ def test_when_the_book_is_full_a_report_is_answered_busy_and_one_of_a_known_even
 # --- withdrawal ----------------------------------------------------------------------------
 
 
-def test_what_its_only_source_withdraws_before_anybody_was_sent_has_expired() -> None:
+def test_what_its_only_source_withdraws_before_anybody_was_sent_has_expired():
     office = waiting_office()
     office.fire(12, now=1.0)
     office.withdraw(12, now=5.0)
@@ -112,7 +110,7 @@ def test_what_its_only_source_withdraws_before_anybody_was_sent_has_expired() ->
     assert office.desk.book.waiting == {}
 
 
-def test_an_event_expires_only_when_the_last_of_its_sources_has_withdrawn_it() -> None:
+def test_an_event_expires_only_when_the_last_of_its_sources_has_withdrawn_it():
     office = waiting_office()
     office.fire(12, source=DETECTOR)
     office.fire(14, source=OTHER_DETECTOR)
@@ -124,21 +122,21 @@ def test_an_event_expires_only_when_the_last_of_its_sources_has_withdrawn_it() -
     assert office.event().state is State.EXPIRED
 
 
-def test_nobody_can_withdraw_what_another_has_reported() -> None:
+def test_nobody_can_withdraw_what_another_has_reported():
     office = waiting_office()
     office.fire(12)
     office.withdraw(12, source=OTHER_DETECTOR)
     assert office.event().state is State.PENDING
 
 
-def test_once_somebody_is_on_the_way_a_withdrawal_ends_nothing(office: Office) -> None:
+def test_once_somebody_is_on_the_way_a_withdrawal_ends_nothing(office):
     office.fire(12)
     office.withdraw(12, now=1.0)
     assert office.event().state is State.ASSIGNED
     assert office.event().confidence == 0.0
 
 
-def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing() -> None:
+def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing():
     office = waiting_office()
     office.fire(12, kind="flood")
     office.fire(90)
@@ -150,7 +148,7 @@ def test_a_withdrawal_elsewhere_or_of_another_kind_ends_nothing() -> None:
 
 
 @pytest.mark.invariant("S7")
-def test_an_event_runs_its_course_with_its_times_in_order(office: Office) -> None:
+def test_an_event_runs_its_course_with_its_times_in_order(office):
     office.fire(12, now=1.0)
     office.progress(OPERATOR, "departed", 3.0)
     office.progress(OPERATOR, "arrived", 9.0)
@@ -169,7 +167,7 @@ def test_an_event_runs_its_course_with_its_times_in_order(office: Office) -> Non
     assert office.working == {}
 
 
-def test_every_step_is_a_change_that_the_memory_hears_of(office: Office) -> None:
+def test_every_step_is_a_change_that_the_memory_hears_of(office):
     office.fire(12)
     book = office.desk.book
     for state in ("departed", "arrived"):
@@ -178,14 +176,14 @@ def test_every_step_is_a_change_that_the_memory_hears_of(office: Office) -> None
         assert [event.number for event in book.changes()] == [1]
 
 
-def test_who_finds_something_was_there_even_if_its_arrival_was_lost(office: Office) -> None:
+def test_who_finds_something_was_there_even_if_its_arrival_was_lost(office):
     office.fire(12, now=1.0)
     office.finds(OPERATOR, "confirmed", 12.0)
     times = office.event().times
     assert [times[step] for step in ("departed", "arrived", "confirmed")] == [12.0, 12.0, 12.0]
 
 
-def test_an_event_that_waits_again_has_not_been_departed_for(office: Office) -> None:
+def test_an_event_that_waits_again_has_not_been_departed_for(office):
     office.fire(12, now=1.0)
     office.progress(OPERATOR, "arrived", 9.0)
     office.busy(GUARD)
@@ -197,7 +195,7 @@ def test_an_event_that_waits_again_has_not_been_departed_for(office: Office) -> 
     assert set(office.event().times) == {"detected", "assigned"}  # to the same again
 
 
-def test_a_step_that_does_not_exist_is_refused() -> None:
+def test_a_step_that_does_not_exist_is_refused():
     book = EventBook()
     event = book.add("fire", HERE, 0.5, 0.0)
     book.move(event, State.ESCALATED, 1.0)
@@ -206,7 +204,7 @@ def test_a_step_that_does_not_exist_is_refused() -> None:
 
 
 @pytest.mark.invariant("S6")
-def test_each_event_is_in_one_state_and_the_counts_add_up_to_all() -> None:
+def test_each_event_is_in_one_state_and_the_counts_add_up_to_all():
     book = EventBook()
     for number in range(6):
         book.add("fire", east(100 * number), 0.5, 0.0)
@@ -222,7 +220,7 @@ def test_each_event_is_in_one_state_and_the_counts_add_up_to_all() -> None:
     assert sum(book.counts.values()) == book.total == 6
 
 
-def test_the_last_1000_closed_events_are_kept() -> None:
+def test_the_last_1000_closed_events_are_kept():
     book = EventBook()
     for _ in range(KEPT_CLOSED + 1):
         book.move(book.add("fire", HERE, 0.5, 0.0), State.ESCALATED, 1.0)
@@ -234,7 +232,7 @@ def test_the_last_1000_closed_events_are_kept() -> None:
 # --- findings ------------------------------------------------------------------------------
 
 
-def test_only_who_was_sent_can_tell_what_was_found(office: Office) -> None:
+def test_only_who_was_sent_can_tell_what_was_found(office):
     office.fire(12)
     assert office.finds(DETECTOR, "confirmed", 2.0)[0].code == m.NOT_PERMITTED
     assert office.event().state is State.ASSIGNED
@@ -242,11 +240,11 @@ def test_only_who_was_sent_can_tell_what_was_found(office: Office) -> None:
     assert office.event().state is State.CONFIRMED
 
 
-def test_of_an_event_that_there_never_was_nobody_can_tell(office: Office) -> None:
+def test_of_an_event_that_there_never_was_nobody_can_tell(office):
     assert office.finds(OPERATOR, "confirmed", event=5)[0].code == m.UNKNOWN_EVENT
 
 
-def test_what_somebody_found_who_was_sent_earlier_counts_even_late(office: Office) -> None:
+def test_what_somebody_found_who_was_sent_earlier_counts_even_late(office):
     office.fire(12)
     office.progress(OPERATOR, "failed", 5.0)
     assert office.event().responder == GUARD
@@ -256,7 +254,7 @@ def test_what_somebody_found_who_was_sent_earlier_counts_even_late(office: Offic
     assert office.working == {GUARD: 1}
 
 
-def test_a_late_finding_closes_an_event_that_waits(office: Office) -> None:
+def test_a_late_finding_closes_an_event_that_waits(office):
     office.busy(GUARD)
     office.ok(office.fire(12))
     office.beat(GUARD, now=11.0)
@@ -266,7 +264,7 @@ def test_a_late_finding_closes_an_event_that_waits(office: Office) -> None:
     assert office.event().state is State.CONFIRMED
 
 
-def test_a_finding_about_an_event_that_is_over_changes_nothing(office: Office) -> None:
+def test_a_finding_about_an_event_that_is_over_changes_nothing(office):
     office.fire(12)
     office.finds(OPERATOR, "refuted", 5.0)
     office.status(ROBOT, 80, now=6.0)

@@ -1,7 +1,5 @@
 """Devices that go away are forgotten: when, who lasts, who makes room, and what the file knows."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Sized
 from contextlib import closing

@@ -1,7 +1,5 @@
 """Who has said OK to an order gets on with it, or somebody else is sent."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Who holds a robot, and how it changes hands: asked, granted, declined or forced."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.dispatch_desk import (
     ADDRESS,

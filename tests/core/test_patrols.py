@@ -1,7 +1,5 @@
 """Robots that the DVA sends round while nothing happens."""
 
-from __future__ import annotations
-
 import numpy as np
 from helpers.dva.dispatch_desk import DVA, GUARD, OPERATOR, ROBOT, Office, crow, east
 
@@ -34,24 +32,24 @@ def sent_out(office: Office) -> int:
     return grant.session
 
 
-def test_a_robot_without_a_beat_stays_where_it_is() -> None:
+def test_a_robot_without_a_beat_stays_where_it_is():
     office = Office()
     assert [office.tick(float(t)) for t in range(0, 60, 5)] == [[]] * 12
 
 
-def test_a_robot_sets_out_when_it_has_rested_and_not_before() -> None:
+def test_a_robot_sets_out_when_it_has_rested_and_not_before():
     office = PatrolOffice()
     assert [office.tick(t) for t in (0.0, 5.0, REST - 0.1)] == [[], [], []]
     sent_out(PatrolOffice())
 
 
-def test_a_robot_under_way_is_left_alone() -> None:
+def test_a_robot_under_way_is_left_alone():
     office = PatrolOffice()
     sent_out(office)
     assert [office.tick(REST + t) for t in (5.0, 15.0, 40.0)] == [[], [], []]
 
 
-def test_a_patrolling_robot_is_sent_to_an_event_and_its_operator_gets_it() -> None:
+def test_a_patrolling_robot_is_sent_to_an_event_and_its_operator_gets_it():
     office = PatrolOffice()
     patrol = sent_out(office)
     office.silence(GUARD, 20.0)
@@ -65,14 +63,14 @@ def test_a_patrolling_robot_is_sent_to_an_event_and_its_operator_gets_it() -> No
     assert [send.to for send in sends] == [ROBOT]
 
 
-def test_nobody_is_told_that_the_dva_itself_holds_a_robot_no_longer() -> None:
+def test_nobody_is_told_that_the_dva_itself_holds_a_robot_no_longer():
     office = PatrolOffice()
     office.tick(0.0)
     [grant] = office.tick(REST)
     assert {send.to for send in office.no([grant], REST)} == {ROBOT}
 
 
-def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again() -> None:
+def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again():
     office = PatrolOffice()
     session = sent_out(office)
     office.tick(15.0)
@@ -89,7 +87,7 @@ def test_a_robot_that_comes_to_stand_is_sent_home_and_then_round_again() -> None
         office.tick(start + 2.0 * REST)
 
 
-def test_a_robot_that_comes_back_from_an_order_takes_up_its_round() -> None:
+def test_a_robot_that_comes_back_from_an_order_takes_up_its_round():
     office = PatrolOffice()
     sent_out(office)
     content = office.say(OPERATOR, m.PermissionRequest(ROBOT, "teleoperation"), 20.0)[0].content
@@ -104,7 +102,7 @@ def test_a_robot_that_comes_back_from_an_order_takes_up_its_round() -> None:
     assert grant.body.session > content.session
 
 
-def test_a_dva_that_closes_stops_its_patrols() -> None:
+def test_a_dva_that_closes_stops_its_patrols():
     office = PatrolOffice()
     session = sent_out(office)
     assert office.desk.close() == [Send(ROBOT, m.PermissionRevocation(ROBOT, DVA, session))]

@@ -1,7 +1,5 @@
 """Who may act on what: grants, sessions, sensors, and the rules of access."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Who is under way may be sent to something worse, by rules that hold whatever the policy says."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,14 +40,14 @@ def office() -> Office:
     return office
 
 
-def test_the_guard_is_redirected_and_the_first_event_waits_again(office: Office) -> None:
+def test_the_guard_is_redirected_and_the_first_event_waits_again(office):
     sends = office.fire(20, severity=0.9, now=5.0)
     assert sends == [Send(GUARD, m.Order(2, "fire", east(20), None))]
     assert (office.event(1).state, office.event(2).state) == (State.PENDING, State.ASSIGNED)
     assert office.desk.counters["preempted"] == 1
 
 
-def test_to_be_preempted_is_no_attempt_and_no_new_wait(office: Office) -> None:
+def test_to_be_preempted_is_no_attempt_and_no_new_wait(office):
     assert office.event(1).attempts == 1
     office.fire(20, severity=0.9, now=5.0)
     event = office.event(1)
@@ -57,26 +55,26 @@ def test_to_be_preempted_is_no_attempt_and_no_new_wait(office: Office) -> None:
     assert set(event.times) == {"detected"}
 
 
-def test_nobody_is_called_away_from_a_scene(office: Office) -> None:
+def test_nobody_is_called_away_from_a_scene(office):
     office.progress(GUARD, "arrived", 4.0)
     assert office.fire(20, severity=0.9, now=5.0) == []
     assert office.event(1).state is State.ON_SCENE
 
 
-def test_nobody_is_called_away_from_an_event_that_has_waited_for_60_s(office: Office) -> None:
+def test_nobody_is_called_away_from_an_event_that_has_waited_for_60_s(office):
     assert office.fire(20, severity=0.9, now=60.0) == []
     assert office.event(1).state is State.ASSIGNED
     assert office.desk.counters["overruled"] == 1
 
 
-def test_who_has_not_taken_its_order_up_yet_is_not_redirected() -> None:
+def test_who_has_not_taken_its_order_up_yet_is_not_redirected():
     office = Office(Preemptive())
     office.busy(ROBOT, OPERATOR)
     office.fire(80, severity=0.2)
     assert office.fire(20, severity=0.9, now=1.0) == []
 
 
-def test_the_operator_stays_with_its_robot() -> None:
+def test_the_operator_stays_with_its_robot():
     office = Office(Preemptive())
     office.register(OTHER_OPERATOR, "TeleOp")
     office.busy(GUARD)
@@ -90,19 +88,19 @@ def test_the_operator_stays_with_its_robot() -> None:
     assert {n: e for n, e in office.working.items() if e != 99} == {OPERATOR: 2, ROBOT: 2}
 
 
-def test_the_redirected_one_that_declines_leaves_both_events_open(office: Office) -> None:
+def test_the_redirected_one_that_declines_leaves_both_events_open(office):
     sends = office.fire(20, severity=0.9, now=5.0)
     office.no(sends, 6.0)
     assert [office.event(n).state for n in (1, 2)] == [State.PENDING, State.PENDING]
 
 
-def test_word_on_the_first_event_is_refused_once_the_guard_has_another(office: Office) -> None:
+def test_word_on_the_first_event_is_refused_once_the_guard_has_another(office):
     office.fire(20, severity=0.9, now=5.0)
     assert office.progress(GUARD, "failed", 6.0, event=1)[0].code == m.UNKNOWN_EVENT
     assert office.finds(GUARD, "confirmed", 6.0, event=1)[0].code == m.OK  # it was sent there
 
 
-def test_a_policy_that_grabs_everybody_cannot_keep_an_event_beyond_its_deadline() -> None:
+def test_a_policy_that_grabs_everybody_cannot_keep_an_event_beyond_its_deadline():
     office = Office(Grabbing(), Rules(escalate_after=60.0, merge_distance=0.0))
     office.busy(ROBOT, OPERATOR)
     for now in range(90):
@@ -113,7 +111,7 @@ def test_a_policy_that_grabs_everybody_cannot_keep_an_event_beyond_its_deadline(
     assert len(office.working) == 3
 
 
-def test_a_policy_that_does_not_preempt_never_sees_who_is_busy() -> None:
+def test_a_policy_that_does_not_preempt_never_sees_who_is_busy():
     class Watching(Grabbing):
         preempts = False
 

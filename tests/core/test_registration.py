@@ -1,7 +1,5 @@
 """Who is there: registration, a new life, silence, and the device list."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

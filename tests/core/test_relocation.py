@@ -1,7 +1,5 @@
 """Idle guards wait where they are of most use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,13 +34,13 @@ def office_of(policy: Policy) -> Office:
     return Office(policy, ground=GROUND)
 
 
-def test_an_idle_guard_is_sent_where_events_are_expected() -> None:
+def test_an_idle_guard_is_sent_where_events_are_expected():
     office = office_of(Coverage())
     assert office.tick(1.0) == [Send(GUARD, THERE)]
     assert office.desk.counters["relocated"] == 1
 
 
-def test_a_guard_on_its_way_is_not_sent_there_again() -> None:
+def test_a_guard_on_its_way_is_not_sent_there_again():
     office = office_of(Eastward())
     assert office.tick(1.0) == [Send(GUARD, THERE)]
     overruled = office.desk.counters["overruled"]
@@ -50,13 +48,13 @@ def test_a_guard_on_its_way_is_not_sent_there_again() -> None:
     assert office.desk.counters["overruled"] == overruled + 2  # the robot, and the guard again
 
 
-def test_a_robot_is_never_sent_to_wait() -> None:
+def test_a_robot_is_never_sent_to_wait():
     office = office_of(Eastward())
     assert ROBOT not in {send.to for send in office.tick(1.0)}
     assert office.desk.counters["overruled"] == 1
 
 
-def test_who_has_an_order_is_not_sent_to_wait() -> None:
+def test_who_has_an_order_is_not_sent_to_wait():
     office = office_of(Eastward())
     office.busy(ROBOT, OPERATOR)
     assert office.fire(12) == [Send(GUARD, m.Order(1, "fire", east(12), None))]
@@ -69,7 +67,7 @@ class Grabbing(Eastward):
     preempts = True
 
 
-def test_a_guard_under_way_to_an_event_is_not_sent_to_wait() -> None:
+def test_a_guard_under_way_to_an_event_is_not_sent_to_wait():
     office = office_of(Grabbing())
     office.busy(ROBOT, OPERATOR)
     office.ok(office.fire(12))
@@ -81,7 +79,7 @@ def test_a_guard_under_way_to_an_event_is_not_sent_to_wait() -> None:
     assert office.working[GUARD] == 1
 
 
-def test_an_order_interrupts_the_way_and_the_guard_may_be_sent_again_after_it() -> None:
+def test_an_order_interrupts_the_way_and_the_guard_may_be_sent_again_after_it():
     office = office_of(Eastward())
     office.busy(ROBOT, OPERATOR)
     office.tick(1.0)
@@ -90,7 +88,7 @@ def test_an_order_interrupts_the_way_and_the_guard_may_be_sent_again_after_it() 
     assert office.progress(GUARD, "done", 31.0)[1] == [Send(GUARD, THERE)]
 
 
-def test_a_guard_that_has_arrived_is_bound_for_nowhere() -> None:
+def test_a_guard_that_has_arrived_is_bound_for_nowhere():
     office = office_of(Eastward())
     office.tick(1.0)
     office.stands(GUARD, 90, now=80.0)
@@ -102,13 +100,13 @@ def test_a_guard_that_has_arrived_is_bound_for_nowhere() -> None:
     assert office.tick(93.0) == [Send(GUARD, THERE)]
 
 
-def test_a_guard_that_declines_to_move_is_bound_for_nowhere() -> None:
+def test_a_guard_that_declines_to_move_is_bound_for_nowhere():
     office = office_of(Eastward())
     office.no(office.tick(1.0), 2.0)
     assert office.tick(3.0) == [Send(GUARD, THERE)]
 
 
-def test_a_guard_that_started_anew_is_bound_for_nowhere() -> None:
+def test_a_guard_that_started_anew_is_bound_for_nowhere():
     office = office_of(Eastward())
     office.register(GUARD, "Guard")
     office.tick(1.0)
@@ -117,21 +115,21 @@ def test_a_guard_that_started_anew_is_bound_for_nowhere() -> None:
     assert office.tick(3.0) == [Send(GUARD, THERE)]
 
 
-def test_a_guard_that_never_arrives_counts_as_bound_for_twice_its_time_and_3_minutes() -> None:
+def test_a_guard_that_never_arrives_counts_as_bound_for_twice_its_time_and_3_minutes():
     office = office_of(Eastward())
     office.tick(1.0)  # 90 m at 1.3 m/s: 69.2 s
     assert office.tick(1.0 + 2 * 69.2 + 179.0) == []
     assert office.tick(1.0 + 2 * 69.2 + 181.0) == [Send(GUARD, THERE)]
 
 
-def test_without_stations_nobody_is_moved() -> None:
+def test_without_stations_nobody_is_moved():
     office = Office(Coverage())
     assert office.tick(1.0) == []
     assert office.desk.counters["policy failed"] == 0
 
 
 @pytest.mark.parametrize("policy", [MinEta, Coverage])
-def test_where_nobody_is_idle_nothing_is_asked(policy: type[Policy]) -> None:
+def test_where_nobody_is_idle_nothing_is_asked(policy):
     office = office_of(policy())
     office.busy(GUARD, ROBOT)
     assert office.tick(1.0) == []

@@ -1,7 +1,5 @@
 """Which sensors robots have, and what the DVA makes of what they show."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.dispatch_desk import (
     DETECTOR,

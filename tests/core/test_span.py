@@ -1,7 +1,5 @@
 """How many robots one operator may have in hand: a rule of the desk, whatever a policy says."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.dispatch_desk import GUARD, OPERATOR, OTHER_OPERATOR, OTHER_ROBOT, ROBOT, Office
 
@@ -29,17 +27,17 @@ def three_fires(office: Office) -> list[str | None]:
 
 
 @pytest.mark.parametrize(("span", "sent"), [(1, 1), (2, 2), (3, 3), (9, 3)])
-def test_one_operator_is_given_as_many_robots_as_the_span(span: int, sent: int) -> None:
+def test_one_operator_is_given_as_many_robots_as_the_span(span, sent):
     office = office_of(span)
     assert three_fires(office) == [OPERATOR] * sent + [None] * (3 - sent)
     assert office.desk.orders.engaged.count(OPERATOR) == sent
 
 
-def test_of_two_operators_the_one_with_less_in_hand_is_given_the_next_robot() -> None:
+def test_of_two_operators_the_one_with_less_in_hand_is_given_the_next_robot():
     assert three_fires(office_of(span=2, operators=2)) == [OPERATOR, OTHER_OPERATOR, OPERATOR]
 
 
-def test_an_operator_says_of_each_of_its_orders_how_it_stands() -> None:
+def test_an_operator_says_of_each_of_its_orders_how_it_stands():
     office = office_of(span=2)
     three_fires(office)
     assert office.progress(OPERATOR, "arrived", 5.0, event=2)[0].code == m.OK
@@ -51,7 +49,7 @@ def test_an_operator_says_of_each_of_its_orders_how_it_stands() -> None:
     assert office.progress(OPERATOR, "arrived", 5.0, event=3)[0].code == m.UNKNOWN_EVENT
 
 
-def test_a_hand_that_is_free_again_is_given_what_waits() -> None:
+def test_a_hand_that_is_free_again_is_given_what_waits():
     office = office_of(span=2)
     three_fires(office)
     office.finds(OPERATOR, "confirmed", 9.0, event=1)
@@ -61,7 +59,7 @@ def test_a_hand_that_is_free_again_is_given_what_waits() -> None:
     assert office.desk.orders.engaged.count(OPERATOR) == 2
 
 
-def test_an_operator_gets_the_robots_of_all_its_orders_and_no_other() -> None:
+def test_an_operator_gets_the_robots_of_all_its_orders_and_no_other():
     office = office_of(span=2)
     three_fires(office)
     codes = [
@@ -74,7 +72,7 @@ def test_an_operator_gets_the_robots_of_all_its_orders_and_no_other() -> None:
     assert office.say(OTHER_OPERATOR, asked)[0].code == m.BUSY
 
 
-def test_all_that_a_lost_operator_had_in_hand_is_open_to_others() -> None:
+def test_all_that_a_lost_operator_had_in_hand_is_open_to_others():
     office = office_of(span=3)
     three_fires(office)
     office.silence(OPERATOR, 20.0)
@@ -82,7 +80,7 @@ def test_all_that_a_lost_operator_had_in_hand_is_open_to_others() -> None:
     assert office.working == {GUARD: 99}
 
 
-def test_each_order_of_an_operator_has_its_own_time_limit() -> None:
+def test_each_order_of_an_operator_has_its_own_time_limit():
     office = office_of(span=2)
     office.desk.orders.rules = Rules(escalate_after=1000.0, order_limit=100.0, operator_span=2)
     office.fire(10, now=0.0)

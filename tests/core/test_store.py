@@ -1,7 +1,5 @@
 """What survives a DVA that was killed, and a file that is full, locked or something else."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

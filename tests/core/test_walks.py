@@ -1,7 +1,5 @@
 """Whatever happens in whatever order: no rule is broken, nothing is forgotten, all recovers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -21,13 +19,13 @@ def walk(seed: int, folder: Path, steps: int, policy: str | None = None) -> None
 
 @pytest.mark.invariant("S6")
 @pytest.mark.parametrize("policy", POLICY_NAMES)
-def test_a_day_that_goes_wrong_breaks_no_rule_and_ends_well(policy: str, tmp_path: Path) -> None:
+def test_a_day_that_goes_wrong_breaks_no_rule_and_ends_well(policy, tmp_path):
     for seed in range(3):
         walk(seed, tmp_path, SHORT, policy)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("policy", POLICY_NAMES)
-def test_long_days_that_go_wrong(policy: str, tmp_path: Path) -> None:
+def test_long_days_that_go_wrong(policy, tmp_path):
     for seed in range(100, 115):
         walk(seed, tmp_path, LONG, policy)

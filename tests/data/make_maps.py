@@ -6,8 +6,6 @@
 with rows of shelves. As on a recorded map walls are ragged and beyond them nothing is known.
 """
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

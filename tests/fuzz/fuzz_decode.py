@@ -5,8 +5,6 @@ empty and keeps what was found. Options are those of libFuzzer. Bytes that fail 
 `crash-...`; name it instead of the folder to see them fail again.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,6 @@
 """Links on the pages lead somewhere, and files named on the map are there."""
 
 import re
-from pathlib import Path
 
 import pytest
 from helpers.paths import ROOT
@@ -15,7 +14,7 @@ PAGES = [
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_every_link_leads_to_a_file(page: Path) -> None:
+def test_every_link_leads_to_a_file(page):
     links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8"))
     local = [link for link in links if "://" not in link and not link.startswith("mailto:")]
     assert [link for link in local if not (page.parent / link).exists()] == []

@@ -1,10 +1,7 @@
 """What a run of the tests tells at its end, and which faults are planted to see them noticed."""
 
-from __future__ import annotations
-
 import os
 import sys
-from pathlib import Path
 
 import mutants
 import pytest
@@ -15,7 +12,7 @@ from helpers.reporting.left_out import MOST_SKIPPED
 from helpers.wording import unnamed
 
 
-def test_rooms_are_shown_beside_those_before_the_dearest_first() -> None:
+def test_rooms_are_shown_beside_those_before_the_dearest_first():
     head, *lines = cpu_by_room.table({"worlds": 2.0, "core": 3.5}, "abc", {"core": 1.0, "old": 4.0})
     assert "abc" in head
     assert [line.split() for line in lines] == [
@@ -26,9 +23,7 @@ def test_rooms_are_shown_beside_those_before_the_dearest_first() -> None:
     ]
 
 
-def test_the_newest_commit_that_was_tested_before_is_the_one_beside(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_newest_commit_that_was_tested_before_is_the_one_beside(monkeypatch):
     monkeypatch.setattr(cpu_by_room, "commits", lambda: ["now", "one", "two", "three"])
     known = {"now": {"a": 1.0}, "three": {"a": 3.0}, "two": {"a": 2.0}}
     assert cpu_by_room.before(known) == ("two", {"a": 2.0})
@@ -37,9 +32,7 @@ def test_the_newest_commit_that_was_tested_before_is_the_one_beside(
 
 @pytest.mark.system
 @pytest.mark.parametrize(("skipped", "code"), [(MOST_SKIPPED, 0), (MOST_SKIPPED + 1, 1)])
-def test_a_run_in_which_too_many_tests_are_skipped_has_failed(
-    tmp_path: Path, skipped: int, code: int
-) -> None:
+def test_a_run_in_which_too_many_tests_are_skipped_has_failed(tmp_path, skipped, code):
     (tmp_path / "test_m.py").write_text(
         f"import pytest\n@pytest.mark.parametrize('n', range({skipped}))\n"
         "def test_m(n): pytest.skip('too dark')\n"
@@ -64,7 +57,7 @@ def f(x: int = 2) -> bool:
 '''
 
 
-def test_faults_fit_where_a_program_could_be_wrong_and_nowhere_else() -> None:
+def test_faults_fit_where_a_program_could_be_wrong_and_nowhere_else():
     found = mutants.Sites("dva_sim/room/f.py", SOURCE).found
     assert [(one.old, one.new) for one in found][1:] == [
         ("log(x)", "pass"),
@@ -79,7 +72,7 @@ def test_faults_fit_where_a_program_could_be_wrong_and_nowhere_else() -> None:
     assert b"x <= 10" in next(one for one in found if one.old == "<").in_place(SOURCE)
 
 
-def test_every_room_gives_a_fault_and_large_ones_more() -> None:
+def test_every_room_gives_a_fault_and_large_ones_more():
     assert mutants.shares({"small": 1, "middle": 30, "large": 69}, 13) == {
         "small": 1,
         "middle": 4,

@@ -1,9 +1,6 @@
 """Clock, streams, configuration and names: what everything else stands on."""
 
-from __future__ import annotations
-
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +23,7 @@ class Outer(Config):
     items: tuple[Inner, ...] = ()
 
 
-def test_simultaneous_events_run_in_the_order_they_were_scheduled() -> None:
+def test_simultaneous_events_run_in_the_order_they_were_scheduled():
     clock, seen = Clock(), []
     clock.call_at(0.3, seen.append, "first")
     clock.call_after(0.1, lambda: clock.call_after(0.2, seen.append, "second"))
@@ -35,33 +32,33 @@ def test_simultaneous_events_run_in_the_order_they_were_scheduled() -> None:
     assert clock.now == 1.0
 
 
-def test_a_periodic_event_does_not_drift_in_a_million_periods() -> None:
+def test_a_periodic_event_does_not_drift_in_a_million_periods():
     clock, times = Clock(), []
     clock.every(0.1, lambda: times.append(clock.now))
     clock.run(10_000.0)
     assert times[99_999] == 9_999.9
 
 
-def test_a_periodic_event_ends_when_it_returns_false() -> None:
+def test_a_periodic_event_ends_when_it_returns_false():
     clock, times = Clock(), []
     clock.every(1.0, lambda: times.append(clock.now) or len(times) < 3)
     clock.run(10.0)
     assert times == [0.0, 1.0, 2.0]
 
 
-def test_a_stream_does_not_depend_on_the_streams_made_before_it() -> None:
+def test_a_stream_does_not_depend_on_the_streams_made_before_it():
     alone, crowded = Streams(7), Streams(7)
     for name in ("a", "b", "c"):
         crowded[name].random(10)
     assert np.array_equal(alone["robot-1/imu"].random(5), crowded["robot-1/imu"].random(5))
 
 
-def test_streams_of_other_names_or_seeds_differ() -> None:
+def test_streams_of_other_names_or_seeds_differ():
     draws = {Streams(s)[n].random() for s in (1, 2) for n in ("x", "y")}
     assert len(draws) == 4
 
 
-def test_derived_seeds_tell_parts_apart() -> None:
+def test_derived_seeds_tell_parts_apart():
     assert derive_seed("ab", "c") != derive_seed("a", "bc")
     assert derive_seed(1, "drive", 0, 0) == derive_seed(1, "drive", 0, 0)
 
@@ -82,9 +79,7 @@ def test_derived_seeds_tell_parts_apart() -> None:
         ("- 1\n", "1:1", "mapping"),
     ],
 )
-def test_a_mistake_is_told_by_file_line_and_column(
-    tmp_path: Path, text: str, place: str, words: str
-) -> None:
+def test_a_mistake_is_told_by_file_line_and_column(tmp_path, text, place, words):
     path = tmp_path / "bad.yaml"
     path.write_text(text)
 
@@ -118,9 +113,7 @@ def test_a_mistake_is_told_by_file_line_and_column(
         ("a: !!binary aGk=\n", "1:4: !!binary"),
     ],
 )
-def test_a_tag_of_another_kind_than_plain_values_is_told_by_its_place(
-    tmp_path: Path, text: str, place: str
-) -> None:
+def test_a_tag_of_another_kind_than_plain_values_is_told_by_its_place(tmp_path, text, place):
     path = tmp_path / "tagged.yaml"
     path.write_text(text)
     with pytest.raises(ConfigError) as caught:
@@ -128,7 +121,7 @@ def test_a_tag_of_another_kind_than_plain_values_is_told_by_its_place(
     assert str(caught.value).startswith(f"{path}:{place}")
 
 
-def test_tags_of_plain_values_and_merged_keys_are_read(tmp_path: Path) -> None:
+def test_tags_of_plain_values_and_merged_keys_are_read(tmp_path):
     path = tmp_path / "tagged.yaml"
     path.write_text('a: &a {x: 1}\nb: {<<: *a, y: !!str 2}\nc: !!int "7"\n')
     document = load_yaml(path)
@@ -137,15 +130,13 @@ def test_tags_of_plain_values_and_merged_keys_are_read(tmp_path: Path) -> None:
     assert str(document.error("bad", ("b", "x"))).startswith(f"{path}:2:")
 
 
-def test_yaml_12_keeps_times_as_text(tmp_path: Path) -> None:
+def test_yaml_12_keeps_times_as_text(tmp_path):
     path = tmp_path / "time.yaml"
     path.write_text("name: 12:30:56\n")
     assert load_yaml(path).data == {"name": "12:30:56"}
 
 
-def test_a_nearer_folder_hides_a_farther_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_nearer_folder_hides_a_farther_one(tmp_path, monkeypatch):
     folder = tmp_path / "experiments"
     folder.mkdir()
     (folder / "req-rep-vs-pub-sub.yaml").write_text("question: mine\n")
@@ -154,7 +145,7 @@ def test_a_nearer_folder_hides_a_farther_one(
     assert found.resolve() == (folder / "req-rep-vs-pub-sub.yaml").resolve()
 
 
-def test_an_unknown_name_lists_what_there_is() -> None:
+def test_an_unknown_name_lists_what_there_is():
     with pytest.raises(ConfigError, match="did you mean 'req-rep-vs-pub-sub'"):
         resources.find("req-rep-vs-pubsub", "experiments")
 

@@ -1,7 +1,5 @@
 """Mistakes in a configuration, in words: the key that was meant, and the value as it should be."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

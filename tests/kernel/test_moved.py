@@ -10,19 +10,19 @@ from dva_sim.kernel.moved import MOVED
 
 
 @pytest.mark.parametrize(("old", "new"), MOVED.items())
-def test_an_earlier_name_fails_with_the_new_one_which_is_there(old: str, new: str) -> None:
+def test_an_earlier_name_fails_with_the_new_one_which_is_there(old, new):
     with pytest.raises(ModuleNotFoundError) as told:
         import_module(f"dva_sim.{old}")
     assert str(told.value) == f"dva_sim.{old} is now dva_sim.{new}"
     import_module(f"dva_sim.{new}")
 
 
-def test_a_module_that_there_never_was_is_simply_not_there() -> None:
+def test_a_module_that_there_never_was_is_simply_not_there():
     with pytest.raises(ModuleNotFoundError, match=r"No module named 'dva_sim\.never'"):
         import_module("dva_sim.never")
 
 
-def test_a_plug_in_that_imports_an_earlier_name_is_told_in_one_line(tmp_path) -> None:
+def test_a_plug_in_that_imports_an_earlier_name_is_told_in_one_line(tmp_path):
     (tmp_path / "mine.py").write_text("from dva_sim.errors import ConfigError\n")
     with pytest.raises(ConfigError) as told:
         load_policy("mine.py:Mine", base=tmp_path)

@@ -1,9 +1,6 @@
 """Options of plug-ins: what is taken, and what is said of what is not."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 
 import pytest
 
@@ -11,7 +8,7 @@ from dva_sim.kernel import options
 from dva_sim.kernel.errors import ConfigError
 
 
-def test_what_is_within_its_bounds_is_taken() -> None:
+def test_what_is_within_its_bounds_is_taken():
     assert options.number("gain", 2, above=0) == 2.0
     assert options.number("share", 1, least=0, most=1) == 1.0
     assert options.whole_number("window", 5, 1, 9) == 5
@@ -38,9 +35,7 @@ def test_what_is_within_its_bounds_is_taken() -> None:
         (lambda: options.some_of("x", "a", ("a",)), "is 'a'; should be a list of some of a"),
     ],
 )
-def test_what_is_not_gets_a_line_that_says_what_would_be_right(
-    ask: Callable[[], object], wanted: str
-) -> None:
+def test_what_is_not_gets_a_line_that_says_what_would_be_right(ask, wanted):
     with pytest.raises(ConfigError) as told:
         ask()
     assert wanted in str(told.value)

@@ -1,7 +1,5 @@
 """What is said of a name that there is not: the one that was meant, or what there is."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.wording import unnamed
 

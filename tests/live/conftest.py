@@ -1,7 +1,5 @@
 """Programs for tests that start some, and a place for them to listen."""
 
-from __future__ import annotations
-
 import random
 import socket
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A part of a live run that nobody answers gives up, and says who was not there."""
 
-from __future__ import annotations
-
 import math
 from contextlib import nullcontext
 

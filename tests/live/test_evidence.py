@@ -1,7 +1,5 @@
 """What a live run leaves: every decision of the DVA made the same again, lines made a recording."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import os
@@ -68,7 +66,7 @@ def drill(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # --- the DVA decides the same again -------------------------------------------------------
 
 
-def test_a_dva_that_draws_by_chance_decides_the_same_again(drill: Path) -> None:
+def test_a_dva_that_draws_by_chance_decides_the_same_again(drill):
     entries = [json.loads(line) for line in drill.read_text().splitlines()]
     assert any(entry.get("bits") for entry in entries)
     decided = "".join(text for entry in entries for text in entry.get("decided", ()))
@@ -81,13 +79,13 @@ def test_a_dva_that_draws_by_chance_decides_the_same_again(drill: Path) -> None:
 
 
 @pytest.mark.parametrize("policy", ["auction", "coverage", "hazard_team", "min_eta"])
-def test_a_dva_with_another_policy_decides_the_same_again(tmp_path: Path, policy: str) -> None:
+def test_a_dva_with_another_policy_decides_the_same_again(tmp_path, policy):
     path = tmp_path / "dva.trace.jsonl"
     trace_of(path, "fire-drill", horizon_s=60, dispatch={"policy": policy})
     assert differences(path) == 0
 
 
-def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path: Path) -> None:
+def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path):
     first = Run(scenario_of(horizon_s=30), 1)
     store = Store(tmp_path / "memory.sqlite")
     first.dva._memory = store
@@ -105,7 +103,7 @@ def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path: P
     assert differences(path) == 0
 
 
-def test_every_way_to_ask_the_dva_is_written_down() -> None:
+def test_every_way_to_ask_the_dva_is_written_down():
     """What changes a DVA and is in no trace would be missed by every replay."""
     public = {name for name, _ in inspect.getmembers(Dva, inspect.isfunction) if name[0] != "_"}
     asked = set(re.findall(r"\bdesk\.(\w+)\(", inspect.getsource(dva_server)))
@@ -130,9 +128,7 @@ def _first_grant(entries: list[dict[str, Any]]) -> dict[str, Any]:
         (lambda es: es.clear(), "is no line of a robot's trace"),
     ],
 )
-def test_a_trace_changed_by_hand_is_found_out(
-    drill: Path, tmp_path: Path, change: Change, text: str
-) -> None:
+def test_a_trace_changed_by_hand_is_found_out(drill, tmp_path, change, text):
     entries = [json.loads(line) for line in drill.read_text().splitlines()]
     change(entries)
     path = tmp_path / "changed.trace.jsonl"
@@ -142,9 +138,7 @@ def test_a_trace_changed_by_hand_is_found_out(
     assert any(text in problem.text for problem in problems)
 
 
-def test_a_trace_that_ends_in_the_middle_of_a_line_is_checked_up_to_there(
-    drill: Path, tmp_path: Path
-) -> None:
+def test_a_trace_that_ends_in_the_middle_of_a_line_is_checked_up_to_there(drill, tmp_path):
     path = tmp_path / "cut.trace.jsonl"
     path.write_bytes(drill.read_bytes()[:-20])
     ended = call("check", str(path))
@@ -152,7 +146,7 @@ def test_a_trace_that_ends_in_the_middle_of_a_line_is_checked_up_to_there(
     assert "warning: its last line is cut off" in ended.stdout
 
 
-def test_a_trace_runs_no_class_in_a_file(drill: Path, tmp_path: Path) -> None:
+def test_a_trace_runs_no_class_in_a_file(drill, tmp_path):
     start, *rest = drill.read_text().splitlines(keepends=True)
     told = json.loads(start)
     told["scenario"]["dispatch"]["policy"] = "mine.py:Mine"
@@ -169,7 +163,7 @@ def message(number: int, source: str = PHONE) -> bytes:
     return encode(m.Message(ROBOT, number, source, "12:00:00", 7, m.SetTeleOp(0.1, 0.0, None)))
 
 
-def test_who_records_never_waits_and_counts_what_has_no_room() -> None:
+def test_who_records_never_waits_and_counts_what_has_no_room():
     reads, writes = os.pipe()
     recorder = LiveRecorder(Clock(), Outlet(writes))
     for number in range(1, 2001):
@@ -185,7 +179,7 @@ def test_who_records_never_waits_and_counts_what_has_no_room() -> None:
     os.close(writes)
 
 
-def test_nothing_is_written_to_a_file_that_has_the_number_of_a_closed_outlet() -> None:
+def test_nothing_is_written_to_a_file_that_has_the_number_of_a_closed_outlet():
     reads, writes = os.pipe()
     outlet = Outlet(writes)
     assert outlet.put(b"a line")
@@ -197,7 +191,7 @@ def test_nothing_is_written_to_a_file_that_has_the_number_of_a_closed_outlet() -
     os.close(writes)
 
 
-def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch):
     monkeypatch.setattr(recording, "BYTES_PER_SECOND", 1000)
     monkeypatch.setattr(recording.time, "monotonic", lambda: 5.0)
     with Path(os.devnull).open("wb") as nowhere:
@@ -207,7 +201,7 @@ def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch: pytest.Mon
     assert 95 <= recorder.counters["not recorded"] < 100
 
 
-def test_of_strangers_what_arrives_is_kept_of_others_what_they_send() -> None:
+def test_of_strangers_what_arrives_is_kept_of_others_what_they_send():
     reads, writes = os.pipe()
     recorder = LiveRecorder(Clock(), Outlet(writes))
     recorder.is_own = {PHONE, ROBOT}.__contains__
@@ -223,7 +217,7 @@ def test_of_strangers_what_arrives_is_kept_of_others_what_they_send() -> None:
     os.close(writes)
 
 
-def test_after_a_gap_a_trace_goes_on_no_more() -> None:
+def test_after_a_gap_a_trace_goes_on_no_more():
     said = []
 
     class Full(LiveRecorder):
@@ -261,7 +255,7 @@ def found_in(path: Path) -> tuple[object, ...]:
     return tuple(found)
 
 
-def test_what_parts_say_becomes_a_recording_whose_messages_are_valid(tmp_path: Path) -> None:
+def test_what_parts_say_becomes_a_recording_whose_messages_are_valid(tmp_path):
     path = tmp_path / "run.mcap"
     assert record(path).finish() is None
     assert [file.name for file in tmp_path.iterdir()] == ["run.mcap"]
@@ -274,7 +268,7 @@ def test_what_parts_say_becomes_a_recording_whose_messages_are_valid(tmp_path: P
     assert found_in(path) == ([], [], "20 messages")
 
 
-def test_a_message_that_is_none_is_found_in_a_recording(tmp_path: Path) -> None:
+def test_a_message_that_is_none_is_found_in_a_recording(tmp_path):
     path = tmp_path / "run.mcap"
     keeper = record(path)
     inlet = keeper.inlet()
@@ -287,7 +281,7 @@ def test_a_message_that_is_none_is_found_in_a_recording(tmp_path: Path) -> None:
     assert f"message 21, at 3.0 s, from {PHONE}: " in ended.stdout
 
 
-def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path: Path) -> None:
+def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path):
     """As of a run whose supervisor was killed, in the middle of a line."""
     keeper = record(tmp_path / "run.mcap")
     keeper.close()
@@ -308,9 +302,7 @@ def test_lines_that_were_left_are_read_like_a_recording_and_stay(tmp_path: Path)
     assert keeper.path.read_bytes() == left
 
 
-def test_a_recording_is_made_of_lines_that_were_left_where_one_is_asked_for(
-    tmp_path: Path,
-) -> None:
+def test_a_recording_is_made_of_lines_that_were_left_where_one_is_asked_for(tmp_path):
     keeper = record(tmp_path / "run.mcap")
     keeper.close()
     made = tmp_path / "made.mcap"
@@ -326,7 +318,7 @@ def test_a_recording_is_made_of_lines_that_were_left_where_one_is_asked_for(
     assert "is already a recording" in already.stderr
 
 
-def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path: Path) -> None:
+def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path):
     keeper = record(tmp_path / "run.mcap")
     inlet = keeper.inlet()
     ended = call("replay", str(keeper.path))
@@ -340,7 +332,7 @@ def test_the_lines_of_a_run_that_goes_on_can_be_read_meanwhile(tmp_path: Path) -
     assert read_recording(tmp_path / "run.mcap").playback.recorder.timeline[-1].time == 3.0
 
 
-def test_a_run_whose_folder_is_removed_meanwhile_is_recorded(tmp_path: Path) -> None:
+def test_a_run_whose_folder_is_removed_meanwhile_is_recorded(tmp_path):
     folder = tmp_path / "there"
     folder.mkdir()
     keeper = record(folder / "run.mcap")
@@ -349,7 +341,7 @@ def test_a_run_whose_folder_is_removed_meanwhile_is_recorded(tmp_path: Path) -> 
     assert found_in(folder / "run.mcap") == ([], [], "20 messages")
 
 
-def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path):
     keeper = Keeper(tmp_path / "run.mcap", scenario_of(), 1)
     inlet = keeper.inlet()
     with Path("/dev/full").open("wb") as full:
@@ -361,9 +353,7 @@ def test_a_disk_that_becomes_full_is_told_in_one_line(tmp_path: Path) -> None:
     assert lost.endswith("run.mcap is recorded up to 0 s only: No space left on device")
 
 
-def test_a_run_that_has_grown_too_large_is_kept_up_to_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_has_grown_too_large_is_kept_up_to_there(tmp_path, monkeypatch):
     monkeypatch.setattr(recording, "MOST_BYTES", 30_000)
     lost = record(tmp_path / "run.mcap", lines=100_0).finish()
     assert lost is not None
@@ -372,7 +362,7 @@ def test_a_run_that_has_grown_too_large_is_kept_up_to_there(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no disk that is always full")
-def test_a_trace_on_a_full_disk_ends_and_is_told_once() -> None:
+def test_a_trace_on_a_full_disk_ends_and_is_told_once():
     told: list[str] = []
     take = TraceFile(Path("/dev/full"), told.append)
     for _ in range(3):
@@ -381,7 +371,7 @@ def test_a_trace_on_a_full_disk_ends_and_is_told_once() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"5\n", b"{}\n", b'{"format": 99}\n'])
-def test_what_holds_no_lines_ends_in_one_line(tmp_path: Path, data: bytes) -> None:
+def test_what_holds_no_lines_ends_in_one_line(tmp_path, data):
     part = tmp_path / "run.mcap.part"
     part.write_bytes(data)
     with pytest.raises(ConfigError, match="holds no lines of a live run"):

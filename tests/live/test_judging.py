@@ -1,7 +1,5 @@
 """A live run is judged by what its parts say, whoever speaks first and whatever they hide."""
 
-from __future__ import annotations
-
 import json
 import random
 from collections import defaultdict
@@ -91,16 +89,14 @@ def judged(run: Run, lines: dict[int, list[Line]], seed: int = 1) -> dict[str, s
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_an_honest_run_holds_every_rule_whichever_part_is_read_first(seed: int) -> None:
+def test_an_honest_run_holds_every_rule_whichever_part_is_read_first(seed):
     run = drive()
     assert run.field.robots[ROBOT].applied > 50
     assert judged(run, said_by_parts(run), seed) == dict.fromkeys(RULES, "held")
 
 
 @pytest.mark.invariant("S3")
-def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(monkeypatch):
     monkeypatch.setattr(RobotController, "_emergency", lambda *_: Decision(m.OK, "stopped"))
     run = drive()
     found = judged(run, said_by_parts(run))
@@ -108,7 +104,7 @@ def test_a_robot_that_answers_an_emergency_and_drives_on_is_found_out(
 
 
 @pytest.mark.parametrize("ahead", [-0.3, 0.3])
-def test_no_rule_is_broken_by_two_clocks_that_differ(ahead: float) -> None:
+def test_no_rule_is_broken_by_two_clocks_that_differ(ahead):
     """Each rule compares times of one part; the DVA and the phones are on another machine."""
     run = drive()
     lines = said_by_parts(run)
@@ -123,7 +119,7 @@ def _later(line: Line, seconds: float) -> Line:
     return [word, max(0.0, time + seconds), *rest]
 
 
-def test_without_the_world_robots_are_not_judged_and_without_the_dva_no_events() -> None:
+def test_without_the_world_robots_are_not_judged_and_without_the_dva_no_events():
     run = drive(10.0)
     lines = said_by_parts(run)
     alone = judged(run, {WORLD: lines[WORLD]})
@@ -132,14 +128,14 @@ def test_without_the_world_robots_are_not_judged_and_without_the_dva_no_events()
     assert [alone[rule] for rule in RULES] == ["not judged"] * 5 + ["held"] * 2
 
 
-def test_what_could_not_be_said_leaves_every_rule_unjudged() -> None:
+def test_what_could_not_be_said_leaves_every_rule_unjudged():
     run = drive(10.0)
     lines = said_by_parts(run)
     lines[WORLD].insert(50, [SEEN, lines[WORLD][50][1], "gap", {"missing": 3}])
     assert judged(run, lines) == dict.fromkeys(RULES, "not judged")
 
 
-def test_a_judge_that_has_failed_has_held_nothing() -> None:
+def test_a_judge_that_has_failed_has_held_nothing():
     run = drive(10.0)
     judge = LiveJudge(terms_of(run.scenario))
     judge.joins(WORLD)
@@ -165,9 +161,7 @@ def reply(time: float, to: str, number: int) -> Sent:
 
 @pytest.mark.invariant("S5")
 @pytest.mark.parametrize("is_forged", [False, True])
-def test_a_permission_that_nobody_but_its_own_words_says_the_dva_gave_is_none(
-    is_forged: bool,
-) -> None:
+def test_a_permission_that_nobody_but_its_own_words_says_the_dva_gave_is_none(is_forged):
     """Two operators; the robot believes what one of them says and answers in the DVA's name."""
     scenario = scenarios.build(scenarios.load("drive-to-event"), {"operator.count": 2})
     grant = said(1.0, DVA, ROBOT, m.PermissionGrant(PHONE, "both", 5), 5, 1)

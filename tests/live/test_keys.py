@@ -1,7 +1,5 @@
 """Keys by the names that people use, and what both ends say when keys do not fit."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -31,21 +29,19 @@ ROBOT, OPERATOR, DETECTOR = (id_of(kind, 1) for kind in ("robot", "operator", "d
         ("70:1A:04:F9:81:D6", "70:1A:04:F9:81:D6"),
     ],
 )
-def test_a_device_is_named_as_people_do_or_by_its_id(
-    tmp_path: Path, name: str, id_tag: str
-) -> None:
+def test_a_device_is_named_as_people_do_or_by_its_id(tmp_path, name, id_tag):
     assert make_keys(tmp_path / "keys", [name]) == f"{tmp_path / 'keys'}: made 1 pairs of keys"
     ring = KeyRing(tmp_path / "keys")
     assert ring.devices == [id_tag]
     assert len(ring.pair(id_tag)[1]) == 40
 
 
-def test_a_scenario_stands_for_all_its_devices(tmp_path: Path) -> None:
+def test_a_scenario_stands_for_all_its_devices(tmp_path):
     make_keys(tmp_path, ["drive-to-event"])
     assert KeyRing(tmp_path).devices == sorted([DVA, ROBOT, OPERATOR, DETECTOR])
 
 
-def test_keys_that_are_there_are_kept(tmp_path: Path) -> None:
+def test_keys_that_are_there_are_kept(tmp_path):
     make_keys(tmp_path, ["robot-1", "robot-2"])
     before = KeyRing(tmp_path).pair(ROBOT)
     said = make_keys(tmp_path, ["drive-to-event", "robot-1", "dva"])
@@ -57,7 +53,7 @@ def test_keys_that_are_there_are_kept(tmp_path: Path) -> None:
     "name",
     ["", "robot", "robot-0", "robot-01", "robot-10000", "dva-1", "cat-1", "70:1a:04:f9:81:d6"],
 )
-def test_a_name_that_stands_for_nothing_is_refused(tmp_path: Path, name: str) -> None:
+def test_a_name_that_stands_for_nothing_is_refused(tmp_path, name):
     with pytest.raises(ConfigError, match=r"is no device .* and no scenario"):
         make_keys(tmp_path / "keys", ["robot-1", name])
     assert not (tmp_path / "keys").exists()
@@ -76,7 +72,7 @@ def keys(tmp_path: Path) -> Path:
 
 
 @pytest.mark.system
-def test_a_run_with_keys_goes_like_one_without(programs: Programs, tmp_path: Path) -> None:
+def test_a_run_with_keys_goes_like_one_without(programs, tmp_path):
     made = call("keys", "ours", "drive-to-event", cwd=tmp_path)
     assert (made.returncode, made.stdout) == (0, "ours: made 4 pairs of keys\n")
     run = programs.start(*LIVE, "--keys", "ours")
@@ -111,9 +107,7 @@ def dva_and_operator(
 
 
 @pytest.mark.system
-def test_an_operator_whose_key_is_unknown_is_told_so_at_both_ends(
-    programs: Programs, address: str, keys: Path
-) -> None:
+def test_an_operator_whose_key_is_unknown_is_told_so_at_both_ends(programs, address, keys):
     theirs = with_another_key(keys, OPERATOR)
     dva, operator = dva_and_operator(programs, address, keys, theirs)
     dva.wait_to_say(f"{DVA} refused a connection: an unknown key (")
@@ -122,16 +116,14 @@ def test_an_operator_whose_key_is_unknown_is_told_so_at_both_ends(
 
 
 @pytest.mark.system
-def test_an_operator_without_keys_is_told_so_at_both_ends(
-    programs: Programs, address: str, keys: Path
-) -> None:
+def test_an_operator_without_keys_is_told_so_at_both_ends(programs, address, keys):
     dva, operator = dva_and_operator(programs, address, keys, None)
     dva.wait_to_say("the other end has no keys, this one wants them")
     operator.wait_to_say(f"{DVA} wants keys, this end has none")
 
 
 @pytest.mark.system
-def test_a_missing_secret_key_ends_in_one_line(programs: Programs, keys: Path) -> None:
+def test_a_missing_secret_key_ends_in_one_line(programs, keys):
     (keys / "secret" / f"{OPERATOR.replace(':', '-')}.key_secret").unlink()
     run = programs.start(*LIVE, "--for", "60", "--keys", keys)
     assert run.ends() == 2

@@ -1,9 +1,5 @@
 """Mistakes in the words of `dva-sim live` that no process has to be started for."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 from helpers.processes.command_line import call
 
@@ -39,9 +35,7 @@ from dva_sim.live import supervisor
         (["--record", "/proc"], "nothing can be written in folder '/proc'"),
     ],
 )
-def test_a_mistake_ends_in_one_line_before_anything_is_started(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
-) -> None:
+def test_a_mistake_ends_in_one_line_before_anything_is_started(tmp_path, monkeypatch, words, said):
     for name in ("there.mcap", "cut.mcap.part", "dva.trace.jsonl", "robot-1.trace.jsonl"):
         folder = tmp_path / ("traces" if name.endswith("jsonl") else "")
         folder.mkdir(exist_ok=True)

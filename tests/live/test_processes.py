@@ -1,7 +1,5 @@
 """`dva-sim live` as users run it: real processes, real sockets, real signals."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -12,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from helpers.processes.command_line import call
-from helpers.processes.programs import Program, Programs, wait_until
+from helpers.processes.programs import Program, wait_until
 
 from dva_sim.agents.robot.decision_log import replay
 from dva_sim.protocol import messages as m
@@ -56,8 +54,8 @@ def briefly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_done(
-    programs: Programs, tmp_path: Path
-) -> None:
+    programs, tmp_path
+):
     run = programs.start(*SCRIPTED, "--record", "traces")
     assert run.ends() == 0, run.complained
     assert all_held(run)
@@ -98,8 +96,8 @@ RobotController._emergency = lambda *_: Decision(m.OK, "stopped")
 
 @pytest.mark.invariant("S3")
 def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_done(
-    programs: Programs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    programs, tmp_path, monkeypatch
+):
     """The bug is in all processes; what it did is judged by what was seen."""
     (tmp_path / "sitecustomize.py").write_text(DEAF)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -125,9 +123,7 @@ def count_in(recording: Path, element: bytes) -> int:
 
 
 @pytest.mark.usefixtures("briefly")
-def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
-    programs: Programs, tmp_path: Path
-) -> None:
+def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(programs, tmp_path):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     assert run.ends() == 0, run.complained
     assert all_held(run)
@@ -145,7 +141,7 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(
 
 
 @pytest.mark.usefixtures("briefly")
-def test_the_robots_go_on_when_the_disk_becomes_full(programs: Programs, tmp_path: Path) -> None:
+def test_the_robots_go_on_when_the_disk_becomes_full(programs, tmp_path):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     run.wait_to_say("is now in mode Teleoperation")
     resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
@@ -158,16 +154,14 @@ def test_the_robots_go_on_when_the_disk_becomes_full(programs: Programs, tmp_pat
     assert call("replay", tmp_path / "run.mcap.part").returncode == 0
 
 
-def test_a_run_lasts_as_long_as_it_is_told_to(programs: Programs) -> None:
+def test_a_run_lasts_as_long_as_it_is_told_to(programs):
     run = programs.start(*SCRIPTED, "--for", "3")
     assert run.ends() == 0
     assert "The run ended (time is up)" in run.said
     assert programs.processes() == {}
 
 
-def test_a_simulated_person_drives_to_the_fire_and_confirms_it(
-    programs: Programs, tmp_path: Path
-) -> None:
+def test_a_simulated_person_drives_to_the_fire_and_confirms_it(programs, tmp_path):
     run = programs.start("live", "drive-to-event", *NEAR, "--record", "traces")
     assert run.ends() == 0, run.complained
     assert "The run ended (settled): event 1 (fire) is confirmed." in run.said
@@ -181,7 +175,7 @@ def test_a_simulated_person_drives_to_the_fire_and_confirms_it(
 # --- how it ends ---------------------------------------------------------------------------
 
 
-def test_a_run_that_is_interrupted_ends_cleanly(programs: Programs) -> None:
+def test_a_run_that_is_interrupted_ends_cleanly(programs):
     run = programs.start("live", "drive-to-event")
     run.wait_to_say("is now in mode Teleoperation")
     run.send(signal.SIGTERM)
@@ -192,7 +186,7 @@ def test_a_run_that_is_interrupted_ends_cleanly(programs: Programs) -> None:
     assert programs.processes() == {}
 
 
-def test_a_run_can_be_interrupted_before_anything_has_happened(programs: Programs) -> None:
+def test_a_run_can_be_interrupted_before_anything_has_happened(programs):
     run = programs.start(*SCRIPTED)
     programs.process_of("dva")
     run.send(signal.SIGINT)
@@ -202,8 +196,8 @@ def test_a_run_can_be_interrupted_before_anything_has_happened(programs: Program
 
 
 def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_replayed(
-    programs: Programs, tmp_path: Path
-) -> None:
+    programs, tmp_path
+):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     run.wait_to_say("is now in mode Teleoperation")
     run.send(signal.SIGKILL)
@@ -222,9 +216,7 @@ def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_repla
 
 
 @pytest.mark.parametrize("part", ["world", "operator"])
-def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(
-    programs: Programs, tmp_path: Path, part: str
-) -> None:
+def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(programs, tmp_path, part):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
     run.wait_to_say("is now in mode Teleoperation")
     os.kill(programs.process_of(part), signal.SIGKILL)
@@ -239,7 +231,7 @@ def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(
 # --- mistakes ------------------------------------------------------------------------------
 
 
-def test_a_mistake_that_a_part_finds_ends_in_one_line_and_exit_code_2(programs: Programs) -> None:
+def test_a_mistake_that_a_part_finds_ends_in_one_line_and_exit_code_2(programs):
     run = programs.start("live", "drive-to-event", "--for", "60", "--keys", ".")
     assert run.ends() == 2
     (line,) = run.complained
@@ -248,7 +240,7 @@ def test_a_mistake_that_a_part_finds_ends_in_one_line_and_exit_code_2(programs: 
     assert programs.processes() == {}
 
 
-def test_a_port_that_is_taken_ends_in_one_line(programs: Programs, address: str) -> None:
+def test_a_port_that_is_taken_ends_in_one_line(programs, address):
     port = int(address.partition(":")[2])
     whole = (*SCRIPTED, "--dva", address)
     world = (*SCRIPTED, "--only", "world", "--port", str(port))
@@ -267,7 +259,7 @@ def test_a_port_that_is_taken_ends_in_one_line(programs: Programs, address: str)
 # --- parts started by hand -----------------------------------------------------------------
 
 
-def test_three_parts_started_by_hand_work_together(programs: Programs, address: str) -> None:
+def test_three_parts_started_by_hand_work_together(programs, address):
     at = ("--dva", address)
     parts = [programs.start(*SCRIPTED, "--only", part, *at) for part in ("dva", "world")]
     parts.append(programs.start(*SCRIPTED, "--only", "operator", *at))
@@ -283,7 +275,7 @@ def test_three_parts_started_by_hand_work_together(programs: Programs, address: 
     programs.wait_for_none()
 
 
-def test_parts_may_start_before_the_dva(programs: Programs, address: str) -> None:
+def test_parts_may_start_before_the_dva(programs, address):
     at = ("--dva", address, "--set", "request.timeout_s=1")
     operator = programs.start(*SCRIPTED, "--only", "operator", *at)
     world = programs.start(*SCRIPTED, "--only", "world", *at)
@@ -302,9 +294,7 @@ def sessions_of_drives(trace: Path) -> set[int | None]:
 
 
 @pytest.mark.invariant("S8")
-def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(
-    programs: Programs, address: str, tmp_path: Path
-) -> None:
+def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(programs, address, tmp_path):
     """The world is the same all the time; only a DVA that knows the robot can permit to drive."""
     at = ("--dva", address, "--set", "request.timeout_s=1")
     dva = programs.start(*SCRIPTED, "--only", "dva", *at)
@@ -323,8 +313,8 @@ def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(
 
 
 def test_a_dva_that_was_killed_remembers_its_events_and_goes_on_with_them(
-    programs: Programs, address: str, tmp_path: Path
-) -> None:
+    programs, address, tmp_path
+):
     """The fire is reported once, to the first DVA; the second hears that it is confirmed."""
     live = ("live", "drive-to-event", *NEAR, "--dva", address)
     keeps = ("--only", "dva", "--state", "dva.sqlite")

@@ -1,7 +1,5 @@
 """The same session in both clocks: what a robot decides does not depend on which one ticks."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 
@@ -29,7 +27,7 @@ def of_the_session(decisions: list[Decided]) -> list[Decided]:
 
 
 @pytest.mark.parametrize("pattern", WAYS)
-def test_a_session_leads_to_the_same_decisions_in_both_clocks(pattern: str) -> None:
+def test_a_session_leads_to_the_same_decisions_in_both_clocks(pattern):
     way: Way = WAYS[pattern]
     virtual = of_the_session(in_virtual_time(way, pattern=pattern))
     live = of_the_session(over_sockets(way, pattern=pattern))
@@ -46,7 +44,7 @@ def test_a_session_leads_to_the_same_decisions_in_both_clocks(pattern: str) -> N
     assert [d.code for d in live if d.code != m.OK] == [m.WRONG_MODE] * refused
 
 
-def test_the_session_is_what_it_says() -> None:
+def test_the_session_is_what_it_says():
     decisions = of_the_session(in_virtual_time())
     start, first, *_ = decisions
     assert start == Decided("StartTeleOp", m.OK, "", "Teleoperation", 0.0, 0.0)
@@ -59,7 +57,7 @@ def test_the_session_is_what_it_says() -> None:
     assert [d.message for d in decisions[-2:]] == ["StopTeleOp", "PermissionRevocation"]
 
 
-def test_the_operator_tells_what_was_done_and_what_came_of_it() -> None:
+def test_the_operator_tells_what_was_done_and_what_came_of_it():
     assert told_in_virtual_time() == [
         "starts robot-1 and sends 200 commands",
         "has driven robot-1: 200 of 200 commands obeyed",
@@ -71,7 +69,7 @@ def test_the_operator_tells_what_was_done_and_what_came_of_it() -> None:
     ]
 
 
-def test_commands_that_came_too_late_are_not_told_as_obeyed() -> None:
+def test_commands_that_came_too_late_are_not_told_as_obeyed():
     """After 10 s in which every command came late the operator gives the robot up."""
     told = told_in_virtual_time(**{"robot.processing_s": 0.3, "robot.max_age_s": 0.2})
     assert told[1:] == [
@@ -84,7 +82,7 @@ def test_commands_that_came_too_late_are_not_told_as_obeyed() -> None:
     "changed",
     [{"robot.max_age_s": 0.2}, {"robot.processing_s": 0.3, "robot.watchdog_s": 0.2}],
 )
-def test_a_shorter_limit_leads_to_other_decisions(changed: dict[str, float]) -> None:
+def test_a_shorter_limit_leads_to_other_decisions(changed):
     """So it is no wonder of the comparison that both clocks agree."""
     usual, strict = (of_the_session(in_virtual_time(**c)) for c in ({}, changed))
     assert strict != usual
@@ -94,7 +92,7 @@ def test_a_shorter_limit_leads_to_other_decisions(changed: dict[str, float]) -> 
 
 @pytest.mark.invariant("S2", "S8")
 @pytest.mark.parametrize("live", [False, True])
-def test_a_grant_forged_in_the_dvas_name_is_found_out_by_asking_the_dva(live: bool) -> None:
+def test_a_grant_forged_in_the_dvas_name_is_found_out_by_asking_the_dva(live):
     decisions = over_sockets(forged) if live else in_virtual_time(forged)
     told = [d.message for d in decisions]
     assert told.count("PermissionGrant") == 2

@@ -1,7 +1,5 @@
 """A robot taken over, and sensors that the DVA heeds: the same in virtual time and over sockets."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -157,9 +155,7 @@ def is_moving(scene: Scene) -> bool:
 
 
 @pytest.mark.invariant("S2")
-def test_a_supervisor_takes_a_moving_robot_over_and_it_stands_in_between(
-    network: Transport,
-) -> None:
+def test_a_supervisor_takes_a_moving_robot_over_and_it_stands_in_between(network):
     scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
     speeds: list[float] = []
     driver = scene.enters(1, drives_until_refused(first))
@@ -179,9 +175,7 @@ def test_a_supervisor_takes_a_moving_robot_over_and_it_stands_in_between(
     assert scene.robot.controller.owner == SUPERVISOR
 
 
-def test_who_is_no_supervisor_is_refused_and_whoever_is_asked_may_decline(
-    network: Transport,
-) -> None:
+def test_who_is_no_supervisor_is_refused_and_whoever_is_asked_may_decline(network):
     scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
 
     def asks(_: ScriptedOperator) -> Script:
@@ -198,7 +192,7 @@ def test_who_is_no_supervisor_is_refused_and_whoever_is_asked_may_decline(
     assert scene.robot.controller.owner == OPERATOR
 
 
-def test_a_holder_that_agrees_gives_its_robot_up(network: Transport) -> None:
+def test_a_holder_that_agrees_gives_its_robot_up(network):
     scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
     speeds: list[float] = []
     driver = scene.enters(1, drives_until_refused(first))
@@ -218,7 +212,7 @@ def test_a_holder_that_agrees_gives_its_robot_up(network: Transport) -> None:
     assert scene.robot.controller.owner == OTHER
 
 
-def test_with_keys_nobody_plays_the_supervisor(network: Transport) -> None:
+def test_with_keys_nobody_plays_the_supervisor(network):
     """A supervisor is known by its id: with keys by its key, without them by its word."""
     scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
     scene.enters(1, drives_until_refused(first))
@@ -234,7 +228,7 @@ def test_with_keys_nobody_plays_the_supervisor(network: Transport) -> None:
     assert (ROBOT in scene.dva.desk.sessions.reserved) is not with_keys
 
 
-def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network: Transport) -> None:
+def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network):
     scene, heard = Scene(network, **SHOWS_SMOKE), list[m.Reply]()
 
     def asks(_: ScriptedOperator) -> Script:
@@ -261,7 +255,7 @@ def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network: Transpo
     assert math.dist(at, (here.x, here.y)) < 0.5
 
 
-def test_what_a_detector_reports_beside_the_robot_is_confirmed_by_it(network: Transport) -> None:
+def test_what_a_detector_reports_beside_the_robot_is_confirmed_by_it(network):
     scene = Scene(network, **SHOWS_SMOKE)
     pose = scene.robot.body.pose()
     place = m.Position(*scene.stage.site.frame.to_latlon(pose.x + 3.0, pose.y))

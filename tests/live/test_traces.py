@@ -1,7 +1,5 @@
 """Traces of robots' decisions: replayed through a fresh controller they give the same."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -98,7 +96,7 @@ def drive(tmp_path: Path) -> Path:
 # --- the same again ------------------------------------------------------------------------
 
 
-def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path: Path) -> None:
+def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path):
     path = tmp_path / "robot-1.trace.jsonl"
     decisions = over_sockets(pipelined, trace=path)
     replayed = list(replay(path))
@@ -109,9 +107,7 @@ def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
-def test_a_simulated_operators_drive_is_decided_the_same_again(
-    tmp_path: Path, pattern: str
-) -> None:
+def test_a_simulated_operators_drive_is_decided_the_same_again(tmp_path, pattern):
     link = {"delay_s": 0.2, "jitter_s": 0.1, "loss": 0.1}
     path = tmp_path / "robot-1.trace.jsonl"
     with traced(path, pattern=pattern, link=link, horizon_s=120) as run:
@@ -120,9 +116,7 @@ def test_a_simulated_operators_drive_is_decided_the_same_again(
     assert differences(path) == 0
 
 
-def test_missions_emergencies_and_leases_that_end_are_decided_the_same_again(
-    tmp_path: Path,
-) -> None:
+def test_missions_emergencies_and_leases_that_end_are_decided_the_same_again(tmp_path):
     path = tmp_path / "robot-1.trace.jsonl"
     with traced(path, **LATER) as run:
         _mission_lease_and_emergency(run)
@@ -153,7 +147,7 @@ def _mission_lease_and_emergency(run: Run) -> None:
     run.clock.run(130.0)
 
 
-def test_reply_contents_are_not_kept_but_what_leads_to_them_is(tmp_path: Path) -> None:
+def test_reply_contents_are_not_kept_but_what_leads_to_them_is(tmp_path):
     path = tmp_path / "robot-1.trace.jsonl"
     grant = m.PermissionGrant(DVA, "both", 5, sensors=("heat_flux",))
     told = ((10.0, grant), (11.0, m.GetSensorInfo()), (12.0, m.DevSub("heat_flux", 1)))
@@ -166,7 +160,7 @@ def test_reply_contents_are_not_kept_but_what_leads_to_them_is(tmp_path: Path) -
     assert differences(path) == 0
 
 
-def test_what_was_decided_is_on_disk_at_once(drive: Path) -> None:
+def test_what_was_decided_is_on_disk_at_once(drive):
     """A robot that is switched off in the middle leaves what it has decided until then."""
     controller = RobotController(ROBOT, DVA, Limits(1.0, 2.0))
     path = drive.with_name("other.jsonl")
@@ -180,7 +174,7 @@ def test_what_was_decided_is_on_disk_at_once(drive: Path) -> None:
 # --- changed by hand -----------------------------------------------------------------------
 
 
-def test_the_trace_as_it_was_taken_shows_no_difference(drive: Path) -> None:
+def test_the_trace_as_it_was_taken_shows_no_difference(drive):
     assert sum(kinds(drive).values()) == 8
     assert differences(drive) == 0
 
@@ -199,14 +193,12 @@ def test_the_trace_as_it_was_taken_shows_no_difference(drive: Path) -> None:
         (0, lambda e: e["limits"].update(watchdog=0.5), 3),
     ],
 )
-def test_a_trace_changed_by_hand_is_found_out(
-    drive: Path, number: int, how: Callable[[dict[str, Any]], object], found: int
-) -> None:
+def test_a_trace_changed_by_hand_is_found_out(drive, number, how, found):
     change(drive, number, how)
     assert differences(drive) == found
 
 
-def test_a_line_taken_out_is_found_out(drive: Path) -> None:
+def test_a_line_taken_out_is_found_out(drive):
     whole = drive.read_text().splitlines(keepends=True)
     drive.write_text("".join(whole[:4] + whole[5:]))  # without the start
     assert differences(drive) == 3
@@ -222,7 +214,7 @@ def said_of(path: Path) -> str:
 
 
 @pytest.mark.parametrize("kept", [1, 100, 500, -1, -2, -20])
-def test_a_trace_that_ends_in_the_middle_of_a_line_ends_in_one_line(drive: Path, kept: int) -> None:
+def test_a_trace_that_ends_in_the_middle_of_a_line_ends_in_one_line(drive, kept):
     data = drive.read_text().rstrip("\n")
     drive.write_text(data[:kept])
     said = said_of(drive)
@@ -245,7 +237,7 @@ FOREIGN = {
 
 
 @pytest.mark.parametrize("what", FOREIGN)
-def test_a_foreign_file_ends_in_one_line(tmp_path: Path, what: str) -> None:
+def test_a_foreign_file_ends_in_one_line(tmp_path, what):
     path = tmp_path / "foreign"
     path.write_bytes(FOREIGN[what])
     said = said_of(path)
@@ -266,7 +258,7 @@ def test_a_foreign_file_ends_in_one_line(tmp_path: Path, what: str) -> None:
         '{"message": "\\ud800"}',
     ],
 )
-def test_a_foreign_line_is_told_by_its_number(drive: Path, line: str) -> None:
+def test_a_foreign_line_is_told_by_its_number(drive, line):
     whole = drive.read_text().splitlines()
     whole[3] = line
     drive.write_text("\n".join(whole))
@@ -285,12 +277,12 @@ def test_a_foreign_line_is_told_by_its_number(drive: Path, line: str) -> None:
         ("text", 5),
     ],
 )
-def test_a_value_of_another_type_is_told_by_its_line(drive: Path, key: str, value: object) -> None:
+def test_a_value_of_another_type_is_told_by_its_line(drive, key, value):
     change(drive, 3, lambda entry: entry.update({key: value}))
     assert said_of(drive).startswith(f"{drive}:4: is no line of a robot's trace")
 
 
-def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_told_in_one_line(tmp_path):
     assert (
         said_of(tmp_path / "no") == f"{tmp_path / 'no'}: cannot be read: No such file or directory"
     )

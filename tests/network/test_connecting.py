@@ -1,7 +1,5 @@
 """Which depth a connection gets: messages where that is exact, segments everywhere else."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -22,7 +20,7 @@ def link(**config: Any) -> Link:
     return Link(settings, ConstantRate(settings.rate_bps), Streams(1), "l")
 
 
-def test_delay_alone_is_no_reason_for_segments() -> None:
+def test_delay_alone_is_no_reason_for_segments():
     assert is_calm(link(delay_s=0.5), LOAD)
 
 
@@ -37,7 +35,7 @@ def test_delay_alone_is_no_reason_for_segments() -> None:
     ],
     ids=["loss", "jitter", "an outage", "used up by more than four fifths", "a short queue"],
 )
-def test_what_may_lose_delay_by_chance_or_pile_up_takes_segments(config: dict[str, Any]) -> None:
+def test_what_may_lose_delay_by_chance_or_pile_up_takes_segments(config):
     assert not is_calm(link(**config), LOAD)
     connector = Connector(load=LOAD)
     assert connector.depth(link(), link()) == "message"
@@ -54,12 +52,12 @@ def test_what_may_lose_delay_by_chance_or_pile_up_takes_segments(config: dict[st
         {"conflate": "publisher"},
     ],
 )
-def test_a_bound_that_is_set_takes_segments(options: dict[str, Any]) -> None:
+def test_a_bound_that_is_set_takes_segments(options):
     connector = Connector(zeromq=ZeromqConfig(**options))
     assert connector.depth(link(), link()) == "segment"
 
 
-def test_what_is_chosen_by_hand_is_taken() -> None:
+def test_what_is_chosen_by_hand_is_taken():
     for depth in ("message", "segment"):
         connector = Connector(depth=depth)  # type: ignore[arg-type]
         assert connector.depth(link(loss=0.1), link()) == depth
@@ -67,7 +65,7 @@ def test_what_is_chosen_by_hand_is_taken() -> None:
     assert Connector("datagrams", "segment").depth(link(), link()) == "datagram"
 
 
-def test_the_usual_pictures_and_commands_use_a_twelfth_of_the_usual_link() -> None:
+def test_the_usual_pictures_and_commands_use_a_twelfth_of_the_usual_link():
     """10 pictures of 12,000 bytes and 30 messages a second, on 20 Mbit/s."""
     load = load_of(scenarios.build({}))
     assert load.rate_bps == 8 * (10 * (12_000 + 9 * 52) + 30 * 1000)
@@ -85,7 +83,7 @@ def test_the_usual_pictures_and_commands_use_a_twelfth_of_the_usual_link() -> No
         ({"transport": "datagrams"}, "datagram"),
     ],
 )
-def test_a_run_says_what_it_used(changes: dict[str, Any], depth: str) -> None:
+def test_a_run_says_what_it_used(changes, depth):
     scenario = scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 8, **changes})
     assert simulate(scenario, 1).depth == depth
 
@@ -100,6 +98,6 @@ def test_a_run_says_what_it_used(changes: dict[str, Any], depth: str) -> None:
         ({"network_depth": "packet"}, "auto, message or segment"),
     ],
 )
-def test_what_cannot_be_set_is_refused(changes: dict[str, Any], told: str) -> None:
+def test_what_cannot_be_set_is_refused(changes, told):
     with pytest.raises(ConfigError, match=told):
         scenarios.build({}, changes)

@@ -1,7 +1,5 @@
 """Datagrams: nothing is promised but that a message is whole."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -43,23 +41,23 @@ def heard(size: int, count: int, **config: Any) -> list[int]:
     return got
 
 
-def test_a_message_of_one_packet_is_lost_as_often_as_a_packet_is() -> None:
+def test_a_message_of_one_packet_is_lost_as_often_as_a_packet_is():
     got = heard(400, 4000, loss=0.1)
     assert len(got) / 4000 == pytest.approx(0.9, abs=0.02)
     assert got == sorted(got)
 
 
-def test_a_message_of_nine_packets_is_lost_if_one_of_them_is() -> None:
+def test_a_message_of_nine_packets_is_lost_if_one_of_them_is():
     assert len(heard(12_000, 4000, loss=0.1)) / 4000 == pytest.approx(0.9**9, abs=0.025)
 
 
-def test_where_packets_overtake_messages_do() -> None:
+def test_where_packets_overtake_messages_do():
     got = heard(400, 500, delay_s=0.5, jitter_s=0.3, reorder=True)
     assert sorted(got) == list(range(500))
     assert got != sorted(got)
 
 
-def test_nothing_is_shaken_and_the_first_message_leaves_at_once() -> None:
+def test_nothing_is_shaken_and_the_first_message_leaves_at_once():
     net, times = network(delay_s=0.1, rate_bps=1e9), list[float]()
     net.serve("robot", lambda request: request.answer(request.data))
     requester = Requester(net, "phone", "robot", timeout=1.0)
@@ -68,7 +66,7 @@ def test_nothing_is_shaken_and_the_first_message_leaves_at_once() -> None:
     assert times == [pytest.approx(0.2, abs=1e-3)]
 
 
-def test_only_the_requesters_time_out_sends_again() -> None:
+def test_only_the_requesters_time_out_sends_again():
     net, seen, replies = network(delay_s=0.1, loss=0.5, seed=3), list[bytes](), list[bytes]()
 
     def serve(request: Request) -> None:
@@ -86,7 +84,7 @@ def test_only_the_requesters_time_out_sends_again() -> None:
     assert requester.timeouts > 50
 
 
-def test_a_subscription_that_is_lost_is_said_again() -> None:
+def test_a_subscription_that_is_lost_is_said_again():
     net, got = network(loss=0.5, seed=2), list[int]()
     net.subscribe("robot", "phone", "t|", got.append)
     for number in range(200):
@@ -96,7 +94,7 @@ def test_a_subscription_that_is_lost_is_said_again() -> None:
     assert len(got) > 60
 
 
-def test_a_closed_socket_hears_nothing_more_but_what_it_sent_is_executed() -> None:
+def test_a_closed_socket_hears_nothing_more_but_what_it_sent_is_executed():
     clock, got, back = Clock(), list[str](), list[str]()
     connection = DatagramConnection(clock, *links(delay_s=0.1), got.append, back.append)
     connection.open(lambda: None)

@@ -1,7 +1,5 @@
 """Key files: made once, kept, checked."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat
@@ -37,7 +35,7 @@ def refused(folder: Path, device: str | None = None) -> str:
     return str(error.value)
 
 
-def test_keys_survive_writing_and_reading(folder: Path) -> None:
+def test_keys_survive_writing_and_reading(folder):
     ring = KeyRing(folder)
     assert ring.devices == [ROBOT, GUARD]
     public, secret = ring.pair(ROBOT)
@@ -47,13 +45,13 @@ def test_keys_survive_writing_and_reading(folder: Path) -> None:
     assert ring.owner(zmq.curve_keypair()[0]) is None
 
 
-def test_the_files_are_certificates_as_others_read_them(folder: Path) -> None:
+def test_the_files_are_certificates_as_others_read_them(folder):
     assert zmq.auth.load_certificate(folder / SECRET) == KeyRing(folder).pair(ROBOT)
     assert zmq.auth.load_certificate(folder / PUBLIC) == (KeyRing(folder).public(ROBOT), None)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes of POSIX")
-def test_secrets_are_for_their_owner_only(folder: Path) -> None:
+def test_secrets_are_for_their_owner_only(folder):
     assert mode(folder / SECRET) == 0o600
     assert mode(folder / "secret") == 0o700
     (folder / SECRET).chmod(0o640)
@@ -61,20 +59,20 @@ def test_secrets_are_for_their_owner_only(folder: Path) -> None:
     KeyRing(folder).pair(GUARD)
 
 
-def test_existing_keys_are_kept(folder: Path) -> None:
+def test_existing_keys_are_kept(folder):
     before = KeyRing(folder).pair(ROBOT)
     assert create_keys(folder, [ROBOT, "operator-1"]) == ["operator-1"]
     assert KeyRing(folder).pair(ROBOT) == before
 
 
-def test_a_public_key_is_made_again_from_its_secret(folder: Path) -> None:
+def test_a_public_key_is_made_again_from_its_secret(folder):
     before = KeyRing(folder).pair(ROBOT)
     (folder / PUBLIC).unlink()
     assert create_keys(folder, [ROBOT]) == []
     assert KeyRing(folder).pair(ROBOT) == before
 
 
-def test_a_folder_can_be_split(folder: Path, tmp_path: Path) -> None:
+def test_a_folder_can_be_split(folder, tmp_path):
     there = tmp_path / "there"
     shutil.copytree(folder / "public", there / "public")
     (there / "secret").mkdir()
@@ -86,7 +84,7 @@ def test_a_folder_can_be_split(folder: Path, tmp_path: Path) -> None:
     assert create_keys(there, [GUARD]) == []  # its secret is elsewhere
 
 
-def test_what_is_missing_is_named(folder: Path, tmp_path: Path) -> None:
+def test_what_is_missing_is_named(folder, tmp_path):
     assert "dva-sim keys" in refused(tmp_path / "nowhere")
     assert "public key of robot-9" in refused(folder, "robot-9")
     (tmp_path / "empty").mkdir()
@@ -104,14 +102,14 @@ def test_what_is_missing_is_named(folder: Path, tmp_path: Path) -> None:
         (b"\xff\xfe\x00", "not plain text"),
     ],
 )
-def test_a_broken_file_is_named(folder: Path, content: bytes, problem: str) -> None:
+def test_a_broken_file_is_named(folder, content, problem):
     (folder / PUBLIC).write_bytes(content)
     line = refused(folder)
     assert line.startswith(str(folder / PUBLIC))
     assert problem in line
 
 
-def test_two_devices_cannot_have_one_key(folder: Path) -> None:
+def test_two_devices_cannot_have_one_key(folder):
     text = (folder / PUBLIC).read_text()
     (folder / "public" / "copy.key").write_text(text)
     assert f"is a second key of {ROBOT}" in refused(folder)
@@ -119,12 +117,12 @@ def test_two_devices_cannot_have_one_key(folder: Path) -> None:
     assert "have the same key" in refused(folder)
 
 
-def test_a_secret_does_not_belong_among_the_public_keys(folder: Path) -> None:
+def test_a_secret_does_not_belong_among_the_public_keys(folder):
     shutil.copy(folder / SECRET, folder / PUBLIC)
     assert "holds a secret key" in refused(folder)
 
 
-def test_keys_that_are_no_pair_are_refused(folder: Path, tmp_path: Path) -> None:
+def test_keys_that_are_no_pair_are_refused(folder, tmp_path):
     create_keys(tmp_path / "other", [ROBOT])
     shutil.copy(tmp_path / "other" / SECRET, folder / SECRET)
     assert "outdated" in refused(folder, ROBOT)
@@ -138,18 +136,18 @@ def test_keys_that_are_no_pair_are_refused(folder: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("id_", ["", "../robot", "a b", "-", 'x"', "é", "x" * 65, "a\n"])
-def test_an_id_that_is_no_file_name_is_refused(tmp_path: Path, id_: str) -> None:
+def test_an_id_that_is_no_file_name_is_refused(tmp_path, id_):
     with pytest.raises(ConfigError, match="id"):
         create_keys(tmp_path, ["fine", id_])
     assert list(tmp_path.iterdir()) == []
 
 
-def test_two_ids_never_share_a_file(folder: Path) -> None:
+def test_two_ids_never_share_a_file(folder):
     with pytest.raises(ConfigError, match="same file"):
         create_keys(folder, [ROBOT.replace(":", "-")])
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match="cannot be written"):
         create_keys(tmp_path / "file", [ROBOT])

@@ -1,7 +1,5 @@
 """Request/reply and publish/subscribe on the virtual network."""
 
-from __future__ import annotations
-
 import pytest
 
 from dva_sim.kernel.clock import Clock
@@ -38,7 +36,7 @@ def echo(net: VirtualNetwork, service_time: float) -> list[bytes]:
     return seen
 
 
-def test_a_stream_delivers_everything_once_and_in_order_through_loss() -> None:
+def test_a_stream_delivers_everything_once_and_in_order_through_loss():
     clock, (forward, backward) = Clock(), pair(loss=0.3, delay_s=0.05, jitter_s=0.05)
     got: list[int] = []
     stream = Stream(clock, forward, backward, got.append)
@@ -49,7 +47,7 @@ def test_a_stream_delivers_everything_once_and_in_order_through_loss() -> None:
     assert stream.retransmitted > 100
 
 
-def test_a_lost_message_holds_up_those_behind_it() -> None:
+def test_a_lost_message_holds_up_those_behind_it():
     clock, (forward, backward) = Clock(), pair(delay_s=0.1, loss=0.3, seed=4)
     sent: dict[int, float] = {}
     got: dict[int, float] = {}
@@ -69,14 +67,14 @@ def test_a_lost_message_holds_up_those_behind_it() -> None:
     assert got[first] - sent[first] >= 0.3
 
 
-def test_a_full_send_queue_refuses_rather_than_grows() -> None:
+def test_a_full_send_queue_refuses_rather_than_grows():
     clock, (forward, backward) = Clock(), pair(delay_s=10.0)
     stream = Stream(clock, forward, backward, lambda _: None)
     taken = sum(stream.send(i, 10) for i in range(MAX_IN_FLIGHT + 50))
     assert taken == MAX_IN_FLIGHT
 
 
-def test_a_connection_opens_after_three_round_trips() -> None:
+def test_a_connection_opens_after_three_round_trips():
     clock, (out, back) = Clock(), pair(delay_s=0.1)
     opened: list[float] = []
     connection = Connection(clock, out, back, lambda _: None, lambda _: None)
@@ -85,7 +83,7 @@ def test_a_connection_opens_after_three_round_trips() -> None:
     assert opened == [pytest.approx(0.6, abs=0.01)]
 
 
-def test_a_request_is_tried_three_times_then_fails_and_late_replies_are_dropped() -> None:
+def test_a_request_is_tried_three_times_then_fails_and_late_replies_are_dropped():
     net = network(delay_s=0.1)
     seen = echo(net, 100.0)
     requester = Requester(net, "phone", "robot", timeout=2.0, attempts=3)
@@ -99,7 +97,7 @@ def test_a_request_is_tried_three_times_then_fails_and_late_replies_are_dropped(
     assert requester.timeouts == 3
 
 
-def test_what_is_published_before_the_subscription_has_arrived_is_lost() -> None:
+def test_what_is_published_before_the_subscription_has_arrived_is_lost():
     net = network(delay_s=0.1)
     got: list[int] = []
     net.subscribe("robot", "phone", "robot|", got.append)
@@ -111,7 +109,7 @@ def test_what_is_published_before_the_subscription_has_arrived_is_lost() -> None
     assert got == list(range(got[0], 20))
 
 
-def test_topics_that_end_in_a_bar_do_not_match_by_accident() -> None:
+def test_topics_that_end_in_a_bar_do_not_match_by_accident():
     net = network()
     got: list[str] = []
     net.subscribe("robot", "phone", "robot-1|", got.append)
@@ -122,7 +120,7 @@ def test_topics_that_end_in_a_bar_do_not_match_by_accident() -> None:
     assert got == ["mine"]
 
 
-def test_nothing_is_delivered_after_a_subscription_is_closed() -> None:
+def test_nothing_is_delivered_after_a_subscription_is_closed():
     net = network(delay_s=0.2)
     got: list[str] = []
     subscription = net.subscribe("robot", "phone", "r|", got.append)

@@ -1,11 +1,8 @@
 """The registry of messaging patterns: one place that names, lists and hints derive from."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
-from pathlib import Path
 
 import pytest
 from helpers.paths import ROOT
@@ -22,7 +19,7 @@ from dva_sim.simulation.scenario import Scenario
 EXAMPLE = "acknowledged_pub_sub.py:AcknowledgedPubSub"
 
 
-def test_every_pattern_says_all_that_reports_and_pages_tell_of_it() -> None:
+def test_every_pattern_says_all_that_reports_and_pages_tell_of_it():
     page = (ROOT / "protocol" / "README.md").read_text(encoding="utf-8").splitlines()
     for name, kind in PATTERNS.items():
         row = next(line for line in page if line.startswith(f"| `{name}`"))
@@ -47,13 +44,13 @@ def test_every_pattern_says_all_that_reports_and_pages_tell_of_it() -> None:
         ("gone.py:Mine", {}, "file 'gone.py' not found"),
     ],
 )
-def test_a_pattern_that_cannot_be_had_is_told_in_a_line(name, options, told) -> None:
+def test_a_pattern_that_cannot_be_had_is_told_in_a_line(name, options, told):
     with pytest.raises(ConfigError, match=r".") as caught:
         load_pattern(name, options)()
     assert told in str(caught.value)
 
 
-def test_a_package_offers_patterns_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_offers_patterns_by_name(monkeypatch):
     offered = EntryPoint("plain", "dva_sim.network.patterns:PubSub", "dva_sim.patterns")
     monkeypatch.setattr("dva_sim.kernel.plugins.entry_points", lambda group: [offered])
     assert isinstance(load_pattern("plain")(), PubSub)
@@ -66,21 +63,21 @@ def test_a_package_offers_patterns_by_name(monkeypatch: pytest.MonkeyPatch) -> N
         (f"pattern: {EXAMPLE}\npattern_options:\n  timeout_s: 1\n  every: 0\n", "one.yaml:4:"),
     ],
 )
-def test_a_mistake_in_a_pattern_is_told_at_its_key(tmp_path: Path, text: str, place: str) -> None:
+def test_a_mistake_in_a_pattern_is_told_at_its_key(tmp_path, text, place):
     (tmp_path / "one.yaml").write_text(text)
     with pytest.raises(ConfigError, match=r".") as caught:
         scenarios.build(scenarios.load(str(tmp_path / "one.yaml")))
     assert place in str(caught.value)
 
 
-def test_options_of_a_pattern_are_written_only_where_there_are_any() -> None:
+def test_options_of_a_pattern_are_written_only_where_there_are_any():
     """The hash of a configuration that has none is what it was before there could be any."""
     assert "pattern_options" not in Scenario().model_dump()
     named = Scenario(pattern=EXAMPLE, pattern_options={"every": 3})
     assert Scenario.model_validate(named.model_dump()) == named
 
 
-def test_a_scenario_that_is_only_read_runs_no_file(tmp_path: Path) -> None:
+def test_a_scenario_that_is_only_read_runs_no_file(tmp_path):
     """As from a recording or a results folder, which may come from anybody."""
     (tmp_path / "mine.py").write_text("raise SystemExit('was run')")
     named = {"pattern": f"{tmp_path}/mine.py:Mine"}
@@ -89,7 +86,7 @@ def test_a_scenario_that_is_only_read_runs_no_file(tmp_path: Path) -> None:
         scenarios.build(named)
 
 
-def test_a_pattern_beside_the_scenario_that_names_it_is_found(tmp_path: Path) -> None:
+def test_a_pattern_beside_the_scenario_that_names_it_is_found(tmp_path):
     (tmp_path / "mine.py").write_text(
         "from dva_sim.network.patterns import PubSub\n\n"
         "class Mine(PubSub):\n    newest_wins = True\n"
@@ -99,7 +96,7 @@ def test_a_pattern_beside_the_scenario_that_names_it_is_found(tmp_path: Path) ->
     assert scenario.pattern == f"{tmp_path}/mine.py:Mine"
 
 
-def test_knowing_the_patterns_needs_neither_sockets_nor_arrays() -> None:
+def test_knowing_the_patterns_needs_neither_sockets_nor_arrays():
     """Labels, lists and completion look there before anything runs."""
     heavy = "{'zmq', 'numpy', 'matplotlib', 'lxml', 'pydantic'}"
     code = f"import sys, dva_sim.network.patterns; print(sorted({heavy} & sys.modules.keys()))"

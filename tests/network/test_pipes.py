@@ -1,14 +1,12 @@
 """Pipes: the high-water mark, the low one at half of it, and keeping only the newest."""
 
-from __future__ import annotations
-
 import pytest
 
 from dva_sim.network.zmtp import Pipe, ReceivePipe
 
 
 @pytest.mark.parametrize(("mark", "low"), [(1, 1), (2, 1), (3, 2), (10, 5), (1000, 500)])
-def test_a_full_pipe_has_room_again_when_half_of_it_has_been_read(mark: int, low: int) -> None:
+def test_a_full_pipe_has_room_again_when_half_of_it_has_been_read(mark, low):
     pipe: Pipe[int] = Pipe(mark)
     assert [pipe.put(number) for number in range(mark + 1)] == [True] * mark + [False]
     for _ in range(low - 1):
@@ -18,7 +16,7 @@ def test_a_full_pipe_has_room_again_when_half_of_it_has_been_read(mark: int, low
     assert [pipe.put(number) for number in range(low + 1)] == [True] * low + [False]
 
 
-def test_who_was_refused_is_told_once_when_there_is_room() -> None:
+def test_who_was_refused_is_told_once_when_there_is_room():
     pipe, told = Pipe[int](4), list[int]()
     pipe.on_room = lambda: told.append(len(pipe))
     for number in range(5):
@@ -27,7 +25,7 @@ def test_who_was_refused_is_told_once_when_there_is_room() -> None:
     assert told == [2]
 
 
-def test_what_conflates_keeps_the_newest_and_is_never_full() -> None:
+def test_what_conflates_keeps_the_newest_and_is_never_full():
     pipe = Pipe[int](1, conflate=True)
     assert all(pipe.put(number) for number in range(5))
     assert (len(pipe), pipe.superseded, pipe.take(), pipe.take()) == (1, 4, 4, None)
@@ -44,7 +42,7 @@ class Flow:
         self.said.append("resume")
 
 
-def test_a_full_receiver_lets_its_connection_wait_until_half_is_read() -> None:
+def test_a_full_receiver_lets_its_connection_wait_until_half_is_read():
     pipe, flow = ReceivePipe[int](4), Flow()
     pipe.flow = flow
     for number in range(4):

@@ -1,7 +1,5 @@
 """A poll costs what is ready, not what is open, and misses nothing whoever used the socket."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """What reception does to a link, place by place."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +29,7 @@ class Place:
         return make_link(settings, "up", Streams(1), "radio", lambda: self.quality)
 
 
-def test_where_nothing_is_drawn_the_link_is_as_it_is() -> None:
+def test_where_nothing_is_drawn_the_link_is_as_it_is():
     wired = make_link(LinkConfig(delay_s=0.1, loss=0.2), "up", Streams(1), "radio")
     radio = Place().link(delay_s=0.1, loss=0.2)
     times = [n * 0.01 for n in range(500)]
@@ -39,38 +37,38 @@ def test_where_nothing_is_drawn_the_link_is_as_it_is() -> None:
     assert radio.lost == wired.lost > 50
 
 
-def test_reception_adds_its_delay() -> None:
+def test_reception_adds_its_delay():
     assert Place(Quality(extra_delay_s=0.05)).link(delay_s=0.1, rate_bps=8e6).carry(
         1.0, 1000
     ) == pytest.approx(1.151)
 
 
-def test_the_slower_of_air_and_link_gives_the_rate() -> None:
+def test_the_slower_of_air_and_link_gives_the_rate():
     slow = Place(Quality(rate_bps=8e3)).link(rate_bps=8e6)
     assert [slow.carry(0.0, 500) for _ in range(3)] == pytest.approx([0.5, 1.0, 1.5])
     fast = Place(Quality(rate_bps=8e9)).link(rate_bps=8e3)
     assert fast.carry(0.0, 500) == pytest.approx(0.5)
 
 
-def test_losses_of_the_air_come_on_top() -> None:
+def test_losses_of_the_air_come_on_top():
     link = Place(Quality(loss=0.5)).link(loss=0.2)
     arrived = sum(link.carry(n * 0.01, 100) is not None for n in range(4000))
     assert arrived / 4000 == pytest.approx(0.4, abs=0.03)
 
 
-def test_where_there_is_no_reception_nothing_arrives() -> None:
+def test_where_there_is_no_reception_nothing_arrives():
     link = Place(Quality(loss=1.0)).link()
     assert {link.carry(n * 0.01, 100) for n in range(200)} == {None}
 
 
-def test_a_full_queue_before_the_air_drops() -> None:
+def test_a_full_queue_before_the_air_drops():
     link = Place(Quality(rate_bps=8e3)).link(queue_bytes=3000)
     fates = [link.carry(0.0, 1000) for _ in range(5)]
     assert [fate is None for fate in fates] == [False, False, False, True, True]
     assert (link.offered, link.dropped) == (5, 2)
 
 
-def test_packets_keep_their_order_when_reception_gets_better() -> None:
+def test_packets_keep_their_order_when_reception_gets_better():
     place = Place(Quality(extra_delay_s=1.0, rate_bps=8e3))
     link = place.link(delay_s=0.1)
     first = link.carry(0.0, 100)
@@ -81,7 +79,7 @@ def test_packets_keep_their_order_when_reception_gets_better() -> None:
     assert second >= first > 1.0
 
 
-def test_packets_overtake_in_the_air_too_where_the_link_may_reorder_them() -> None:
+def test_packets_overtake_in_the_air_too_where_the_link_may_reorder_them():
     law = {"law": "gamma", "sd_s": 0.05}
     for reorder in (False, True):
         link = Place(Quality()).link(delay_s=0.1, delay_law=law, reorder=reorder)
@@ -89,7 +87,7 @@ def test_packets_overtake_in_the_air_too_where_the_link_may_reorder_them() -> No
         assert (arrivals == sorted(arrivals)) is not reorder
 
 
-def test_a_slow_air_leaves_the_law_of_the_delay_as_it_is() -> None:
+def test_a_slow_air_leaves_the_law_of_the_delay_as_it_is():
     law, n = {"law": "normal", "sd_s": 0.02}, 4000
     link = Place(Quality(rate_bps=1e6)).link(delay_s=0.1, delay_law=law, reorder=True)
     times = np.arange(n) / 100
@@ -98,7 +96,7 @@ def test_a_slow_air_leaves_the_law_of_the_delay_as_it_is() -> None:
     assert delays.std() == pytest.approx(0.02, abs=4 * 0.02 / (2 * n) ** 0.5)
 
 
-def test_what_was_sent_without_reception_arrives_when_there_is_some_again() -> None:
+def test_what_was_sent_without_reception_arrives_when_there_is_some_again():
     place, clock = Place(Quality(loss=1.0)), Clock()
     got: list[tuple[str, float]] = []
     back = Place().link(delay_s=0.01)

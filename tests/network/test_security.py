@@ -1,7 +1,5 @@
 """Keys on real sockets: who comes together, who does not, and what both ends say."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import socket as tcp

@@ -1,7 +1,5 @@
 """What a scenario sets on ZeroMQ sockets is set on real ones; what cannot be is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

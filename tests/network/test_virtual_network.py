@@ -1,7 +1,5 @@
 """The patterns on the virtual network at both depths: what is alike, what only segments show."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any, Literal
 

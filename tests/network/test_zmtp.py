@@ -1,7 +1,5 @@
 """ZeroMQ on top of TCP: when it is open, what waits where, what a full pipe does, what is lost."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
@@ -55,17 +53,17 @@ class Pair:
         self.clock.run(self.clock.now + seconds)
 
 
-def test_a_frame_has_two_bytes_more_up_to_255_bytes_and_nine_beyond() -> None:
+def test_a_frame_has_two_bytes_more_up_to_255_bytes_and_nine_beyond():
     assert [framed(size) for size in (0, 255, 256, 400)] == [2, 257, 265, 409]
 
 
-def test_the_opener_is_ready_after_three_round_trips_and_the_peer_half_a_one_later() -> None:
+def test_the_opener_is_ready_after_three_round_trips_and_the_peer_half_a_one_later():
     pair = Pair(delay_s=0.1, rate_bps=1e9)
     pair.open()
     assert pair.ready == [pytest.approx(0.6, abs=1e-3), pytest.approx(0.7, abs=1e-3)]
 
 
-def test_what_is_sent_before_the_handshake_leaves_when_it_is_over() -> None:
+def test_what_is_sent_before_the_handshake_leaves_when_it_is_over():
     pair = Pair(delay_s=0.1, rate_bps=1e9)
     assert pair.send("early") == [True]
     pair.open()
@@ -73,7 +71,7 @@ def test_what_is_sent_before_the_handshake_leaves_when_it_is_over() -> None:
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_everything_arrives_once_and_in_order(loss: float) -> None:
+def test_everything_arrives_once_and_in_order(loss):
     pair = Pair(delay_s=0.02, jitter_s=0.01, loss=loss)
     pair.open(20.0)
     for number in range(300):
@@ -82,7 +80,7 @@ def test_everything_arrives_once_and_in_order(loss: float) -> None:
     assert pair.at_peer == list(range(300))
 
 
-def test_a_message_longer_than_a_batch_arrives_whole_and_before_the_next() -> None:
+def test_a_message_longer_than_a_batch_arrives_whole_and_before_the_next():
     pair = Pair(delay_s=0.01)
     pair.open()
     pair.connection.opener.send("long", 5 * BATCH + 17)
@@ -92,7 +90,7 @@ def test_a_message_longer_than_a_batch_arrives_whole_and_before_the_next() -> No
     assert pair.times["long"] <= pair.times["short"]
 
 
-def test_a_pipe_at_its_mark_refuses_and_takes_again_when_half_of_it_has_left() -> None:
+def test_a_pipe_at_its_mark_refuses_and_takes_again_when_half_of_it_has_left():
     """10 wait in the pipe, one in the encoder, and a few in TCP's buffer of 4 KiB, doubled."""
     pair = Pair(ZmtpOptions(mark=10, tcp=SMALL_BUFFER), delay_s=0.1, rate_bps=20_000)
     pair.open()
@@ -107,7 +105,7 @@ def test_a_pipe_at_its_mark_refuses_and_takes_again_when_half_of_it_has_left() -
     assert len(room) == 1
 
 
-def test_what_conflates_sends_the_newest_of_what_waited() -> None:
+def test_what_conflates_sends_the_newest_of_what_waited():
     pair = Pair(ZmtpOptions(conflate=True, tcp=SMALL_BUFFER), delay_s=0.1, rate_bps=20_000)
     pair.open()
     assert all(pair.send(*range(100)))
@@ -117,7 +115,7 @@ def test_what_conflates_sends_the_newest_of_what_waited() -> None:
     assert len(pair.at_peer) < 60
 
 
-def test_on_a_slow_link_the_kernels_buffer_makes_commands_old_and_a_small_one_does_not() -> None:
+def test_on_a_slow_link_the_kernels_buffer_makes_commands_old_and_a_small_one_does_not():
     """20 commands a second of 461 bytes want 74 kbit/s; the link has 32."""
     ages = {}
     for name, tcp in {"tuned": TcpOptions(), "4 KiB": SMALL_BUFFER}.items():
@@ -135,7 +133,7 @@ def test_on_a_slow_link_the_kernels_buffer_makes_commands_old_and_a_small_one_do
 # --- a receiver that does not take ---------------------------------------------------------
 
 
-def test_a_receiver_that_pauses_gets_everything_later_in_order() -> None:
+def test_a_receiver_that_pauses_gets_everything_later_in_order():
     pair = Pair(delay_s=0.01)
     pair.open()
     pair.connection.peer.pause()
@@ -147,7 +145,7 @@ def test_a_receiver_that_pauses_gets_everything_later_in_order() -> None:
     assert pair.at_peer == list(range(100))
 
 
-def test_a_receiver_that_takes_nothing_fills_its_pipe_the_window_and_the_senders_pipe() -> None:
+def test_a_receiver_that_takes_nothing_fills_its_pipe_the_window_and_the_senders_pipe():
     small = TcpOptions(send_buffer=4096, receive_buffer=4096)
     pair = Pair(ZmtpOptions(mark=10, tcp=small), ZmtpOptions(tcp=small), delay_s=0.01)
     pipe = ReceivePipe[int](10)
@@ -170,7 +168,7 @@ def test_a_receiver_that_takes_nothing_fills_its_pipe_the_window_and_the_senders
 # --- the end -------------------------------------------------------------------------------
 
 
-def test_what_tcp_has_when_a_socket_is_closed_still_arrives_and_its_answer_does_not() -> None:
+def test_what_tcp_has_when_a_socket_is_closed_still_arrives_and_its_answer_does_not():
     pair = Pair(delay_s=0.1)
     pair.open()
     pair.send("request")
@@ -181,7 +179,7 @@ def test_what_tcp_has_when_a_socket_is_closed_still_arrives_and_its_answer_does_
     assert pair.at_opener == []
 
 
-def test_a_request_whose_packet_was_lost_arrives_although_its_socket_was_closed() -> None:
+def test_a_request_whose_packet_was_lost_arrives_although_its_socket_was_closed():
     """TCP goes on behind a closed socket: so commands are executed more than once."""
     late = 0
     for seed in range(40):
@@ -196,7 +194,7 @@ def test_a_request_whose_packet_was_lost_arrives_although_its_socket_was_closed(
     assert late >= 5
 
 
-def test_a_socket_that_is_closed_in_the_handshake_sends_nothing() -> None:
+def test_a_socket_that_is_closed_in_the_handshake_sends_nothing():
     pair = Pair(delay_s=0.1)
     pair.send("request")
     pair.open(0.55)
@@ -206,7 +204,7 @@ def test_a_socket_that_is_closed_in_the_handshake_sends_nothing() -> None:
     assert pair.send("more") == [False]
 
 
-def test_who_is_left_hears_of_it_half_a_round_trip_later() -> None:
+def test_who_is_left_hears_of_it_half_a_round_trip_later():
     pair = Pair(delay_s=0.1)
     pair.open()
     ended: list[float] = []
@@ -216,7 +214,7 @@ def test_who_is_left_hears_of_it_half_a_round_trip_later() -> None:
     assert ended == [pytest.approx(5.1, abs=1e-3)]
 
 
-def test_nothing_is_delivered_after_a_connection_broke() -> None:
+def test_nothing_is_delivered_after_a_connection_broke():
     pair = Pair(delay_s=0.1)
     pair.open()
     pair.send("under way")
@@ -226,7 +224,7 @@ def test_nothing_is_delivered_after_a_connection_broke() -> None:
     assert pair.at_peer == pair.at_opener == []
 
 
-def test_a_small_buffer_is_filled_and_drained_in_the_rhythm_of_real_sockets() -> None:
+def test_a_small_buffer_is_filled_and_drained_in_the_rhythm_of_real_sockets():
     """Fifty a second into 64 kbit/s. Seen on sockets: seven fill the buffer; then nothing is
     written until four are left; of what comes then four or five in a row find room."""
     conflated = ZmtpOptions(conflate=True, tcp=SMALL_BUFFER)

@@ -1,7 +1,5 @@
 """Replies that were given are kept for who asks again, and no more of them than fit."""
 
-from __future__ import annotations
-
 import pytest
 
 from dva_sim.protocol.exchange import ReplyCache, key_of
@@ -13,7 +11,7 @@ def kept(cache: ReplyCache) -> list[int]:
     return [number for number, key in enumerate(KEYS) if cache.get(key) is not None]
 
 
-def test_the_last_64_replies_to_a_source_are_kept() -> None:
+def test_the_last_64_replies_to_a_source_are_kept():
     cache = ReplyCache()
     for key in KEYS:
         cache.put(key, "a", b"reply")
@@ -21,7 +19,7 @@ def test_the_last_64_replies_to_a_source_are_kept() -> None:
 
 
 @pytest.mark.invariant("S10")
-def test_of_long_replies_fewer_are_kept_and_the_last_always() -> None:
+def test_of_long_replies_fewer_are_kept_and_the_last_always():
     cache = ReplyCache(room=1000)
     for key in KEYS[:5]:
         cache.put(key, "a", bytes(300))
@@ -33,7 +31,7 @@ def test_of_long_replies_fewer_are_kept_and_the_last_always() -> None:
 
 
 @pytest.mark.invariant("S10")
-def test_who_has_asked_longest_ago_is_forgotten_first() -> None:
+def test_who_has_asked_longest_ago_is_forgotten_first():
     cache = ReplyCache(sources=2, room=1000)
     for key, source in zip(KEYS, "abac", strict=False):
         cache.put(key, source, bytes(400))

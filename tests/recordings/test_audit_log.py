@@ -1,13 +1,10 @@
 """The audit log: rows in a chain, what is done to it by hand, and disks that are full."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -59,7 +56,7 @@ def by_hand(path: Path, *commands: str) -> None:
             file.execute(command)
 
 
-def test_a_log_that_nobody_touched_holds_and_tells_its_last_hash(log: Path) -> None:
+def test_a_log_that_nobody_touched_holds_and_tells_its_last_hash(log):
     found, rows = verify(log), read_rows(log)
 
     assert (found.rows, found.problem, found.is_ended, found.doubts) == (5, None, True, ())
@@ -97,9 +94,7 @@ PLANTED: dict[str, tuple[tuple[str, ...], int, str]] = {
 
 
 @pytest.mark.parametrize("fault", PLANTED)
-def test_what_was_done_by_hand_is_found_at_the_first_row_that_is_wrong(
-    log: Path, fault: str
-) -> None:
+def test_what_was_done_by_hand_is_found_at_the_first_row_that_is_wrong(log, fault):
     commands, number, words = PLANTED[fault]
     by_hand(log, *commands)
 
@@ -110,7 +105,7 @@ def test_what_was_done_by_hand_is_found_at_the_first_row_that_is_wrong(
         AuditLog(log)
 
 
-def test_a_row_put_in_whose_hash_is_right_does_not_follow_the_one_before(log: Path) -> None:
+def test_a_row_put_in_whose_hash_is_right_does_not_follow_the_one_before(log):
     forged = row_of(entry("assign", author="eve"), 3, NOTHING_BEFORE)
     by_hand(log, "DELETE FROM audit WHERE number=3")
     with closing(sqlite3.connect(log, isolation_level=None)) as file:
@@ -125,9 +120,7 @@ def test_a_row_put_in_whose_hash_is_right_does_not_follow_the_one_before(log: Pa
     assert (problem.number, "does not follow row 2" in problem.text) == (3, True)
 
 
-def test_an_end_that_was_cut_with_its_count_leaves_a_doubt_and_another_last_hash(
-    log: Path,
-) -> None:
+def test_an_end_that_was_cut_with_its_count_leaves_a_doubt_and_another_last_hash(log):
     before = verify(log)
     by_hand(log, "DELETE FROM audit WHERE number>3", "UPDATE sqlite_sequence SET seq=3")
 
@@ -140,9 +133,7 @@ def test_an_end_that_was_cut_with_its_count_leaves_a_doubt_and_another_last_hash
 
 
 @pytest.mark.parametrize("command", ["UPDATE audit SET author='bob'", "DELETE FROM audit"])
-def test_its_guards_refuse_a_change_that_does_not_remove_them_first(
-    log: Path, command: str
-) -> None:
+def test_its_guards_refuse_a_change_that_does_not_remove_them_first(log, command):
     with (
         closing(sqlite3.connect(log, isolation_level=None)) as file,
         pytest.raises(sqlite3.IntegrityError, match="only grows"),
@@ -150,7 +141,7 @@ def test_its_guards_refuse_a_change_that_does_not_remove_them_first(
         file.execute(command)
 
 
-def test_a_log_is_gone_on_with_by_the_next_console(log: Path) -> None:
+def test_a_log_is_gone_on_with_by_the_next_console(log):
     again = AuditLog(log)
     (row,) = again.append([entry(BEGIN)])
     again.close()
@@ -160,7 +151,7 @@ def test_a_log_is_gone_on_with_by_the_next_console(log: Path) -> None:
     assert not verify(log).is_ended
 
 
-def test_two_consoles_may_write_one_log(tmp_path: Path) -> None:
+def test_two_consoles_may_write_one_log(tmp_path):
     path = tmp_path / "audit.sqlite"
     one, other = AuditLog(path), AuditLog(path)
     for number in range(6):
@@ -172,9 +163,7 @@ def test_two_consoles_may_write_one_log(tmp_path: Path) -> None:
     assert [row.action for row in read_rows(path)] == [f"step {number}" for number in range(6)]
 
 
-def test_of_rows_for_which_there_is_no_room_none_is_written_and_later_all_are(
-    tmp_path: Path,
-) -> None:
+def test_of_rows_for_which_there_is_no_room_none_is_written_and_later_all_are(tmp_path):
     log = AuditLog(tmp_path / "audit.sqlite")
     log.append([entry("before")])
     log._file.execute("PRAGMA max_page_count = 12")  # as of a disk that is full
@@ -200,7 +189,7 @@ for number in range(100_000):
 """
 
 
-def test_a_process_that_is_killed_has_written_all_that_it_said_was_done(tmp_path: Path) -> None:
+def test_a_process_that_is_killed_has_written_all_that_it_said_was_done(tmp_path):
     path = tmp_path / "audit.sqlite"
     with subprocess.Popen([sys.executable, "-c", _WRITER, path], stdout=subprocess.PIPE) as writer:
         assert writer.stdout is not None
@@ -214,7 +203,7 @@ def test_a_process_that_is_killed_has_written_all_that_it_said_was_done(tmp_path
     assert found.rows >= said
 
 
-def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log: Path) -> None:
+def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log):
     plain = [plain_row(row) for row in read_rows(log)]
     assert verify_plain(plain[2:]).problem is None
     assert verify_plain(plain[2:]).head == plain[-1]["hash"]
@@ -232,7 +221,7 @@ def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log
         assert (problem.number, words in problem.text) == (number, True)
 
 
-def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path: Path) -> None:
+def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path):
     path = tmp_path / "audit.sqlite"
     path.write_text("not a log, but somebody's notes")
 
@@ -242,9 +231,7 @@ def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [Path.touch, lambda path: None])
-def test_a_file_that_is_empty_or_not_there_becomes_a_log(
-    tmp_path: Path, make: Callable[[Path], object]
-) -> None:
+def test_a_file_that_is_empty_or_not_there_becomes_a_log(tmp_path, make):
     path = tmp_path / "audit.sqlite"
     make(path)
     AuditLog(path).close()
@@ -258,9 +245,7 @@ TEXTS = st.text(st.characters(), max_size=40)
 
 @settings(max_examples=25, deadline=None)
 @given(author=TEXTS, text=TEXTS, details=st.dictionaries(TEXTS, st.integers() | TEXTS))
-def test_whatever_is_said_stands_there_as_it_was_said(
-    tmp_path_factory: pytest.TempPathFactory, author: str, text: str, details: dict[str, Any]
-) -> None:
+def test_whatever_is_said_stands_there_as_it_was_said(tmp_path_factory, author, text, details):
     path = tmp_path_factory.mktemp("logs") / "audit.sqlite"
     log = AuditLog(path)
     (row,) = log.append([entry(author=author, text=text, details=details)])

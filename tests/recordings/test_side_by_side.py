@@ -22,7 +22,7 @@ def told(pictures: Wanted | None = None, patterns: str = "req-rep,latest-wins") 
     return said.getvalue()
 
 
-def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_each_other() -> None:
+def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_each_other():
     said = told()
     assert said.count("robot-1 to event 1") == 2
     headings = ("req-rep, 100 ms each way", "latest-wins, 100 ms each way", "side by side")
@@ -33,7 +33,7 @@ def test_without_any_picture_both_stories_are_told_and_how_they_ended_beside_eac
     assert all("not confirmed within 12 s" in end for _, _, end in ends)
 
 
-def test_a_still_and_a_strip_show_both(tmp_path: Path) -> None:
+def test_a_still_and_a_strip_show_both(tmp_path):
     said = told(Wanted(still=tmp_path / "one.png", strip=tmp_path / "more.png", panels=2))
     assert "Still: " in said
     assert "Strip: " in said
@@ -42,11 +42,11 @@ def test_a_still_and_a_strip_show_both(tmp_path: Path) -> None:
         assert more.height > 1.5 * one.height  # a row for each moment
 
 
-def test_a_camera_is_one_of_one_run() -> None:
+def test_a_camera_is_one_of_one_run():
     eye = Wanted(still=Path("eye.png"), camera="robot-1")
     with pytest.raises(ConfigError, match=r"--camera .*--side-by-side"):
         told(eye)
 
 
-def test_the_same_pattern_may_stand_on_both_sides() -> None:
+def test_the_same_pattern_may_stand_on_both_sides():
     assert told(patterns="pub-sub,pub-sub").count("plain PUB/SUB") == 2

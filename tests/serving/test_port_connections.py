@@ -1,7 +1,5 @@
 """Which connection makes room for which: those without a token first, a higher role before all."""
 
-from __future__ import annotations
-
 from dva_sim.serving.port_connections import IDLE, SILENT, PortConnections
 
 NOBODY, LOOK, DRIVE, SUPERVISE = 0, 1, 3, 5  # ranks

@@ -84,7 +84,7 @@ def test_briefly_told_levels_leave_out_what_goes_without_saying(levels, text):
     assert brief(levels).replace("\N{NO-BREAK SPACE}", " ") == text
 
 
-def test_a_law_that_a_treatment_sets_is_told_key_by_key() -> None:
+def test_a_law_that_a_treatment_sets_is_told_key_by_key():
     law = {"law": "gamma", "mean_s": 0.05, "cv": 0.5}
     assert (
         level_name("robot.processing_s", law) == "law gamma, mean_s 50\N{NO-BREAK SPACE}ms, cv 0.5"

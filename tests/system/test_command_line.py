@@ -1,7 +1,5 @@
 """The program as users call it: its words, its files, its exit codes; once as a real process."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -63,7 +61,7 @@ HEAVY |= {"rich", "distributed", "dask", "multiprocessing", "pydantic", "dva_sim
 HEAVY |= {"dva_sim.simulation", "dva_sim.experiments", "dva_sim.core"}
 
 
-def test_help_and_lists_import_nothing_heavy() -> None:
+def test_help_and_lists_import_nothing_heavy():
     program = (
         "import sys\n"
         "from dva_sim.cli import app\n"
@@ -80,7 +78,7 @@ def test_help_and_lists_import_nothing_heavy() -> None:
     assert modules & HEAVY == set()
 
 
-def test_a_study_gives_the_same_bytes_with_any_number_of_processes(ran: Path) -> None:
+def test_a_study_gives_the_same_bytes_with_any_number_of_processes(ran):
     assert run(ran, jobs="2").returncode == 0
     one, two = bytes_of(ran / "1"), bytes_of(ran / "2")
     tables = {"runs", "events", "operators", "people", "tracks"}
@@ -88,28 +86,28 @@ def test_a_study_gives_the_same_bytes_with_any_number_of_processes(ran: Path) ->
     assert one == two
 
 
-def test_a_study_that_was_changed_on_the_command_line_is_called_exploratory(ran: Path) -> None:
+def test_a_study_that_was_changed_on_the_command_line_is_called_exploratory(ran):
     files = bytes_of(ran / "1")
     assert json.loads(files["manifest.json"])["set"] == ["persons=2"]
     assert b"exploratory" in files["report.html"]
     assert b"<script src" not in files["report.html"]
 
 
-def test_the_report_made_again_by_its_command_has_the_same_bytes(ran: Path) -> None:
+def test_the_report_made_again_by_its_command_has_the_same_bytes(ran):
     before = bytes_of(ran / "1")
     with blank_pictures():
         assert call("report", "1", cwd=ran).returncode == 0
     assert bytes_of(ran / "1") == before
 
 
-def test_another_study_is_not_written_into_the_same_folder(ran: Path) -> None:
+def test_another_study_is_not_written_into_the_same_folder(ran):
     other = run(ran, "1", "--seed", "5")
     assert other.returncode == 2
     assert "holds another study" in other.stderr
 
 
 @pytest.mark.system
-def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
+def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_path):
     """All others call it within this process: see `command_line`."""
     words = [sys.executable, "-m", "dva_sim.cli", "run", "req-rep-vs-pubsub"]
     ended = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, check=False)
@@ -137,9 +135,7 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
         (["episode", "inside.yaml"], "inside.yaml:2:1: unknown key 'robots'"),
     ],
 )
-def test_a_mistake_ends_in_one_line_and_exit_code_2(
-    tmp_path: Path, words: list[str], said: str
-) -> None:
+def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path, words, said):
     (tmp_path / "bad.yaml").write_text(
         "question: what?\nparts:\n  drive:\n    scenario: drive-to-event\n    refrence: {}\n"
     )
@@ -153,7 +149,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(
     assert "Traceback" not in ended.stderr + ended.stdout
 
 
-def test_an_episode_tells_its_story_and_shows_it(tmp_path: Path) -> None:
+def test_an_episode_tells_its_story_and_shows_it(tmp_path):
     from PIL import Image
 
     told = call(
@@ -168,14 +164,14 @@ def test_an_episode_tells_its_story_and_shows_it(tmp_path: Path) -> None:
         assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 100
 
 
-def test_everything_that_can_be_named_is_listed(tmp_path: Path) -> None:
+def test_everything_that_can_be_named_is_listed(tmp_path):
     listed = call("list", cwd=tmp_path).stdout
     shipped = ("req-rep-vs-pub-sub", "fire-drill", "caparica", "dissertation", "servrobot")
     plugins = ("min_eta", "pursuit", "oracle", "median20-copy", "latest-wins")
     assert unnamed(listed, *shipped, *plugins) == []
 
 
-def test_a_map_and_a_cellular_trace_of_ones_own_carry_a_whole_study(tmp_path: Path) -> None:
+def test_a_map_and_a_cellular_trace_of_ones_own_carry_a_whole_study(tmp_path):
     (tmp_path / "quicker.yaml").write_text(STUDY)
     ways = [f"link.trace_{way}={TRACES / 'cellular'}.{way}" for way in ("up", "down")]
     settings = (f"site.map={MAPS / 'hall.yaml'}", "factors.link.delay_s=[0]", "horizon_s=12", *ways)

@@ -1,7 +1,5 @@
 """What the pages show as code does what they say."""
 
-from pathlib import Path
-
 from helpers.paths import ROOT
 
 from dva_sim.agents.operator.strategies import load_strategy
@@ -11,7 +9,7 @@ from dva_sim.testing.promises import tried
 PAGES = ROOT
 
 
-def test_the_operator_on_the_page_of_agents_keeps_its_promises(tmp_path: Path) -> None:
+def test_the_operator_on_the_page_of_agents_keeps_its_promises(tmp_path):
     page = (PAGES / "agents/README.md").read_text(encoding="utf-8")
     blocks = [part.partition("```")[0] for part in page.split("```python\n")[1:]]
     (code,) = [block for block in blocks if "class Cautious" in block]

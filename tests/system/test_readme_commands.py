@@ -1,7 +1,5 @@
 """Every command on the first page works, and one sees what the page says one sees."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re
@@ -415,14 +413,14 @@ EXPECTED = {
 # --- and whether one does ------------------------------------------------------------------
 
 
-def test_it_is_said_of_every_command_what_one_should_see_and_of_no_other() -> None:
+def test_it_is_said_of_every_command_what_one_should_see_and_of_no_other():
     missing, gone = set(commands()) - set(EXPECTED), set(EXPECTED) - set(commands())
     assert not missing, f"say in EXPECTED what one should see of {sorted(missing)}"
     assert not gone, f"no longer on the page: {sorted(gone)}"
 
 
 @pytest.mark.parametrize("command", [c for c in commands() if c.startswith("dva-sim ")])
-def test_every_command_is_one_that_the_program_knows(command: str) -> None:
+def test_every_command_is_one_that_the_program_knows(command):
     group, rest = typer.main.get_command(app), words_of(command)
     while hasattr(group, "resolve_command"):
         context = group.context_class(group)
@@ -431,7 +429,7 @@ def test_every_command_is_one_that_the_program_knows(command: str) -> None:
 
 
 @pytest.mark.parametrize("target", [c.split()[1] for c in commands() if c.startswith("make ")])
-def test_every_target_is_one_that_make_knows(target: str) -> None:
+def test_every_target_is_one_that_make_knows(target):
     tried = subprocess.run(["make", "-n", target], cwd=HOME, capture_output=True, check=False)
     assert tried.returncode == 0
 
@@ -444,9 +442,7 @@ RUNNABLE = [
 
 
 @pytest.mark.parametrize("command", RUNNABLE)
-def test_one_sees_what_the_page_says(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_sees_what_the_page_says(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.setattr(dry_run, "PROBE_S", 0.0)  # a few runs suffice to plan by
@@ -461,7 +457,7 @@ def test_one_sees_what_the_page_says(
     expected.look(Seen(ended.output, ended.exit_code))
 
 
-def test_what_the_page_writes_in_python_can_be_called_so() -> None:
+def test_what_the_page_writes_in_python_can_be_called_so():
     (code,) = blocks("python")
     calls = [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Call)]
     ours = [c for c in calls if isinstance(c.func, ast.Attribute) and _is_ours(c.func.value)]
@@ -476,7 +472,7 @@ def _is_ours(value: ast.expr) -> bool:
     return isinstance(value, ast.Name) and value.id == "dva_sim"
 
 
-def test_the_last_line_in_python_says_how_long_the_drive_took() -> None:
+def test_the_last_line_in_python_says_how_long_the_drive_took():
     (code,) = blocks("python")
     line = code.strip().splitlines()[-1]
     time = eval(line, {"dva_sim": dva_sim})

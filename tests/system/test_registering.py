@@ -1,7 +1,5 @@
 """From a new study to a confirmed hypothesis, as users call it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -32,7 +30,7 @@ def status_of(folder: Path) -> dict[str, object]:
     return found
 
 
-def test_a_study_is_registered_run_and_told_apart_from_what_was_only_tried(tmp_path: Path) -> None:
+def test_a_study_is_registered_run_and_told_apart_from_what_was_only_tried(tmp_path):
     study = tmp_path / "mine.yaml"
     study.write_text(STUDY)
     done = call("register", "mine.yaml", cwd=tmp_path)

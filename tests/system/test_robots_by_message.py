@@ -1,7 +1,5 @@
 """Robots on the network: what they do when they are told to, by messages alone."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter
@@ -61,7 +59,7 @@ def place(run: Run, x: float, y: float) -> m.Position:
     return m.Position(*run.stage.site.frame.to_latlon(x, y))
 
 
-def test_a_robot_drives_a_mission_by_itself_and_is_idle_again() -> None:
+def test_a_robot_drives_a_mission_by_itself_and_is_idle_again():
     run = staged()
     robot = run.field.robots[ROBOT]
     start = robot.body.pose()
@@ -78,7 +76,7 @@ def test_a_robot_drives_a_mission_by_itself_and_is_idle_again() -> None:
     assert run.recorder.violations == {}
 
 
-def test_an_emergency_stops_a_moving_robot_within_its_braking_distance() -> None:
+def test_an_emergency_stops_a_moving_robot_within_its_braking_distance():
     run = staged()
     robot = run.field.robots[ROBOT]
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
@@ -97,7 +95,7 @@ def test_an_emergency_stops_a_moving_robot_within_its_braking_distance() -> None
     assert run.recorder.violations == {}
 
 
-def test_two_robots_that_meet_head_on_get_past_each_other_without_touching() -> None:
+def test_two_robots_that_meet_head_on_get_past_each_other_without_touching():
     run = staged(**{"robot.count": 2, "operator.count": 2})
     one, two = (run.field.robots[id_of("robot", n)] for n in (1, 2))
     ways = ((ROBOT, (14.5, 7.4)), (id_of("robot", 2), (9.5, 7.4)))
@@ -120,7 +118,7 @@ def test_two_robots_that_meet_head_on_get_past_each_other_without_touching() -> 
         assert math.dist(robot.body.pose()[:2], goal) < 0.5
 
 
-def test_bad_bytes_are_answered_and_change_nothing() -> None:
+def test_bad_bytes_are_answered_and_change_nothing():
     run = staged()
     answers: list[bytes] = []
     handler = run.network.service(ROBOT)
@@ -134,7 +132,7 @@ def test_bad_bytes_are_answered_and_change_nothing() -> None:
     assert run.field.robots[ROBOT].controller.mode == "Idle"
 
 
-def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted() -> None:
+def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted():
     run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Chemistry lab"}])
     values: list[m.SensorValue] = []
 
@@ -159,7 +157,7 @@ def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted() -> 
     assert ticks == sorted(ticks)
 
 
-def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone() -> None:
+def test_a_new_mission_right_after_an_emergency_is_driven_by_one_loop_alone():
     run = staged(**{"robot.processing_s": 0.0})
     robot = run.field.robots[ROBOT]
     obeyed: list[float] = []
@@ -181,7 +179,7 @@ def rules_broken(run: Run, robot: RobotAgent) -> list[str]:
     return [rule for rule, _ in broken_by_moving(witness, motion_of(robot), limits, run.clock.now)]
 
 
-def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_does() -> None:
+def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_does():
     """It slides until its own brakes have stopped it; after that nothing excuses a motion."""
     run = staged(**{"robot.count": 2, "operator.count": 2})
     pushed = run.field.robots[ROBOT]
@@ -194,7 +192,7 @@ def test_a_robot_that_another_has_pushed_breaks_no_rule_but_one_that_drives_on_d
     assert rules_broken(run, pushed) == ["S1"]
 
 
-def test_a_robot_that_drives_backwards_by_itself_breaks_a_rule() -> None:
+def test_a_robot_that_drives_backwards_by_itself_breaks_a_rule():
     run = staged()
     robot = run.field.robots[ROBOT]
     run.clock.run(10.0)
@@ -207,7 +205,7 @@ def test_a_robot_that_drives_backwards_by_itself_breaks_a_rule() -> None:
     assert rules_broken(run, robot) == []
 
 
-def test_a_published_command_to_another_robot_is_counted_and_not_obeyed() -> None:
+def test_a_published_command_to_another_robot_is_counted_and_not_obeyed():
     run = staged()
     robot = run.field.robots[ROBOT]
     other = m.Message(id_of("robot", 2), 1, DVA, "12:00:00", 5, m.SetTeleOp(0.5, 0.0))
@@ -230,7 +228,7 @@ def told_of_mission(run: Run) -> list[m.MissionStatus]:
     return told
 
 
-def test_a_patrol_is_cancelled_and_the_robot_goes_home() -> None:
+def test_a_patrol_is_cancelled_and_the_robot_goes_home():
     run = staged()
     robot = run.field.robots[ROBOT]
     base = robot.body.pose()
@@ -262,7 +260,7 @@ def test_a_patrol_is_cancelled_and_the_robot_goes_home() -> None:
     assert run.recorder.violations == {}
 
 
-def test_an_emergency_during_a_patrol_ends_it_and_says_so() -> None:
+def test_an_emergency_during_a_patrol_ends_it_and_says_so():
     run = staged()
     told = told_of_mission(run)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
@@ -277,7 +275,7 @@ def test_an_emergency_during_a_patrol_ends_it_and_says_so() -> None:
     assert robot.body.distance == before
 
 
-def test_a_robot_inspects_an_event_and_waits_before_it() -> None:
+def test_a_robot_inspects_an_event_and_waits_before_it():
     nobody_drives = [{"levels": ["sensors"]}]
     run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Workshop"}], access=nobody_drives)
     robot = run.field.robots[ROBOT]
@@ -292,7 +290,7 @@ def test_a_robot_inspects_an_event_and_waits_before_it() -> None:
     assert robot.body.contacts == 0
 
 
-def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay() -> None:
+def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay():
     run = staged(**{"robot.sensors": [{"name": "lidar", "noise": 0.0, "rate_hz": 10}]})
     robot = run.field.robots[ROBOT]
     scans: list[m.SensorValue] = []
@@ -315,7 +313,7 @@ def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay() -> None:
     assert scans[-1].values == tuple(expected.round(3).tolist())
 
 
-def test_a_frame_is_published_when_it_has_been_encoded_one_at_a_time() -> None:
+def test_a_frame_is_published_when_it_has_been_encoded_one_at_a_time():
     """0.25 s for a frame: of ten a second, one in three is taken, and arrives that much later."""
     run = staged(**{"camera.encode_s": 0.25, "camera.rate_hz": 10.0, "link.delay_s": 0.0})
     shown: list[tuple[float, float]] = []
@@ -332,7 +330,7 @@ def test_a_frame_is_published_when_it_has_been_encoded_one_at_a_time() -> None:
 
 
 @pytest.mark.invariant("S11")
-def test_nobody_can_talk_a_robot_to_death() -> None:
+def test_nobody_can_talk_a_robot_to_death():
     """Twenty strangers send rubbish, fifty a second each, while the DVA drives the robot."""
     served: dict[str, list[float]] = {"alone": [], "flooded": []}
     for name, strangers in (("alone", 0), ("flooded", 20)):
@@ -466,7 +464,7 @@ class Driven:
 
 @pytest.mark.invariant("S10")
 @pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub"])
-def test_no_valid_message_of_strangers_keeps_the_holder_waiting(pattern: str) -> None:
+def test_no_valid_message_of_strangers_keeps_the_holder_waiting(pattern):
     """The holder's command waits for one message of others, whatever they send, however many."""
     driven = Driven(pattern)
     for source, body in FLOODS:
@@ -480,7 +478,7 @@ def test_no_valid_message_of_strangers_keeps_the_holder_waiting(pattern: str) ->
     assert not driven.run.recorder.violations
 
 
-def test_what_only_the_holder_may_say_costs_a_robot_that_is_driven_nothing() -> None:
+def test_what_only_the_holder_may_say_costs_a_robot_that_is_driven_nothing():
     driven = Driven("req-rep")
     for body in (*HOLDERS, *DVAS):
         driven.flood(20, "", body)
@@ -489,7 +487,7 @@ def test_what_only_the_holder_may_say_costs_a_robot_that_is_driven_nothing() -> 
 
 
 @pytest.mark.parametrize("body", [body for _, body in FLOODS[:1]] + [m.Emergency()])
-def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body: m.Body) -> None:
+def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body):
     driven = Driven("pub-sub")
     for strangers in STRANGERS:
         cries = [0.1 + 0.1537 * number for number in range(3)]
@@ -506,7 +504,7 @@ def test_no_flood_holds_up_an_emergency_and_none_outlasts_it(body: m.Body) -> No
     assert longest < SERVICE + 1e-3  # of which one service is its own
 
 
-def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy() -> None:
+def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy():
     driven, told = Driven("req-rep"), list[m.Body]()
     service = driven.run.network.service(ROBOT)
     assert service is not None
@@ -526,7 +524,7 @@ def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy() ->
     assert busy + unread + codes[m.OK] == 200
 
 
-def test_a_robot_says_which_sensors_it_has_itself_when_it_is_asked_by_its_id() -> None:
+def test_a_robot_says_which_sensors_it_has_itself_when_it_is_asked_by_its_id():
     run = staged()
     told = send(run, 1.0, m.GetSensorInfo(ROBOT), session=0)
     run.clock.run(2.0)

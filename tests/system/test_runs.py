@@ -1,7 +1,5 @@
 """Whole runs: the same every time, safe at every moment, and true to the closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from typing import Any
@@ -37,17 +35,17 @@ print(rows(run("fire-drill", 5, horizon_s=60, **rough)))
 """
 
 
-def test_the_same_seed_gives_the_same_bytes_in_two_processes() -> None:
+def test_the_same_seed_gives_the_same_bytes_in_two_processes():
     here, elsewhere = told_here_and_elsewhere(PROGRAM)
     assert here == elsewhere
     assert len(here) > 5_000
 
 
-def test_another_seed_gives_another_run() -> None:
+def test_another_seed_gives_another_run():
     assert rows(run(seed=1)) != rows(run(seed=2))
 
 
-def test_adding_a_guard_changes_nobody_elses_luck() -> None:
+def test_adding_a_guard_changes_nobody_elses_luck():
     """The fire is nearer to the robot; the guard's presence must not move the robot a hair."""
     alone = run(events=NEAR, link__loss=0.05, link__delay_s=0.05)
     guarded = run(events=NEAR, link__loss=0.05, link__delay_s=0.05, guard__count=1)
@@ -59,7 +57,7 @@ def test_adding_a_guard_changes_nobody_elses_luck() -> None:
     ("name", "changes"),
     [("drive-to-event", {"link.delay_s": 0.1}), ("evacuation", {"horizon_s": 40})],
 )
-def test_keeping_traffic_for_pictures_changes_nothing(name: str, changes: dict[str, float]) -> None:
+def test_keeping_traffic_for_pictures_changes_nothing(name, changes):
     scenario = scenarios.build(scenarios.load(name), changes)
     plain, filmed = simulate(scenario, 3), simulate(scenario, 3, keep_traffic=True)
     assert str(measures.run_row(plain)) == str(measures.run_row(filmed))
@@ -68,7 +66,7 @@ def test_keeping_traffic_for_pictures_changes_nothing(name: str, changes: dict[s
 
 @pytest.mark.parametrize("pattern", ["req-rep", "pipelined", "pub-sub", "latest-wins"])
 @pytest.mark.parametrize("profile", ["default", "dissertation"])
-def test_no_safety_rule_is_broken_on_a_rough_link(pattern: str, profile: str) -> None:
+def test_no_safety_rule_is_broken_on_a_rough_link(pattern, profile):
     link = {"loss": 0.1, "jitter_s": 0.1, "delay_s": 0.2}
     recording = run(pattern=pattern, phone__profile=profile, link=link, horizon_s=60)
     assert recording.recorder.violations == {}
@@ -76,7 +74,7 @@ def test_no_safety_rule_is_broken_on_a_rough_link(pattern: str, profile: str) ->
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.1, 1.0])
-def test_request_reply_makes_commands_rarer_by_its_closed_form(delay: float) -> None:
+def test_request_reply_makes_commands_rarer_by_its_closed_form(delay):
     """Period = max(wanted period, round trip + processing), whole periods of the phone."""
     drive = run(pattern="req-rep", link__delay_s=delay, horizon_s=60).recorder.drives[0]
     gaps = [b.time - a.time for a, b in itertools.pairwise(drive.applied)]
@@ -86,7 +84,7 @@ def test_request_reply_makes_commands_rarer_by_its_closed_form(delay: float) -> 
 
 
 @pytest.mark.parametrize("delay", [0.0, 1.0])
-def test_a_window_of_requests_makes_commands_as_many_times_as_frequent(delay: float) -> None:
+def test_a_window_of_requests_makes_commands_as_many_times_as_frequent(delay):
     """Rate = min(wanted rate, window / (round trip + processing))."""
     ways = {"command__window": 4, "link__delay_s": delay, "horizon_s": 60}
     drive = run(pattern="pipelined", **ways).recorder.drives[0]
@@ -95,14 +93,14 @@ def test_a_window_of_requests_makes_commands_as_many_times_as_frequent(delay: fl
     assert rate == pytest.approx(min(10.0, 4 / (2 * delay + 0.05)), rel=0.08)
 
 
-def test_publishing_keeps_the_wanted_rate_at_any_delay() -> None:
+def test_publishing_keeps_the_wanted_rate_at_any_delay():
     for delay in (0.0, 1.0):
         drive = run(pattern="pub-sub", link__delay_s=delay, horizon_s=40).recorder.drives[0]
         gaps = [b.time - a.time for a, b in itertools.pairwise(drive.applied)]
         assert sorted(gaps)[len(gaps) // 2] == pytest.approx(0.1, abs=0.002)
 
 
-def test_a_slow_robot_falls_behind_under_plain_publishing_but_not_if_the_latest_wins() -> None:
+def test_a_slow_robot_falls_behind_under_plain_publishing_but_not_if_the_latest_wins():
     """10 commands a second into a robot that needs 0.2 s for each."""
     slow = {"robot__processing_s": 0.2, "horizon_s": 40}
     plain = run(pattern="pub-sub", **slow).recorder.drives[0].applied
@@ -113,7 +111,7 @@ def test_a_slow_robot_falls_behind_under_plain_publishing_but_not_if_the_latest_
     assert ages[4] < ages[9] < ages[14]
 
 
-def test_the_oracle_is_faster_than_any_operator() -> None:
+def test_the_oracle_is_faster_than_any_operator():
     reference = run(
         operator__strategy="oracle",
         phone__profile="ideal",
@@ -125,7 +123,7 @@ def test_the_oracle_is_faster_than_any_operator() -> None:
         assert measures.run_row(run(link__delay_s=delay))["drive_time_s"] > best - 0.5
 
 
-def test_each_stage_of_the_delay_budget_is_what_it_is_made_of() -> None:
+def test_each_stage_of_the_delay_budget_is_what_it_is_made_of():
     row = measures.run_row(run(link__delay_s=0.25))
     stages = {s: row[f"delay_{s}_s"] for s in STAGES}
     assert stages["uplink"] == pytest.approx(0.25, abs=0.002)
@@ -137,9 +135,7 @@ def test_each_stage_of_the_delay_budget_is_what_it_is_made_of() -> None:
 
 
 @pytest.mark.parametrize("delay", [0.0, 1.0])
-def test_the_loop_delay_is_what_operators_come_to_see(
-    delay: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_loop_delay_is_what_operators_come_to_see(delay, monkeypatch):
     """The person's own guess, made from pictures and intents alone, checks the sum of stages.
 
     It comes in tenths of a second, and the lag that fits a response best is a little less than
@@ -158,7 +154,7 @@ def test_the_loop_delay_is_what_operators_come_to_see(
     assert loop - 0.2 < later[len(later) // 2] < loop + 0.1
 
 
-def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay() -> None:
+def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay():
     slow = {"phone__profile": "dissertation", "link__delay_s": 0.5, "horizon_s": 60}
     waited = measures.run_row(run(pattern="req-rep", **slow))["delay_pattern_s"]
     assert 0.05 < waited < 1.05
@@ -166,7 +162,7 @@ def test_waiting_for_the_last_reply_is_told_as_the_patterns_own_delay() -> None:
 
 
 @pytest.mark.invariant("S1")
-def test_a_robot_without_watchdog_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_without_watchdog_is_found_out(monkeypatch):
     """The rules are checked from outside: a controller that trusts too long breaks S1."""
     honest = RobotController._set
 
@@ -181,7 +177,7 @@ def test_a_robot_without_watchdog_is_found_out(monkeypatch: pytest.MonkeyPatch) 
     assert cut_link_run().recorder.violations["S1"] > 0
 
 
-def test_commands_still_under_way_when_a_drive_ends_are_known_to_the_checks() -> None:
+def test_commands_still_under_way_when_a_drive_ends_are_known_to_the_checks():
     """At a second's delay they move the robot once more, lawfully, before the stop arrives."""
     recording = run(link__delay_s=1.0)
     drive = recording.recorder.drives[0]
@@ -190,7 +186,7 @@ def test_commands_still_under_way_when_a_drive_ends_are_known_to_the_checks() ->
     assert recording.recorder.violations == {}
 
 
-def test_a_robot_that_brakes_while_its_next_drive_is_ordered_breaks_no_rule() -> None:
+def test_a_robot_that_brakes_while_its_next_drive_is_ordered_breaks_no_rule():
     recording = run("search-and-confirm", seed=1)
     first, second = recording.recorder.drives[:2]
     assert first.robot == second.robot
@@ -205,9 +201,7 @@ def cut_link_run(pattern: str = "latest-wins", until: float = 65.0, **more: Any)
 
 @pytest.mark.invariant("S8")
 @pytest.mark.parametrize("pattern", ["req-rep", "pub-sub", "latest-wins"])
-def test_when_a_dead_link_comes_back_the_event_is_confirmed_under_any_pattern(
-    pattern: str,
-) -> None:
+def test_when_a_dead_link_comes_back_the_event_is_confirmed_under_any_pattern(pattern):
     recording = cut_link_run(pattern, horizon_s=400)
     row = measures.run_row(recording)
     assert row["confirmed"], recording.recorder.timeline
@@ -216,7 +210,7 @@ def test_when_a_dead_link_comes_back_the_event_is_confirmed_under_any_pattern(
     assert recording.recorder.violations == {}
 
 
-def test_a_link_that_stays_dead_ends_the_drive_and_the_event_goes_to_a_guard() -> None:
+def test_a_link_that_stays_dead_ends_the_drive_and_the_event_goes_to_a_guard():
     recording = cut_link_run(until=1e6, events=NEAR, guard__count=1, horizon_s=600)
     first = recording.recorder.drives[0]
     assert first.started is not None
@@ -225,18 +219,18 @@ def test_a_link_that_stays_dead_ends_the_drive_and_the_event_goes_to_a_guard() -
     assert (event["outcome"], event["responder_kind"]) == ("confirmed", "guard")
 
 
-def test_a_robot_that_could_never_be_driven_counts_with_the_whole_horizon() -> None:
+def test_a_robot_that_could_never_be_driven_counts_with_the_whole_horizon():
     row = measures.run_row(run(link__loss=0.9, horizon_s=60))
     assert (row["confirmed"], row["outcome"], row["drive_time_s"]) == (False, "no drive", 60)
 
 
-def test_two_fires_reported_as_one_event_are_both_accounted_for() -> None:
+def test_two_fires_reported_as_one_event_are_both_accounted_for():
     twins = [{"kind": "fire", "room": "Server room", "reported": True}] * 2
     rows_ = measures.event_rows(run(events=twins, seed=3))
     assert [r["outcome"] for r in rows_] == ["confirmed", "confirmed"]
 
 
-def test_a_story_ends_with_every_event_accounted_for() -> None:
+def test_a_story_ends_with_every_event_accounted_for():
     for seed in range(2):
         recording = run("fire-drill", seed)
         events = measures.event_rows(recording)

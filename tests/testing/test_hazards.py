@@ -1,7 +1,5 @@
 """What every hazard promises: kept by all that are shipped, missed by the bad ones."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What every way of steering promises: kept by those that are shipped, missed by bad ones."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import random

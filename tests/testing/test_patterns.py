@@ -1,7 +1,5 @@
 """What every messaging pattern promises: kept by all that are shipped, missed by the bad ones."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
@@ -24,12 +22,12 @@ GROWS_OLD = {"pub-sub": ("lets commands grow old at a slow robot: 22 s",)}
 
 
 @pytest.mark.parametrize("name", [*known_patterns(), EXAMPLE])
-def test_every_pattern_that_is_shipped_keeps_its_promises(name: str) -> None:
+def test_every_pattern_that_is_shipped_keeps_its_promises(name):
     outcome = tried(check_pattern, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), GROWS_OLD.get(name, ()))
 
 
-def test_the_example_keeps_them_however_often_it_asks() -> None:
+def test_the_example_keeps_them_however_often_it_asks():
     for every in (1, 3, 30):
         check_pattern(load_pattern(EXAMPLE, {"every": every}))
 
@@ -152,7 +150,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize(("kind", "promise"), FAULTS.items())
-def test_a_pattern_that_breaks_a_promise_is_found_out(kind: type[Pattern], promise: str) -> None:
+def test_a_pattern_that_breaks_a_promise_is_found_out(kind, promise):
     broken = tried(check_pattern, kind, slow=60.0).broken
     assert any(told.startswith(promise) for told in broken), broken
 
@@ -165,18 +163,18 @@ class Sleepy(LatestWins):
         super().offer(command)
 
 
-def test_a_slow_pattern_is_a_warning() -> None:
+def test_a_slow_pattern_is_a_warning():
     outcome = tried(check_pattern, Sleepy, slow=1e-6)
     assert outcome.broken == ()
     assert outcome.warnings[-1].startswith("is slow: ")
 
 
-def test_check_pattern_refuses_a_bad_one_in_a_line() -> None:
+def test_check_pattern_refuses_a_bad_one_in_a_line():
     with pytest.raises(BrokenPromises, match=FAULTS[Floods]):
         check_pattern(Floods)
 
 
-def test_the_command_tells_what_is_wrong_with_a_file(tmp_path, capsys) -> None:
+def test_the_command_tells_what_is_wrong_with_a_file(tmp_path, capsys):
     path = tmp_path / "mine.py"
     path.write_text(
         "from dva_sim.network.patterns import PubSub\n\n"

@@ -1,7 +1,5 @@
 """What every filter and mapping promises: kept by all that are shipped, missed by the bad ones."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -22,13 +20,13 @@ STICKS = {
 
 
 @pytest.mark.parametrize("name", [*known_filters(), "faithful.py:Faithful"])
-def test_every_filter_that_is_shipped_keeps_its_promises(name: str) -> None:
+def test_every_filter_that_is_shipped_keeps_its_promises(name):
     outcome = tried(check_filter, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), STICKS.get(name, ()))
 
 
 @pytest.mark.parametrize("name", [*known_mappings(), "cubic.py:Cubic"])
-def test_every_mapping_that_is_shipped_keeps_its_promises(name: str) -> None:
+def test_every_mapping_that_is_shipped_keeps_its_promises(name):
     outcome = tried(check_mapping, name, slow=60.0)
     assert (outcome.broken, outcome.warnings) == ((), ())
 
@@ -95,7 +93,7 @@ Shared = but(
         (but(NoFilter, add=lambda *_: 1 / 0), "raises: ZeroDivisionError: division by zero (test_"),
     ],
 )
-def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told) -> None:
+def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told):
     outcome = tried(check_filter, kind, slow=60.0)
     assert any(line.startswith(told) for line in outcome.broken), outcome.broken
 
@@ -148,7 +146,7 @@ ONE, TWO = AbsoluteMapping, DifferentialMapping
         ),
     ],
 )
-def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told) -> None:
+def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told):
     outcome = tried(check_mapping, kind, slow=60.0)
     assert any(line.startswith(told) for line in outcome.broken), outcome.broken
 

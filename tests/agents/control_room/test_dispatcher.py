@@ -1,7 +1,5 @@
 """A scripted dispatcher in a run: what it does, in which order, by messages anybody can send."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -39,7 +37,7 @@ def of_people(recording: Recording) -> list[Fact]:
     return [fact for fact in recording.facts if fact.role is not None]
 
 
-def test_asked_first_it_acknowledges_after_8_s_and_sends_as_proposed_12_s_later() -> None:
+def test_asked_first_it_acknowledges_after_8_s_and_sends_as_proposed_12_s_later():
     recording = played("ask_first")
     seen, sent = of_people(recording)
     assert (seen.action, sent.action, sent.author) == ("acknowledge", "assign", ROOM)
@@ -50,7 +48,7 @@ def test_asked_first_it_acknowledges_after_8_s_and_sends_as_proposed_12_s_later(
     assert recording.events[0].times["assigned"] == sent.time
 
 
-def test_what_it_says_are_messages_of_the_protocol() -> None:
+def test_what_it_says_are_messages_of_the_protocol():
     traffic = played("ask_first").recorder.traffic or []
     said = [decode(sent.payload).body for sent in traffic if sent.source == ROOM]
     kinds = [type(body) for body in said if not isinstance(body, m.Heartbeat)]
@@ -62,7 +60,7 @@ def test_what_it_says_are_messages_of_the_protocol() -> None:
     assert any(isinstance(body, m.AuditRecord) for body in heard)
 
 
-def test_automatic_it_watches_and_sends_another_where_its_rule_says_so() -> None:
+def test_automatic_it_watches_and_sends_another_where_its_rule_says_so():
     recording = played("automatic", "guard")
     by_itself, *rest = [f for f in recording.facts if f.action == "assign"]
     assert (by_itself.role, by_itself.time) == (None, pytest.approx(5.0, abs=0.01))
@@ -77,19 +75,19 @@ def test_automatic_it_watches_and_sends_another_where_its_rule_says_so() -> None
     ("sends", "state"), [("nobody", State.REFUTED), ("others", State.ESCALATED)]
 )
 @pytest.mark.invariant("S6")
-def test_it_may_end_an_event_and_no_rule_is_broken(sends: str, state: State) -> None:
+def test_it_may_end_an_event_and_no_rule_is_broken(sends, state):
     recording = played("ask_first", sends)
     assert recording.events[0].state is state
     assert recording.recorder.violations == {}
     assert run_row(recording)["dismissed"] == 1
 
 
-def test_the_same_seed_makes_the_same_decisions() -> None:
+def test_the_same_seed_makes_the_same_decisions():
     again = simulate(scenario("ask_first", overrules=[]), seed=3)
     assert again.facts == played("ask_first").facts
 
 
-def test_its_delays_are_no_luck_of_anybody_else() -> None:
+def test_its_delays_are_no_luck_of_anybody_else():
     """Whoever is there, everybody else draws the same numbers."""
     alone = simulate(build({**TEAM, "events": [ALARM], "horizon_s": 60.0}, {}), seed=3)
     room = played("automatic")
@@ -97,7 +95,7 @@ def test_its_delays_are_no_luck_of_anybody_else() -> None:
     assert alone.incidents[0].hazard.position == room.incidents[0].hazard.position
 
 
-def test_a_run_says_how_long_it_took_and_what_the_policy_would_have_done() -> None:
+def test_a_run_says_how_long_it_took_and_what_the_policy_would_have_done():
     recording = played("ask_first")
     row, (event,) = run_row(recording), event_rows(recording)
     assert row["acknowledge_mean_s"] == pytest.approx(8.0, abs=0.05)
@@ -108,7 +106,7 @@ def test_a_run_says_how_long_it_took_and_what_the_policy_would_have_done() -> No
     assert event["policy_would_send"] == event["responder"]
 
 
-def test_without_a_control_room_no_row_says_a_word_of_one() -> None:
+def test_without_a_control_room_no_row_says_a_word_of_one():
     plain = build({**TEAM, "events": [ALARM], "horizon_s": 60.0}, {})
     recording = simulate(plain, seed=3)
     assert "overrides" not in measures_of(plain)
@@ -117,13 +115,13 @@ def test_without_a_control_room_no_row_says_a_word_of_one() -> None:
     assert "mode" not in plain.model_dump(mode="json")["dispatch"]
 
 
-def test_who_may_only_look_is_refused_and_the_policy_goes_on() -> None:
+def test_who_may_only_look_is_refused_and_the_policy_goes_on():
     recording = simulate(scenario("ask_first", role="look"), seed=3)
     assert [f.code for f in of_people(recording)] == [m.NOT_PERMITTED]
     assert recording.events[0].times["assigned"] == pytest.approx(5.0, abs=0.01)
 
 
-def test_too_slow_it_is_told_that_the_policy_was_first() -> None:
+def test_too_slow_it_is_told_that_the_policy_was_first():
     slow = scenario("ask_first", decide_s={"median": 70.0}, overrules=[{"sends": "guard"}])
     recording = simulate(slow, seed=3)
     orders = [f for f in recording.facts if f.action == "assign" and f.code == m.OK]

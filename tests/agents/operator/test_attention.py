@@ -1,7 +1,5 @@
 """Which of several robots one person looks at."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -32,18 +30,18 @@ class Robot:
         ("a robot that only drives is left for one that waits", (None, None, 99.9), 2),
     ],
 )
-def test_judgements_come_first(why: str, waits: tuple[float | None, ...], chosen: int) -> None:
+def test_judgements_come_first(why, waits, chosen):
     assert next_screen(100.0, 0, 99.0, waits, (0.0, 50.0, 40.0)) == chosen, why
 
 
-def test_while_none_waits_each_is_glanced_at_in_turn_for_3_s() -> None:
+def test_while_none_waits_each_is_glanced_at_in_turn_for_3_s():
     waits, seen = (None, None, None), (0.0, 50.0, 40.0)
     assert GLANCE == 3.0
     assert next_screen(100.0, 0, 97.1, waits, seen) == 0
     assert next_screen(100.0, 0, 97.0, waits, seen) == 2  # not looked at for longest
 
 
-def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time() -> None:
+def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time():
     clock, robot = Clock(), Robot()
     attention = Attention(clock, switch=1.0)
     attention.begin(robot)
@@ -55,7 +53,7 @@ def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time() -> None
     assert robot.log.turned_to == 0
 
 
-def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch() -> None:
+def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
     """3 s of looking, up to 0.5 s until the person moves on, 1 s to find into the other."""
     clock, one, two = Clock(), Robot(), Robot()
     attention = Attention(clock, switch=1.0)
@@ -74,7 +72,7 @@ def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch() -> None:
     assert gaps == pytest.approx([1.0] * len(gaps))
 
 
-def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over() -> None:
+def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over():
     clock, one, two = Clock(), Robot(), Robot()
     attention = Attention(clock, switch=1.0)
     attention.begin(one)
@@ -90,7 +88,7 @@ def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over() -> None:
     assert attention.looks_at(one)
 
 
-def test_the_last_screen_that_goes_off_leaves_nothing_to_look_at() -> None:
+def test_the_last_screen_that_goes_off_leaves_nothing_to_look_at():
     clock, one, two = Clock(), Robot(), Robot()
     attention = Attention(clock, switch=1.0)
     attention.begin(one)

@@ -1,7 +1,5 @@
 """How the phone's app sends commands."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -63,7 +61,7 @@ def small_sender(
     )
 
 
-def test_no_command_leaves_the_phone_before_the_first_picture() -> None:
+def test_no_command_leaves_the_phone_before_the_first_picture():
     """Without a tick the robot could not bound the age of what waits for a connection."""
     network, seen = small_network(), list[int | None]([None])
     got: list[bytes] = []
@@ -96,7 +94,7 @@ class Broken(PubSub):
         super().offer(command)
 
 
-def test_what_a_pattern_of_a_user_gets_wrong_is_counted_and_the_others_go() -> None:
+def test_what_a_pattern_of_a_user_gets_wrong_is_counted_and_the_others_go():
     network = small_network()
     sender = small_sender(network, Broken(), [1])
     sender.start()
@@ -105,7 +103,7 @@ def test_what_a_pattern_of_a_user_gets_wrong_is_counted_and_the_others_go() -> N
     assert sender.first_failure == "ValueError: odd"
 
 
-def test_a_shipped_pattern_that_fails_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shipped_pattern_that_fails_ends_the_run(monkeypatch):
     """Its errors are ours: nobody should have to look for them in a counter."""
     monkeypatch.setattr(PubSub, "offer", lambda pattern, command: 1 / 0)
     sender = small_sender(small_network(), PubSub(), [1])
@@ -113,7 +111,7 @@ def test_a_shipped_pattern_that_fails_ends_the_run(monkeypatch: pytest.MonkeyPat
         sender.start()
 
 
-def test_once_a_drive_is_over_its_pattern_sends_nothing() -> None:
+def test_once_a_drive_is_over_its_pattern_sends_nothing():
     network, kept = small_network(), PubSub()
     sender = small_sender(network, kept, [1])
     sender.start()
@@ -125,7 +123,7 @@ def test_once_a_drive_is_over_its_pattern_sends_nothing() -> None:
 
 
 @pytest.mark.parametrize("off", [0, 1])
-def test_a_reply_counts_only_if_it_answers_the_command(off: int) -> None:
+def test_a_reply_counts_only_if_it_answers_the_command(off):
     network, told = small_network(), list[str]()
     says = Outbox(ROBOT)
 

@@ -1,7 +1,5 @@
 """What a person comes to know of the delay, from what it did and what it sees alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -21,17 +19,17 @@ def learn(
 
 
 @pytest.mark.parametrize("delay", [0.2, 0.6, 1.5, 4.0, 10.0])
-def test_the_delay_is_learnt_to_a_tenth_of_a_second(delay: float) -> None:
+def test_the_delay_is_learnt_to_a_tenth_of_a_second(delay):
     assert learn(DelayEstimate(0.0, 0.6), delay, 60.0, 0.1) == pytest.approx(delay, abs=0.11)
 
 
 @pytest.mark.parametrize("delay", [0.05, 0.21, 0.6])
-def test_a_finer_resolution_learns_it_to_a_hundredth(delay: float) -> None:
+def test_a_finer_resolution_learns_it_to_a_hundredth(delay):
     guess = DelayEstimate(0.0, 0.3, step=0.01)
     assert learn(guess, delay, 10.0, 0.01) == pytest.approx(delay, abs=0.015)
 
 
-def test_channels_in_other_units_are_weighed_by_their_scale() -> None:
+def test_channels_in_other_units_are_weighed_by_their_scale():
     """A cursor that moves by millimetres a second tells as much as a robot by metres."""
     coarse = DelayEstimate(0.0, 0.3, step=0.01)
     assert learn(coarse, 0.8, 10.0, 0.01, size=1e-4) == pytest.approx(0.3, abs=0.015)
@@ -39,7 +37,7 @@ def test_channels_in_other_units_are_weighed_by_their_scale() -> None:
     assert learn(fine, 0.8, 10.0, 0.01, size=1e-4) == pytest.approx(0.8, abs=0.015)
 
 
-def test_while_nothing_changes_the_guess_is_what_was_learnt_before() -> None:
+def test_while_nothing_changes_the_guess_is_what_was_learnt_before():
     guess = DelayEstimate(0.0, 1.7)
     for now in np.arange(0.0, 20.0, 0.1).tolist():
         guess.intend(now, 0.0, 0.0)
@@ -47,7 +45,7 @@ def test_while_nothing_changes_the_guess_is_what_was_learnt_before() -> None:
     assert guess.value == pytest.approx(1.7)
 
 
-def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute() -> None:
+def test_a_delay_that_changes_is_learnt_anew_within_half_a_minute():
     guess = DelayEstimate(0.0, 0.6)
     asked = np.random.default_rng(2).uniform(0.0, 0.5, 200)
     values = []
@@ -83,14 +81,14 @@ def learns_a_jump_after(frames_per_second: float, luck: int) -> float:
 
 @pytest.mark.parametrize(("frames_per_second", "most"), [(10, 7), (5, 7), (1, 9), (0.5, 14)])
 def test_how_fast_a_delay_is_learnt_hardly_depends_on_how_many_frames_there_are(
-    frames_per_second: float, most: float
-) -> None:
+    frames_per_second, most
+):
     """Two looks at the least are needed, whatever they count."""
     took = [learns_a_jump_after(frames_per_second, luck) for luck in range(9)]
     assert 2.0 < float(np.median(took)) < most
 
 
-def test_a_break_stands_for_nothing_seen() -> None:
+def test_a_break_stands_for_nothing_seen():
     """After 4 s in which nobody looked, one wrong picture is one wrong picture."""
     values = []
     for rests in (True, False):

@@ -1,7 +1,5 @@
 """When a link counts as lost and when a person gives up, by whatever pattern commands travel."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.dva.scripted_dva import ROBOT, PretendedDva
 

@@ -1,7 +1,5 @@
 """Confirming, refuting and giving up, by pictures that a test makes up."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -61,29 +59,29 @@ def outcomes(seen: Observation, count: int = 200, **how: float) -> list[str]:
     return [found[0] for seed in range(count) if (found := look_at(seen, seed, **how)[0])]
 
 
-def test_an_event_in_plain_view_is_confirmed_and_an_empty_place_refuted_after_25_s() -> None:
+def test_an_event_in_plain_view_is_confirmed_and_an_empty_place_refuted_after_25_s():
     assert look_at(picture(FIRE))[0] == ("confirmed", "")
     assert look_at(picture()) == (("refuted", "nothing there"), pytest.approx(25.2, abs=0.11))
 
 
-def test_with_everything_good_nobody_of_500_is_wrong() -> None:
+def test_with_everything_good_nobody_of_500_is_wrong():
     assert set(outcomes(picture(FIRE), 500)) == {"confirmed"}
     assert set(outcomes(picture(), 500)) == {"refuted"}
 
 
-def test_from_elsewhere_nothing_is_refuted() -> None:
+def test_from_elsewhere_nothing_is_refuted():
     assert look_at(picture(away=3.0))[0] is None
 
 
 @pytest.mark.parametrize("visibility", [0.01, 0.4, 1.0, 1.19])
-def test_who_cannot_see_the_place_gives_up_and_refutes_nothing(visibility: float) -> None:
+def test_who_cannot_see_the_place_gives_up_and_refutes_nothing(visibility):
     for seed in range(20):
         found, when = look_at(picture(visibility=visibility), seed, kind="gas_leak")
         assert found == ("gave up", "nothing can be seen")
         assert when == pytest.approx(PERSON.patience, abs=0.3)
 
 
-def test_who_cannot_see_the_place_wants_to_look_from_nearer_after_5_s() -> None:
+def test_who_cannot_see_the_place_wants_to_look_from_nearer_after_5_s():
     looking = Looking(
         "gas_leak", PLACE, planner=ground(), person=PERSON, luck=normals(1), arrived=lambda: None
     )
@@ -97,13 +95,13 @@ def test_who_cannot_see_the_place_wants_to_look_from_nearer_after_5_s() -> None:
     assert before
 
 
-def test_from_nearer_the_same_smoke_lets_the_place_be_seen() -> None:
+def test_from_nearer_the_same_smoke_lets_the_place_be_seen():
     """Through 0.8 m one sees to the place from 0.5 m, not from 1.2 m."""
     assert set(outcomes(picture(away=1.2, visibility=0.8), 20)) == {"gave up"}
     assert "gave up" not in outcomes(picture(away=0.5, visibility=0.8), 20)
 
 
-def test_misses_come_with_smoke_few_frames_and_haste() -> None:
+def test_misses_come_with_smoke_few_frames_and_haste():
     """A leak behind smoke that leaves 6 % of its contrast, hard to tell within 25 s."""
     missed = {
         name: np.mean([out == "refuted" for out in outcomes(seen, 200, **how)])
@@ -125,7 +123,7 @@ def replace_contrast(contrast: float) -> SeenHazard:
     return LEAK_IN_SMOKE._replace(contrast=contrast)
 
 
-def test_false_confirmations_come_with_haste_and_smoke() -> None:
+def test_false_confirmations_come_with_haste_and_smoke():
     hasty = {"confirm_look": 0.7}
     false = [
         np.mean([out == "confirmed" for out in outcomes(seen, 200, **how)])
@@ -135,7 +133,7 @@ def test_false_confirmations_come_with_haste_and_smoke() -> None:
     assert 0.02 < false[1] < false[2]
 
 
-def test_while_the_person_looks_away_no_time_counts() -> None:
+def test_while_the_person_looks_away_no_time_counts():
     looking = Looking(
         "fire", PLACE, planner=ground(), person=PERSON, luck=normals(1), arrived=lambda: None
     )
@@ -145,7 +143,7 @@ def test_while_the_person_looks_away_no_time_counts() -> None:
         looking.look_away()
 
 
-def test_a_place_is_arrived_at_once() -> None:
+def test_a_place_is_arrived_at_once():
     calls: list[int] = []
     looking = Looking(
         "fire",

@@ -1,7 +1,5 @@
 """Strategies by name, and those that users bring."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """One operator with two robots in hand: it watches both, or drives one after the other."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -28,7 +26,7 @@ def modes(dva: PretendedDva) -> list[Mode]:
     return [robot.controller.mode for robot in dva.field.robots.values()]
 
 
-def test_two_missions_run_at_the_same_time_and_both_are_judged() -> None:
+def test_two_missions_run_at_the_same_time_and_both_are_judged():
     dva, operator = office("supervisory")
     assert dva.order(1, EAST, robot=ROBOT) == dva.order(2, WEST, robot=OTHER_ROBOT) == m.OK
     dva.run_until(lambda: len(operator.works) == 2 and modes(dva) == [Mode.MISSION] * 2)
@@ -42,7 +40,7 @@ def test_two_missions_run_at_the_same_time_and_both_are_judged() -> None:
     assert dva.stage.recorder.violations == {}
 
 
-def test_while_one_place_is_searched_the_other_robot_waits_for_the_eyes() -> None:
+def test_while_one_place_is_searched_the_other_robot_waits_for_the_eyes():
     dva, operator = office("supervisory")
     dva.order(1, EAST, robot=ROBOT)
     dva.order(2, WEST, robot=OTHER_ROBOT)
@@ -55,7 +53,7 @@ def test_while_one_place_is_searched_the_other_robot_waits_for_the_eyes() -> Non
     assert sum(log.turned_to for log in logs) >= 2
 
 
-def test_two_robots_driven_by_hand_go_one_after_the_other() -> None:
+def test_two_robots_driven_by_hand_go_one_after_the_other():
     dva, _ = office("direct")
     assert dva.order(1, EAST, robot=ROBOT) == dva.order(2, WEST, robot=OTHER_ROBOT) == m.OK
     dva.run_until(lambda: "departed" in dva.progress(1))
@@ -70,7 +68,7 @@ def test_two_robots_driven_by_hand_go_one_after_the_other() -> None:
     assert second.ordered < first.ended - 20.0
 
 
-def test_a_third_robot_takes_the_place_of_the_one_ordered_longest_ago() -> None:
+def test_a_third_robot_takes_the_place_of_the_one_ordered_longest_ago():
     dva, operator = office("supervisory", robots=3)
     for event, robot in ((1, ROBOT), (2, OTHER_ROBOT), (3, THIRD_ROBOT)):
         dva.order(event, EAST, robot=robot)
@@ -82,7 +80,7 @@ def test_a_third_robot_takes_the_place_of_the_one_ordered_longest_ago() -> None:
     assert dva.stage.recorder.drives[0].outcome == "redirected"
 
 
-def test_a_newer_order_for_a_robot_in_hand_leaves_the_other_alone() -> None:
+def test_a_newer_order_for_a_robot_in_hand_leaves_the_other_alone():
     dva, operator = office("supervisory")
     dva.order(1, EAST, robot=ROBOT)
     dva.order(2, EAST, robot=OTHER_ROBOT)
@@ -94,7 +92,7 @@ def test_a_newer_order_for_a_robot_in_hand_leaves_the_other_alone() -> None:
     assert modes(dva) == [Mode.MISSION] * 2
 
 
-def test_what_waits_for_its_turn_can_be_called_off() -> None:
+def test_what_waits_for_its_turn_can_be_called_off():
     dva, operator = office("direct")
     dva.order(1, EAST, robot=ROBOT)
     dva.order(2, WEST, robot=OTHER_ROBOT)
@@ -105,7 +103,7 @@ def test_what_waits_for_its_turn_can_be_called_off() -> None:
     assert operator.activity == "waiting"
 
 
-def test_who_leaves_puts_both_robots_to_rest() -> None:
+def test_who_leaves_puts_both_robots_to_rest():
     dva, operator = office("supervisory")
     dva.order(1, EAST, robot=ROBOT)
     dva.order(2, WEST, robot=OTHER_ROBOT)
@@ -116,7 +114,7 @@ def test_who_leaves_puts_both_robots_to_rest() -> None:
     assert operator.works == {}
 
 
-def test_a_revoked_permission_ends_one_mission_and_not_the_other() -> None:
+def test_a_revoked_permission_ends_one_mission_and_not_the_other():
     dva, operator = office("supervisory")
     dva.order(1, EAST, robot=ROBOT)
     dva.order(2, WEST, robot=OTHER_ROBOT)
@@ -139,7 +137,7 @@ def fill_with_smoke(view: FieldOfView, extinction: float) -> None:
 
 
 @pytest.mark.parametrize("control", ["direct", "supervisory"])
-def test_a_robot_in_thick_smoke_never_refutes(control: str) -> None:
+def test_a_robot_in_thick_smoke_never_refutes(control):
     """At the place, but through smoke of 20 /m one sees 15 cm."""
     dva = PretendedDva(robots=1, control=control)
     for robot in dva.field.robots.values():
@@ -153,7 +151,7 @@ def test_a_robot_in_thick_smoke_never_refutes(control: str) -> None:
     assert any("nothing can be seen" in what for what in told)
 
 
-def test_who_drives_through_thin_smoke_looks_from_nearer_and_can_refute() -> None:
+def test_who_drives_through_thin_smoke_looks_from_nearer_and_can_refute():
     """Through smoke of 2.8 /m one sees 1.07 m: not from 1.2 m, but from 0.5 m."""
     dva = PretendedDva(robots=1)
     for robot in dva.field.robots.values():

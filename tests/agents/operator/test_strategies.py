@@ -1,7 +1,5 @@
 """How strategies steer, in closed loops where what is asked for happens exactly, a delay later."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import groupby, pairwise

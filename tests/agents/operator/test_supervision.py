@@ -1,7 +1,5 @@
 """An operator who supervises: sends a robot to look, watches what it shows, and judges."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Being told no: by whatever pattern commands travel, the app finds out, and says so."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

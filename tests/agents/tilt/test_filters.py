@@ -1,7 +1,5 @@
 """Filters: what they smooth, how old their values are, and where the dissertation's sticks."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

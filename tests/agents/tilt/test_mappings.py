@@ -1,7 +1,5 @@
 """Mappings: what a tilt means, and what a practised hand tilts to."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """The phone as a whole: from what is wanted to what is sent, and when."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

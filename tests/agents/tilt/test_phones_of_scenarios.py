@@ -1,7 +1,5 @@
 """A scenario names the stages of its phones; what it names wrongly is told before anything runs."""
 
-from __future__ import annotations
-
 import pytest
 
 from dva_sim.kernel.errors import ConfigError

@@ -1,7 +1,5 @@
 """A browser, and worlds to look at with it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

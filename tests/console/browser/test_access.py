@@ -1,7 +1,5 @@
 """Who gets in, what a foreign page reaches, and what is said when the world is gone."""
 
-from __future__ import annotations
-
 import http.server
 import threading
 from collections.abc import Iterator
@@ -33,7 +31,7 @@ def foreign() -> Iterator[str]:
     server.server_close()
 
 
-def test_the_token_leaves_the_address_and_a_reload_still_gets_in(fake, visit) -> None:
+def test_the_token_leaves_the_address_and_a_reload_still_gets_in(fake, visit):
     page = visit.open(fake(*SMALL).drive, "network")
 
     assert "token" not in page.url
@@ -42,7 +40,7 @@ def test_the_token_leaves_the_address_and_a_reload_still_gets_in(fake, visit) ->
 
 
 @pytest.mark.parametrize("query", ["", "?token=wrong"])
-def test_without_the_right_token_there_is_a_page_of_words(fake, visits, query: str) -> None:
+def test_without_the_right_token_there_is_a_page_of_words(fake, visits, query):
     guest = visits()
     page = guest.context.new_page()
     answer = page.goto(f"{fake(*SMALL).base}{query}")
@@ -59,9 +57,7 @@ POST = """url => fetch(url, {method: 'POST', credentials: 'include',
   .then(a => a.status, () => 'refused')"""
 
 
-def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(
-    fake, visit, foreign: str
-) -> None:
+def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(fake, visit, foreign):
     world = fake(*SMALL)
     visit.open(world.drive)
     page = visit.context.new_page()
@@ -74,7 +70,7 @@ def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(
                          f"{world.base}api/state") == "refused"  # fmt: skip
 
 
-def test_a_page_says_so_when_the_world_has_ended(own_world, browser) -> None:
+def test_a_page_says_so_when_the_world_has_ended(own_world, browser):
     world, end = own_world(*SMALL)
     page = browser.new_context().new_page()
     page.goto(f"{world.drive}#/map")

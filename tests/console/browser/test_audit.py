@@ -1,7 +1,5 @@
 """The page Audit: rows, filter, export, and a log that somebody has changed by hand."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -35,7 +33,7 @@ def logged(own_world, visit) -> Page:
     return page
 
 
-def test_what_was_decided_stands_in_the_log_is_measured_filtered_and_exported(logged: Page) -> None:
+def test_what_was_decided_stands_in_the_log_is_measured_filtered_and_exported(logged):
     table = logged.get_by_role("table", name="Audit log")
     expect(table).to_contain_text("acknowledge")
     expect(logged.get_by_role("status", name="Verification")).to_contain_text("holds: 3 rows")
@@ -65,9 +63,7 @@ def test_what_was_decided_stands_in_the_log_is_measured_filtered_and_exported(lo
     assert verify_plain(plain).problem is None
 
 
-def test_a_row_changed_by_hand_is_found_out_by_who_may_look_too(
-    own_world, visits, tmp_path: Path
-) -> None:
+def test_a_row_changed_by_hand_is_found_out_by_who_may_look_too(own_world, visits, tmp_path):
     file = tmp_path / "audit.sqlite"
     world, _ = own_world("--site", "office-block", "--audit", str(file))
     page = visits().open(world.drive, "events")

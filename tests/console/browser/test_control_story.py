@@ -1,7 +1,5 @@
 """The program itself: an event is acknowledged, a robot sent, taken over, driven, confirmed."""
 
-from __future__ import annotations
-
 import re
 import signal
 from collections.abc import Iterator
@@ -71,8 +69,8 @@ def in_order(wanted: tuple[str, ...] | tuple[bytes, ...], said: list[str] | list
 
 
 def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confirmed(
-    tmp_path: Path, visit, programs: Programs
-) -> None:
+    tmp_path, visit, programs
+):
     record, audit = tmp_path / "story.mcap", tmp_path / "audit.sqlite"
     words = ["--record", record, "--audit", audit, "--set", f"link.delay_s={DELAY_S}"]
     words += ["--set", "operator.count=2"]  # one of them a person, the other one simulated
@@ -119,7 +117,7 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
     assert all(one.time <= later.time for one, later in pairwise(sent))
 
 
-def test_people_decide_over_real_links_too(tmp_path: Path, visit, programs: Programs) -> None:
+def test_people_decide_over_real_links_too(tmp_path, visit, programs):
     audit = tmp_path / "audit.sqlite"
     console, address = started(programs, "--links", "real", "--audit", audit)
     page = visit.open(address, "events")

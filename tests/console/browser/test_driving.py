@@ -1,7 +1,5 @@
 """Taking a robot, holding to drive, letting go, and everything that interrupts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -71,7 +69,7 @@ def held(page: Page, key: str) -> Iterator[None]:
         (["ArrowDown"], 0, 0),  # there is no reverse
     ],
 )
-def test_keys_steer_while_they_are_held(page: Page, keys: list[str], speed, turn) -> None:
+def test_keys_steer_while_they_are_held(page, keys, speed, turn):
     for key in keys:
         page.keyboard.down(key)
     assert becomes(lambda: len(inputs(page)) > 5)
@@ -84,7 +82,7 @@ def test_keys_steer_while_they_are_held(page: Page, keys: list[str], speed, turn
     assert inputs(page)[-1]["speed"] == 0
 
 
-def test_a_robot_moves_while_a_key_is_held(page: Page) -> None:
+def test_a_robot_moves_while_a_key_is_held(page):
     with held(page, "ArrowUp"):
         expect(page.locator(".stands")).to_contain_text("Set point 0.50 m/s")
         expect(page.get_by_role("slider", name="Speed")).to_have_value("0.5")
@@ -103,7 +101,7 @@ def test_a_robot_moves_while_a_key_is_held(page: Page) -> None:
         "screen.orientation.dispatchEvent(new Event('change'))",
     ],
 )
-def test_what_interrupts_stops_at_once_and_a_held_key_does_not_go_on(page, interruption) -> None:
+def test_what_interrupts_stops_at_once_and_a_held_key_does_not_go_on(page, interruption):
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page))
         page.evaluate(interruption)
@@ -116,7 +114,7 @@ def test_what_interrupts_stops_at_once_and_a_held_key_does_not_go_on(page, inter
         expect(page.locator(".hint")).to_contain_text("take hold again")
 
 
-def test_a_new_press_drives_again_after_an_interruption(page: Page) -> None:
+def test_a_new_press_drives_again_after_an_interruption(page):
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page))
         page.evaluate("window.dispatchEvent(new Event('blur'))")
@@ -127,7 +125,7 @@ def test_a_new_press_drives_again_after_an_interruption(page: Page) -> None:
         assert becomes(lambda: inputs(page)[-1]["held"] is True)
 
 
-def test_the_focus_goes_on_to_the_button_that_comes_next(page: Page) -> None:
+def test_the_focus_goes_on_to_the_button_that_comes_next(page):
     page.get_by_role("button", name="Stop", exact=True).focus()
     page.keyboard.press("Enter")
     expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
@@ -137,7 +135,7 @@ def test_the_focus_goes_on_to_the_button_that_comes_next(page: Page) -> None:
     expect(page.get_by_role("button", name="Stop", exact=True)).to_be_focused()
 
 
-def test_the_stick_steers_while_a_pointer_holds_it(page: Page) -> None:
+def test_the_stick_steers_while_a_pointer_holds_it(page):
     box = page.locator(".stick").bounding_box()
     assert box
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -151,7 +149,7 @@ def test_the_stick_steers_while_a_pointer_holds_it(page: Page) -> None:
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
 
 
-def test_a_slider_springs_back_when_the_pointer_lets_it_go(page: Page) -> None:
+def test_a_slider_springs_back_when_the_pointer_lets_it_go(page):
     slider = page.get_by_role("slider", name="Speed")
     box = slider.bounding_box()
     assert box
@@ -165,7 +163,7 @@ def test_a_slider_springs_back_when_the_pointer_lets_it_go(page: Page) -> None:
     expect(slider).to_have_value("0")
 
 
-def test_a_slider_set_by_assistive_technology_counts_while_it_has_the_focus(page: Page) -> None:
+def test_a_slider_set_by_assistive_technology_counts_while_it_has_the_focus(page):
     page.get_by_role("slider", name="Speed").fill("0.3")
     assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
     page.get_by_role("slider", name="Turn rate").fill("-15")  # to the right
@@ -175,7 +173,7 @@ def test_a_slider_set_by_assistive_technology_counts_while_it_has_the_focus(page
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
 
 
-def test_keys_of_a_slider_spring_back_too(page: Page) -> None:
+def test_keys_of_a_slider_spring_back_too(page):
     slider = page.get_by_role("slider", name="Speed")
     slider.focus()
     page.keyboard.down("ArrowRight")
@@ -184,7 +182,7 @@ def test_keys_of_a_slider_spring_back_too(page: Page) -> None:
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
 
 
-def test_a_second_key_does_not_wait_for_the_next_turn_to_send(fake, visit) -> None:
+def test_a_second_key_does_not_wait_for_the_next_turn_to_send(fake, visit):
     page = visit.open(fake(*WORLD).drive, "drive")
     listen(page)
     take(page)
@@ -205,7 +203,7 @@ def test_a_second_key_does_not_wait_for_the_next_turn_to_send(fake, visit) -> No
 PADS = "pad => { window.pad = pad; navigator.getGamepads = () => [window.pad]; }"
 
 
-def test_a_gamepad_steers_while_its_shoulder_button_is_held(page: Page) -> None:
+def test_a_gamepad_steers_while_its_shoulder_button_is_held(page):
     def pad(pressed: bool, *axes: float) -> dict[str, object]:
         buttons = [{"pressed": pressed and number == 5} for number in range(8)]
         return {"connected": True, "id": "a pad", "axes": axes, "buttons": buttons}
@@ -227,7 +225,7 @@ def test_a_gamepad_steers_while_its_shoulder_button_is_held(page: Page) -> None:
     expect(page.locator(".hint")).to_contain_text("The gamepad is gone.")
 
 
-def test_input_comes_25_times_a_second_while_something_is_held(page: Page) -> None:
+def test_input_comes_25_times_a_second_while_something_is_held(page):
     with held(page, "ArrowUp"):
         assert becomes(lambda: len(inputs(page)) > 40)
     numbers = [line["n"] for line in inputs(page)]
@@ -235,7 +233,7 @@ def test_input_comes_25_times_a_second_while_something_is_held(page: Page) -> No
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
-def test_emergency_stop_and_its_key_stop_all_robots(page: Page) -> None:
+def test_emergency_stop_and_its_key_stop_all_robots(page):
     for press in (
         lambda: page.get_by_role("button", name="Emergency stop").click(),
         lambda: page.keyboard.press("Shift+Escape"),
@@ -250,7 +248,7 @@ def test_emergency_stop_and_its_key_stop_all_robots(page: Page) -> None:
 
 
 @pytest.mark.parametrize("end", ["key", "button", "stop"])
-def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page: Page, end) -> None:
+def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page, end):
     with held(page, "ArrowLeft"):
         assert becomes(lambda: inputs(page) and inputs(page)[-1]["turn"] == 1)
         if end == "key":
@@ -270,7 +268,7 @@ def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page: P
         assert becomes(lambda: inputs(page)[-1]["turn"] == 1)
 
 
-def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(page: Page) -> None:
+def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(page):
     slider = page.get_by_role("slider", name="Speed")
     box = slider.bounding_box()
     assert box
@@ -291,7 +289,7 @@ def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(p
     assert becomes(lambda: any(line["held"] for line in inputs(page)[count:]))
 
 
-def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared) -> None:
+def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared):
     page = shared(fake(*WORLD).drive, "drive")
     listen(page)
     page.get_by_role("button", name="robot-2 beside it").click()
@@ -312,7 +310,7 @@ def test_two_robots_get_the_same_hand_under_two_patterns(fake, shared) -> None:
     expect(mode).not_to_contain_text("Teleoperation")
 
 
-def test_a_reload_keeps_control_but_drives_no_further(page: Page) -> None:
+def test_a_reload_keeps_control_but_drives_no_further(page):
     who = page.evaluate("sessionStorage.getItem('dva-sim-client')")
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page))
@@ -322,7 +320,7 @@ def test_a_reload_keeps_control_but_drives_no_further(page: Page) -> None:
     assert page.evaluate("sessionStorage.getItem('dva-sim-client')") == who
 
 
-def test_the_picture_tells_its_age_and_goes_on(page: Page) -> None:
+def test_the_picture_tells_its_age_and_goes_on(page):
     picture = page.get_by_role("img", name="What robot-1 sees")
     expect(page.locator(".picture-age")).to_contain_text("s old")
     first = picture.get_attribute("data-frame")
@@ -330,7 +328,7 @@ def test_the_picture_tells_its_age_and_goes_on(page: Page) -> None:
     assert becomes(lambda: picture.get_attribute("data-frame") != first)
 
 
-def test_charts_draw_what_was_measured(page: Page) -> None:
+def test_charts_draw_what_was_measured(page):
     region = page.get_by_role("region", name="Latency")
     expect(region.locator("canvas")).to_have_count(3)
     assert becomes(lambda: "ms" in region.locator(".figures b").first.inner_text())

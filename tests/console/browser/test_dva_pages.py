@@ -3,8 +3,6 @@
 What runs is asked for before the browser, so that it is there until the last page is closed.
 """
 
-from __future__ import annotations
-
 import re
 import signal
 import zipfile
@@ -99,7 +97,7 @@ def row(page: Page, text: str) -> object:
     return page.get_by_role("table", name="Requests").get_by_role("row").filter(has_text=text)
 
 
-def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, shared) -> None:
+def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, shared):
     page = shared(fake(*WORLD).drive, "main")
 
     page.get_by_role("button", name="Request 3", exact=True).click()
@@ -111,7 +109,7 @@ def test_each_request_is_a_line_and_the_chosen_one_is_shown_whole(fake, shared) 
     expect(row(page, "held by ana").first).to_have_class(re.compile("refused"))
 
 
-def test_what_was_no_message_is_shown_with_line_and_column(fake, shared) -> None:
+def test_what_was_no_message_is_shown_with_line_and_column(fake, shared):
     page = shared(fake(*WORLD).drive, "main")
 
     page.get_by_role("button", name="Request 10", exact=True).click()
@@ -120,7 +118,7 @@ def test_what_was_no_message_is_shown_with_line_and_column(fake, shared) -> None
     expect(message.locator("mark")).to_have_text("<MessageID>x10</MessageID>")
 
 
-def test_a_hostile_label_is_text_in_log_and_table(fake, shared) -> None:
+def test_a_hostile_label_is_text_in_log_and_table(fake, shared):
     page = shared(fake(*WORLD).drive, "main")
 
     expect(row(page, HOSTILE).first).to_be_visible()
@@ -129,7 +127,7 @@ def test_a_hostile_label_is_text_in_log_and_table(fake, shared) -> None:
     assert page.locator("table img").count() == 0
 
 
-def test_the_log_is_filtered_searched_paused_and_cleared(fake, shared) -> None:
+def test_the_log_is_filtered_searched_paused_and_cleared(fake, shared):
     page = shared(fake(*WORLD).drive, "main")
     table = page.get_by_role("table", name="Requests")
     expect(table.get_by_role("button")).not_to_have_count(0)
@@ -155,7 +153,7 @@ def test_the_log_is_filtered_searched_paused_and_cleared(fake, shared) -> None:
     expect(page.get_by_role("button", name="Request 1", exact=True)).to_have_count(0)
 
 
-def test_leaving_the_log_while_it_scrolls_is_no_fault(fake, visits) -> None:
+def test_leaving_the_log_while_it_scrolls_is_no_fault(fake, visits):
     visit = visits(360, 500)
     page = visit.open(fake(*WORLD).drive, "main")
     expect(page.get_by_role("table", name="Requests").get_by_role("button")).not_to_have_count(0)
@@ -169,7 +167,7 @@ def test_leaving_the_log_while_it_scrolls_is_no_fault(fake, visits) -> None:
     assert visit.errors == []
 
 
-def test_lines_are_chosen_by_keys_alone(fake, shared) -> None:
+def test_lines_are_chosen_by_keys_alone(fake, shared):
     page = shared(fake(*WORLD).drive, "main")
     page.get_by_role("button", name="Pause log").click()
     last = page.get_by_role("table", name="Requests").get_by_role("button").last
@@ -182,7 +180,7 @@ def test_lines_are_chosen_by_keys_alone(fake, shared) -> None:
     expect(heading).to_be_visible()
 
 
-def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit) -> None:
+def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit):
     page = visit.open(fake(*WORLD).look, "main")
 
     expect(page.get_by_role("table", name="Requests").get_by_role("button")).not_to_have_count(0)
@@ -194,7 +192,7 @@ def test_who_may_only_look_sees_lines_and_nothing_to_act_with(fake, visit) -> No
     expect(page.get_by_role("button", name="Add fake device")).to_have_count(0)
 
 
-def test_a_fake_device_is_added_by_keys_alone(fake, shared) -> None:
+def test_a_fake_device_is_added_by_keys_alone(fake, shared):
     page = shared(fake(*WORLD).drive, "devices")
 
     page.get_by_role("button", name="Add fake device").press("Enter")
@@ -208,8 +206,8 @@ def test_a_fake_device_is_added_by_keys_alone(fake, shared) -> None:
 
 
 def test_on_modelled_links_a_stopped_server_is_silent_starts_again_and_permits_are_revoked(
-    programs: Programs, visit
-) -> None:
+    programs, visit
+):
     page = visit.open(started(programs, *QUICK)[1], "main")
     state = page.get_by_role("status", name="Server state")
 
@@ -237,9 +235,7 @@ def test_on_modelled_links_a_stopped_server_is_silent_starts_again_and_permits_a
     expect(held).not_to_contain_text("console-1")
 
 
-def test_a_peer_on_real_links_shows_up_and_its_faults_are_shown(
-    joined: tuple[Peer, str], visit, tmp_path: Path
-) -> None:
+def test_a_peer_on_real_links_shows_up_and_its_faults_are_shown(joined, visit, tmp_path):
     peer, address = joined
     page = visit.open(address, "main")
 
@@ -263,7 +259,7 @@ def test_a_peer_on_real_links_shows_up_and_its_faults_are_shown(
         assert len([name for name in files.namelist() if name.startswith("refused/")]) == 2
 
 
-def test_a_flood_is_counted_and_not_shown_line_by_line(joined: tuple[Peer, str], visit) -> None:
+def test_a_flood_is_counted_and_not_shown_line_by_line(joined, visit):
     peer, address = joined
     page = visit.open(address, "main")
     expect(row(page, "RegMsg").first).to_be_visible()
@@ -276,7 +272,7 @@ def test_a_flood_is_counted_and_not_shown_line_by_line(joined: tuple[Peer, str],
     expect(page.locator(".age")).not_to_have_class(re.compile("old"))
 
 
-def test_on_real_links_the_port_is_closed_and_opened(joined: tuple[Peer, str], visit) -> None:
+def test_on_real_links_the_port_is_closed_and_opened(joined, visit):
     peer, address = joined
     page = visit.open(address, "main")
 
@@ -287,9 +283,7 @@ def test_on_real_links_the_port_is_closed_and_opened(joined: tuple[Peer, str], v
     assert peer.ask(m.Registration("back", "TeleOp", "127.0.0.1:9")).code == m.OK
 
 
-def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(
-    programs: Programs, visit
-) -> None:
+def test_a_phone_that_chooses_a_fake_robot_gets_a_time_out_and_no_hang(programs, visit):
     _, address = started(programs, *QUICK)
     page = visit.open(address, "devices")
     page.get_by_role("button", name="Add fake device").click()
@@ -325,8 +319,8 @@ def elsewhere(programs: Programs) -> tuple[str, Program]:
 
 
 def test_an_attached_console_shows_what_messages_tell_the_rest_as_unknown_and_offers_no_decision(
-    programs: Programs, elsewhere: tuple[str, Program], visit
-) -> None:
+    programs, elsewhere, visit
+):
     dva, first = elsewhere
     page = visit.open(started(programs, "--dva", dva)[1], "devices")
 
@@ -381,8 +375,8 @@ def supervised(programs: Programs, tmp_path: Path) -> tuple[str, Path]:
 
 
 def test_people_at_an_attached_console_decide_see_alarms_and_read_what_they_did(
-    programs: Programs, supervised: tuple[str, Path], visit, tmp_path: Path
-) -> None:
+    programs, supervised, visit, tmp_path
+):
     dva, keys = supervised
     audit = tmp_path / "audit.sqlite"
     words = ("--dva", dva, "--keys", str(keys), "--audit", str(audit))

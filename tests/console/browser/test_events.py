@@ -1,7 +1,5 @@
 """The page Events in the fake world: alarms, decisions, two people at once, hostile words."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -45,7 +43,7 @@ def in_hand(page: Page, kind: str) -> int:
     return int(heading.inner_text().split()[0])
 
 
-def test_an_event_is_acknowledged_and_somebody_is_sent(both) -> None:
+def test_an_event_is_acknowledged_and_somebody_is_sent(both):
     page, other = both
     number = raised(page)
     choose(page, number)
@@ -62,9 +60,7 @@ def test_an_event_is_acknowledged_and_somebody_is_sent(both) -> None:
     expect(page.get_by_role("region", name="Event in hand")).to_contain_text("a person has to look")
 
 
-def test_of_two_who_decide_at_once_the_second_is_told_and_changes_nothing(
-    fake, both, visit
-) -> None:
+def test_of_two_who_decide_at_once_the_second_is_told_and_changes_nothing(fake, both, visit):
     page, _ = both
     number = raised(page)
     deaf: list[bool] = []
@@ -89,7 +85,7 @@ def test_of_two_who_decide_at_once_the_second_is_told_and_changes_nothing(
     cell(other, number, "robot-3")
 
 
-def test_an_alarm_is_seen_and_one_is_shelved_and_comes_back(both) -> None:
+def test_an_alarm_is_seen_and_one_is_shelved_and_comes_back(both):
     page, other = both
     raised(page, "flood")
     alarms = page.get_by_role("region", name="Alarms")
@@ -108,7 +104,7 @@ def test_an_alarm_is_seen_and_one_is_shelved_and_comes_back(both) -> None:
     expect(alarms.get_by_text("Shelved (1)")).to_have_count(0)
 
 
-def test_an_event_is_raised_at_a_place_clicked_on_the_map(both) -> None:
+def test_an_event_is_raised_at_a_place_clicked_on_the_map(both):
     page, other = both
     before = page.get_by_label("x, m").input_value()
     page.locator(".raise .map-ground").click(position={"x": 60, "y": 150})
@@ -117,7 +113,7 @@ def test_an_event_is_raised_at_a_place_clicked_on_the_map(both) -> None:
     cell(other, raised(page, "gas leak"), "Gas leak")
 
 
-def test_all_is_done_by_keys_alone(both) -> None:
+def test_all_is_done_by_keys_alone(both):
     page, other = both
     expect(page.get_by_role("button", name="Raise event")).to_be_enabled()
     page.get_by_label("Room").focus()
@@ -133,7 +129,7 @@ def test_all_is_done_by_keys_alone(both) -> None:
     cell(other, number, "supervise-")
 
 
-def test_what_needs_words_asks_for_them_and_does_nothing_without(both) -> None:
+def test_what_needs_words_asks_for_them_and_does_nothing_without(both):
     page, other = both
     number = raised(page)
     choose(page, number)
@@ -146,7 +142,7 @@ def test_what_needs_words_asks_for_them_and_does_nothing_without(both) -> None:
     cell(other, number, "refuted")
 
 
-def test_notes_and_names_that_are_html_are_shown_as_they_are(fake, shared) -> None:
+def test_notes_and_names_that_are_html_are_shown_as_they_are(fake, shared):
     evil = "<img src=x onerror=alert(1)>"
     address = fake(*WORLD, "--hostile").drive
     page, other = (shared(address, "events", person=who) for who in (1, 2))
@@ -166,7 +162,7 @@ def test_notes_and_names_that_are_html_are_shown_as_they_are(fake, shared) -> No
         assert each.locator("img[src=x]").count() == 0
 
 
-def test_who_may_look_sees_all_and_has_no_buttons(fake, visit) -> None:
+def test_who_may_look_sees_all_and_has_no_buttons(fake, visit):
     page = visit.open(fake(*WORLD).look, "events")
     expect(page.get_by_role("table", name="Events")).to_contain_text("Fire")
 
@@ -175,7 +171,7 @@ def test_who_may_look_sees_all_and_has_no_buttons(fake, visit) -> None:
         expect(page.get_by_role("button", name=name)).to_have_count(0)
 
 
-def test_only_what_is_new_stands_out(both) -> None:
+def test_only_what_is_new_stands_out(both):
     page, _ = both
     new = page.locator(".alarm.new")
     expect(page.locator(".alarm")).not_to_have_count(0)

@@ -1,7 +1,5 @@
 """A guard's page: who one is, the order and its way, what is said of it, and where one is."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.console.browser_phone import LISTEN
 from helpers.processes.patience import becomes
@@ -45,7 +43,7 @@ def said(page: Page, what: str) -> list[dict]:
     return [line for line in page.evaluate("window.sent") if line.get("do") == what]
 
 
-def test_an_order_is_accepted_and_followed_to_its_end(page) -> None:
+def test_an_order_is_accepted_and_followed_to_its_end(page):
     order = page.get_by_role("region", name="Order")
     expect(order).to_contain_text("Gas leak in somewhere, 42 m")
     tap(page, "Accept")
@@ -69,7 +67,7 @@ def test_an_order_is_accepted_and_followed_to_its_end(page) -> None:
     assert said(page, "guard_answer")[0]["accept"] is True
 
 
-def test_an_order_is_declined_with_a_reason(page) -> None:
+def test_an_order_is_declined_with_a_reason(page):
     tap(page, "Decline")
     page.get_by_label("Reason").fill("I am hurt")
     tap(page, "Decline")
@@ -78,7 +76,7 @@ def test_an_order_is_declined_with_a_reason(page) -> None:
     assert [(line["accept"], line["reason"]) for line in asked] == [(False, "I am hurt")]
 
 
-def test_help_is_asked_for_and_an_event_reported_where_one_is(page) -> None:
+def test_help_is_asked_for_and_an_event_reported_where_one_is(page):
     tap(page, "Help")
     assert becomes(lambda: said(page, "guard_say"))
     page.get_by_text("Report an event").tap()
@@ -91,7 +89,7 @@ def test_help_is_asked_for_and_an_event_reported_where_one_is(page) -> None:
     assert asked["x_m"] != 0
 
 
-def test_a_tap_on_the_map_tells_where_one_is(page) -> None:
+def test_a_tap_on_the_map_tells_where_one_is(page):
     tap(page, "I am here …")
     ground = page.locator(".map-ground")
     box = ground.bounding_box()
@@ -104,7 +102,7 @@ def test_a_tap_on_the_map_tells_where_one_is(page) -> None:
     assert len(said(page, "guard_place")) == 1  # without being asked a tap tells nothing
 
 
-def test_who_is_taken_is_not_given_twice(page, world, visits) -> None:
+def test_who_is_taken_is_not_given_twice(page, world, visits):
     other = guard_at(world, visits(**SCREEN))
     join(other, "guard-1")
     expect(other.get_by_role("alert")).to_contain_text("guard-1 is taken")
@@ -113,14 +111,14 @@ def test_who_is_taken_is_not_given_twice(page, world, visits) -> None:
     tap(other, "Leave")
 
 
-def test_a_reload_leaves_one_who_one_is(page) -> None:
+def test_a_reload_leaves_one_who_one_is(page):
     expect(page.get_by_role("button", name="Accept", exact=True)).to_be_visible()
     page.reload()
     expect(page.get_by_role("heading", name="guard-1")).to_be_visible()
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_the_place_by_satellite_counts_where_the_site_lies_there(world, visits, there) -> None:
+def test_the_place_by_satellite_counts_where_the_site_lies_there(world, visits, there):
     visit = visits(**SCREEN, permissions=["geolocation"])
     page = guard_at(world, visit)
     site = visit.context.request.get(f"{world.base}api/site").json()

@@ -1,7 +1,5 @@
 """A world that lags, and a page that sleeps: what is said, and what is not."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -33,7 +31,7 @@ def page(visit) -> Page:
     return visit.context.new_page()
 
 
-def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page: Page) -> None:
+def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page):
     change(page, lagging)
     page.goto(f"{fake(*SMALL).drive}#/drive")
 
@@ -44,7 +42,7 @@ def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page: Page) 
     expect(page.locator(".hint")).to_contain_text("behind real time")
 
 
-def test_silence_makes_the_page_look_old(fake, page: Page) -> None:
+def test_silence_makes_the_page_look_old(fake, page):
     heard: list[WebSocketRoute] = []
     silent: list[bool] = []
 
@@ -62,7 +60,7 @@ def test_silence_makes_the_page_look_old(fake, page: Page) -> None:
     expect(page.locator(".age.old")).to_be_visible()
 
 
-def test_a_hole_in_what_was_heard_is_filled_by_asking_anew(fake, page: Page) -> None:
+def test_a_hole_in_what_was_heard_is_filled_by_asking_anew(fake, page):
     asked: list[str] = []
 
     def route(socket: WebSocketRoute) -> None:
@@ -85,7 +83,7 @@ def test_a_hole_in_what_was_heard_is_filled_by_asking_anew(fake, page: Page) -> 
     expect(page.locator(".map-canvas")).to_have_count(3)
 
 
-def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page: Page) -> None:
+def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page):
     sockets: list[WebSocketRoute] = []
 
     def route(socket: WebSocketRoute) -> None:
@@ -104,7 +102,7 @@ def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page: Page) -> 
     assert page.evaluate("sessionStorage.getItem('dva-sim-client')") == who
 
 
-def test_nothing_can_be_asked_for_until_the_socket_for_driving_is_open(fake, page: Page) -> None:
+def test_nothing_can_be_asked_for_until_the_socket_for_driving_is_open(fake, page):
     sockets: list[WebSocketRoute] = []
 
     def route(socket: WebSocketRoute) -> None:

@@ -1,7 +1,5 @@
 """The link one chooses, the time factor, the bar above all; two browsers agree."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.processes.patience import becomes
 from playwright.sync_api import expect
@@ -24,7 +22,7 @@ def page(fake, shared):
     return shared(fake(*SMALL).drive, "network")
 
 
-def test_a_slider_changes_the_world_for_every_browser(page, fake, visit) -> None:
+def test_a_slider_changes_the_world_for_every_browser(page, fake, visit):
     other = visit.open(fake(*SMALL).drive, "network")
     for slider, value, shown in SLIDERS:
         page.get_by_role("slider", name=slider).fill(value)
@@ -38,14 +36,14 @@ def test_a_slider_changes_the_world_for_every_browser(page, fake, visit) -> None
     other.get_by_role("slider", name="Time factor").fill("1")
 
 
-def test_the_status_link_tells_the_delay_and_that_it_is_modelled(page) -> None:
+def test_the_status_link_tells_the_delay_and_that_it_is_modelled(page):
     page.get_by_role("button", name="250 ms").click()
 
     expect(page.get_by_role("status", name="Link")).to_contain_text("modelled 250 ms")
     expect(page.get_by_role("button", name="250 ms")).to_have_attribute("aria-pressed", "true")
 
 
-def test_time_stands_still_while_it_is_paused(page) -> None:
+def test_time_stands_still_while_it_is_paused(page):
     page.get_by_role("button", name="Pause").click()
     expect(page.locator(".time")).to_contain_text("paused")
     shown = page.locator(".time .figure").inner_text()
@@ -56,14 +54,14 @@ def test_time_stands_still_while_it_is_paused(page) -> None:
     assert becomes(lambda: page.locator(".time .figure").inner_text() != shown)
 
 
-def test_the_pattern_of_a_robot_changes(page) -> None:
+def test_the_pattern_of_a_robot_changes(page):
     page.get_by_label("Pattern of robot-2").select_option("latest-wins")
     page.reload()
 
     expect(page.get_by_label("Pattern of robot-2")).to_have_value("latest-wins")
 
 
-def test_a_page_that_may_only_look_says_so_and_offers_nothing(fake, visits) -> None:
+def test_a_page_that_may_only_look_says_so_and_offers_nothing(fake, visits):
     page = visits().open(fake(*SMALL).look, "drive")
 
     expect(page.get_by_text("This address may only look.")).to_be_visible()
@@ -72,7 +70,7 @@ def test_a_page_that_may_only_look_says_so_and_offers_nothing(fake, visits) -> N
     expect(page.get_by_role("slider", name="Delay")).to_be_disabled()
 
 
-def test_who_comes_second_is_told_who_drives(fake, shared, visit) -> None:
+def test_who_comes_second_is_told_who_drives(fake, shared, visit):
     first, second = (opened(fake(*SMALL).drive, "drive") for opened in (shared, visit.open))
     first.get_by_role("button", name="Take control").click()
     expect(first.get_by_role("button", name="Release control")).to_be_enabled()

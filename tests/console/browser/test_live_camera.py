@@ -1,14 +1,11 @@
 """A browser shows the camera of a live run's robot by nothing but an image element."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from helpers.processes.programs import Programs, all_gone_after
-from playwright.sync_api import Browser
 
 
 @pytest.fixture
@@ -16,9 +13,7 @@ def programs(tmp_path: Path) -> Iterator[Programs]:
     yield from all_gone_after(tmp_path)
 
 
-def test_an_image_element_shows_what_a_robot_of_a_live_run_sees(
-    programs: Programs, browser: Browser
-) -> None:
+def test_an_image_element_shows_what_a_robot_of_a_live_run_sees(programs, browser):
     run = programs.start("live", "drive-to-event", "--camera-port", "0")
     run.wait_to_say("shows pictures of the robots at http://")
     url = re.search(r"at (http://127\.0\.0\.1:\d+/camera/)LABEL", run.said)

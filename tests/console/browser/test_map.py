@@ -1,7 +1,5 @@
 """The map and its twin, the lists: one selection, everything that moves, crowds."""
 
-from __future__ import annotations
-
 from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
@@ -11,7 +9,7 @@ INK = """([x, y, w, h]) => { const c = document.querySelectorAll('.map-canvas')[
   for (let i = 3; i < d.length; i += 4) sum += d[i] > 0; return sum; }"""
 
 
-def test_robots_people_and_hazards_are_drawn_and_move(fake, shared) -> None:
+def test_robots_people_and_hazards_are_drawn_and_move(fake, shared):
     page = shared(fake(*SMALL).drive)
     canvas = page.locator(".map-canvas").nth(2)
 
@@ -24,7 +22,7 @@ def test_robots_people_and_hazards_are_drawn_and_move(fake, shared) -> None:
     assert becomes(lambda: picture() != first)
 
 
-def test_what_moves_is_drawn_every_second_frame(fake, visit) -> None:
+def test_what_moves_is_drawn_every_second_frame(fake, visit):
     page = visit.open(fake(*SMALL).drive)
     page.clock.install()
     page.clock.pause_at("2030-01-01")
@@ -40,7 +38,7 @@ def test_what_moves_is_drawn_every_second_frame(fake, visit) -> None:
     assert 16 <= page.evaluate("window.drawn") <= 40  # some more for what is told meanwhile
 
 
-def test_list_and_map_share_one_selection(fake, shared) -> None:
+def test_list_and_map_share_one_selection(fake, shared):
     page = shared(fake(*SMALL).drive)
     row = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-2")
     row.click()
@@ -52,7 +50,7 @@ def test_list_and_map_share_one_selection(fake, shared) -> None:
     expect(row).to_have_attribute("aria-pressed", "false")
 
 
-def test_a_robot_in_the_middle_is_hit_by_a_click(fake, shared) -> None:
+def test_a_robot_in_the_middle_is_hit_by_a_click(fake, shared):
     page = shared(fake(*SMALL).drive)
     button = page.get_by_role("region", name="Robots").get_by_role("button", name="robot-1")
     button.click()
@@ -67,7 +65,7 @@ def test_a_robot_in_the_middle_is_hit_by_a_click(fake, shared) -> None:
     expect(page.get_by_role("complementary", name="What is chosen")).to_be_visible()
 
 
-def test_keys_pan_and_zoom_the_map_and_fit_brings_all_back(fake, shared) -> None:
+def test_keys_pan_and_zoom_the_map_and_fit_brings_all_back(fake, shared):
     page = shared(fake(*SMALL).drive)
     bar = page.locator(".scale-bar")
     fitted = bar.inner_text()
@@ -80,7 +78,7 @@ def test_keys_pan_and_zoom_the_map_and_fit_brings_all_back(fake, shared) -> None
     assert becomes(lambda: bar.inner_text() == fitted)
 
 
-def test_events_tell_state_age_and_who_is_sent(fake, shared) -> None:
+def test_events_tell_state_age_and_who_is_sent(fake, shared):
     page = shared(fake(*SMALL).drive)
     event = page.get_by_role("region", name="Events").get_by_role("button").first
 
@@ -91,7 +89,7 @@ def test_events_tell_state_age_and_who_is_sent(fake, shared) -> None:
     expect(page.get_by_role("complementary")).to_contain_text("min ago")
 
 
-def test_the_age_of_an_event_goes_on_while_nothing_is_told_of_it(fake, shared) -> None:
+def test_the_age_of_an_event_goes_on_while_nothing_is_told_of_it(fake, shared):
     page = shared(fake(*SMALL).drive)
     event = page.get_by_role("region", name="Events").get_by_role("button").first
     ages: dict[str, set[int]] = {}  # by state: a new one would be told
@@ -106,7 +104,7 @@ def test_the_age_of_an_event_goes_on_while_nothing_is_told_of_it(fake, shared) -
     assert becomes(goes_on)
 
 
-def test_the_legend_tells_what_the_fullest_tint_means(fake, shared) -> None:
+def test_the_legend_tells_what_the_fullest_tint_means(fake, shared):
     page = shared(fake(*SMALL).drive)
     page.get_by_text("Legend").click()
 
@@ -114,7 +112,7 @@ def test_the_legend_tells_what_the_fullest_tint_means(fake, shared) -> None:
     expect(page.locator(".legend")).not_to_contain_text("undefined")
 
 
-def test_the_legend_is_closed_again_on_a_small_screen(fake, shared) -> None:
+def test_the_legend_is_closed_again_on_a_small_screen(fake, shared):
     for name in ("map", "drive"):
         page = shared(fake(*SMALL).drive, name, width=360, height=640)
         summary = page.get_by_text("Legend")
@@ -137,7 +135,7 @@ def crowd(page: Page) -> int:
     )
 
 
-def test_200_robots_and_100_people_are_shown_and_listed(fake, visit) -> None:
+def test_200_robots_and_100_people_are_shown_and_listed(fake, visit):
     page = visit.open(fake("--robots", "200", "--people", "100", "--site", "campus").drive)
 
     expect(page.get_by_role("region", name="Robots").get_by_role("button")).to_have_count(200)
@@ -145,7 +143,7 @@ def test_200_robots_and_100_people_are_shown_and_listed(fake, visit) -> None:
     assert crowd(page) > 3  # what a machine that does much else still draws
 
 
-def test_a_hostile_label_is_shown_as_text(fake, shared) -> None:
+def test_a_hostile_label_is_shown_as_text(fake, shared):
     for name in ("map", "drive", "network"):
         page = shared(fake(*SMALL, "--hostile").drive, name)
 

@@ -1,7 +1,5 @@
 """The pages for everyone: names, themes, sizes, keys, and no fault that axe-core finds."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.console.accessibility import faults
 from playwright.sync_api import Response, expect
@@ -20,7 +18,7 @@ PAGES = {
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious(fake, shared, width: int, scheme: str) -> None:
+def test_axe_finds_nothing_serious(fake, shared, width, scheme):
     found = {}
     for name, heading in PAGES.items():
         page = shared(fake(*WORLD).drive, name, width=width, scheme=scheme)
@@ -31,7 +29,7 @@ def test_axe_finds_nothing_serious(fake, shared, width: int, scheme: str) -> Non
     assert not any(found.values()), found
 
 
-def test_axe_finds_a_fault_that_is_planted(fake, shared) -> None:
+def test_axe_finds_a_fault_that_is_planted(fake, shared):
     page = shared(fake(*WORLD).drive)
     page.evaluate("document.querySelector('.map-buttons button').removeAttribute('aria-label')")
     page.evaluate("document.querySelector('.map-buttons button').removeAttribute('title')")
@@ -41,7 +39,7 @@ def test_axe_finds_a_fault_that_is_planted(fake, shared) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious_in_help_and_tour(fake, shared, scheme: str, width: int) -> None:
+def test_axe_finds_nothing_serious_in_help_and_tour(fake, shared, scheme, width):
     page = shared(fake(*WORLD).drive, "drive", width=width, scheme=scheme)
     page.get_by_role("button", name="Help").click()
     expect(page.get_by_role("dialog", name="Help")).to_be_visible()
@@ -56,7 +54,7 @@ def test_axe_finds_nothing_serious_in_help_and_tour(fake, shared, scheme: str, w
 
 
 @pytest.mark.parametrize("width", [360, 740, 1280, 2560, 3840])
-def test_nothing_is_wider_than_the_screen(fake, shared, width: int) -> None:
+def test_nothing_is_wider_than_the_screen(fake, shared, width):
     for name, heading in PAGES.items():
         page = shared(fake(*WORLD).drive, name, width=width, height=740)
         expect(page.get_by_role("heading", name=heading, level=1)).to_be_attached()
@@ -69,7 +67,7 @@ def test_nothing_is_wider_than_the_screen(fake, shared, width: int) -> None:
         assert stop["height"] >= 36, name
 
 
-def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, shared) -> None:
+def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, shared):
     page = shared(fake(*WORLD).drive, "drive", width=360, height=640)
     page.get_by_role("button", name="Take the tour").click()
     expect(page.get_by_role("button", name="Begin again")).to_be_visible()
@@ -89,7 +87,7 @@ def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, sha
     page.get_by_role("button", name="End the tour").click()
 
 
-def test_public_names_are_on_their_pages_once(fake, shared) -> None:
+def test_public_names_are_on_their_pages_once(fake, shared):
     page = shared(fake(*WORLD).drive, "drive")
 
     for link in PAGES.values():
@@ -107,7 +105,7 @@ def test_public_names_are_on_their_pages_once(fake, shared) -> None:
         expect(page.get_by_role("slider", name=slider)).to_have_count(1)
 
 
-def test_colours_change_by_a_button_and_stay(fake, visits) -> None:
+def test_colours_change_by_a_button_and_stay(fake, visits):
     page = visits(color_scheme="light").open(fake(*WORLD).drive)
 
     def background() -> str:
@@ -121,7 +119,7 @@ def test_colours_change_by_a_button_and_stay(fake, visits) -> None:
     assert background() == "rgb(22, 25, 29)"
 
 
-def test_focus_can_be_seen_on_everything_that_tab_reaches(fake, shared) -> None:
+def test_focus_can_be_seen_on_everything_that_tab_reaches(fake, shared):
     page = shared(fake(*WORLD).drive, "drive")
     reached = set()
     for _ in range(40):
@@ -136,7 +134,7 @@ def test_focus_can_be_seen_on_everything_that_tab_reaches(fake, shared) -> None:
     assert {"Emergency stop", "Drive", "Take control", "slider-speed", "slider-delay"} <= reached
 
 
-def test_a_robot_is_taken_and_released_by_keys(fake, shared) -> None:
+def test_a_robot_is_taken_and_released_by_keys(fake, shared):
     page = shared(fake(*WORLD).drive, "drive")
 
     page.get_by_role("button", name="Take control").focus()
@@ -146,7 +144,7 @@ def test_a_robot_is_taken_and_released_by_keys(fake, shared) -> None:
     expect(page.get_by_role("button", name="Take control")).to_be_enabled()
 
 
-def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit) -> None:
+def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit):
     answers: list[Response] = []
     page = visit.context.new_page()
     page.on("response", lambda answer: answers.append(answer))  # as a bound method it fails
@@ -159,9 +157,7 @@ def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit) -> N
     assert sum(weights.values()) < 700_000
 
 
-def test_pages_are_reached_by_their_links_and_obey_their_content_security_policy(
-    fake, visit
-) -> None:
+def test_pages_are_reached_by_their_links_and_obey_their_content_security_policy(fake, visit):
     page = visit.open(fake(*WORLD).drive)
     for name in reversed(PAGES.values()):
         page.get_by_role("link", name=name).click()

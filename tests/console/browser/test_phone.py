@@ -1,7 +1,5 @@
 """The five screens of a phone, by an emulated sensor and touch: the whole story, and its ends."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest
@@ -30,7 +28,7 @@ def driving(hand: Hand) -> bool:
     return hand.page.get_by_role("button", name="Stop", exact=True).is_enabled()
 
 
-def test_eight_taps_lead_from_the_scan_to_a_robot_that_moves(hand) -> None:
+def test_eight_taps_lead_from_the_scan_to_a_robot_that_moves(hand):
     page = hand.page
     hand.tap("Authentication", "link")
     hand.tap("Register")
@@ -54,7 +52,7 @@ def test_eight_taps_lead_from_the_scan_to_a_robot_that_moves(hand) -> None:
     ]
 
 
-def test_tilting_drives_and_a_swipe_down_stops(hand) -> None:
+def test_tilting_drives_and_a_swipe_down_stops(hand):
     hand.drive()
     hand.tilt(LEFT_FORWARDS)
     expect(hand.status("Radius")).to_have_text("Radius: 15°")
@@ -69,7 +67,7 @@ def test_tilting_drives_and_a_swipe_down_stops(hand) -> None:
     expect(hand.page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
 
 
-def test_samples_are_raw_numbered_and_bear_the_phones_own_times(hand) -> None:
+def test_samples_are_raw_numbered_and_bear_the_phones_own_times(hand):
     hand.drive()
     assert becomes(lambda: len(hand.sent("samples")) > 40)
     lines = hand.sent("samples")
@@ -103,7 +101,7 @@ INTERRUPTIONS = (
 )
 
 
-def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(hand) -> None:
+def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(hand):
     hand.drive()
     for count, (interruption, why) in enumerate(INTERRUPTIONS, start=1):
         hand.tilt(FORWARDS)
@@ -120,7 +118,7 @@ def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(hand) -> Non
         expect(hand.page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
 
 
-def test_a_sensor_that_falls_silent_ends_the_drive(hand) -> None:
+def test_a_sensor_that_falls_silent_ends_the_drive(hand):
     hand.drive()
     hand.page.evaluate(
         "window.addEventListener('devicemotion', (e) => e.stopImmediatePropagation(), true)"
@@ -131,7 +129,7 @@ def test_a_sensor_that_falls_silent_ends_the_drive(hand) -> None:
     assert not driving(hand)
 
 
-def test_with_hold_to_drive_lifting_the_thumb_stops(hand) -> None:
+def test_with_hold_to_drive_lifting_the_thumb_stops(hand):
     hand.register()
     hand.take()
     hand.calibrate()
@@ -147,7 +145,7 @@ def test_with_hold_to_drive_lifting_the_thumb_stops(hand) -> None:
     assert becomes(lambda: hand.sent("samples")[-1]["hand"] is False)
 
 
-def test_leaving_the_screen_stops_and_a_reload_drives_no_further(hand) -> None:
+def test_leaving_the_screen_stops_and_a_reload_drives_no_further(hand):
     hand.drive()
     hand.tap("‹ Main", "link")
     assert becomes(lambda: hand.sent("gone"))
@@ -161,7 +159,7 @@ def test_leaving_the_screen_stops_and_a_reload_drives_no_further(hand) -> None:
     assert hand.sent("start") == []
 
 
-def test_a_socket_that_is_cut_in_mid_drive_ends_it(hand) -> None:
+def test_a_socket_that_is_cut_in_mid_drive_ends_it(hand):
     hand.drive()
     hand.tilt(FORWARDS)
     expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
@@ -172,7 +170,7 @@ def test_a_socket_that_is_cut_in_mid_drive_ends_it(hand) -> None:
     assert not driving(hand)
 
 
-def test_a_connection_that_hangs_is_lost_after_three_attempts_and_the_robot_is_kept(hand) -> None:
+def test_a_connection_that_hangs_is_lost_after_three_attempts_and_the_robot_is_kept(hand):
     """As in a tunnel: nothing comes and nothing goes, and no socket says that it is closed."""
     hand.drive()
     hand.page.evaluate("window.hangs = true")
@@ -191,7 +189,7 @@ window.fetch = (url, about) => url === '/api/emergency'
   : window.usual(url, about); }"""
 
 
-def test_an_emergency_stop_whose_request_reaches_nobody_goes_over_the_socket(hand) -> None:
+def test_an_emergency_stop_whose_request_reaches_nobody_goes_over_the_socket(hand):
     hand.drive()
     hand.page.evaluate(UNREACHED)
     hand.tap("Emergency stop")
@@ -201,7 +199,7 @@ def test_an_emergency_stop_whose_request_reaches_nobody_goes_over_the_socket(han
     expect(hand.page.get_by_text("not confirmed")).to_have_count(0)
 
 
-def test_an_emergency_stop_is_asked_for_again_in_red_until_it_is_confirmed(hand) -> None:
+def test_an_emergency_stop_is_asked_for_again_in_red_until_it_is_confirmed(hand):
     hand.drive()
     hand.page.evaluate(UNREACHED)
     hand.page.evaluate("window.hangs = true")
@@ -217,7 +215,7 @@ def test_an_emergency_stop_is_asked_for_again_in_red_until_it_is_confirmed(hand)
     assert not driving(hand)
 
 
-def test_each_step_opens_the_next_and_wrong_fields_are_marked(hand) -> None:
+def test_each_step_opens_the_next_and_wrong_fields_are_marked(hand):
     hand.go("Authentication")
     page = hand.page
     for name in ("Get device list", "Get Permission Level"):
@@ -245,7 +243,7 @@ def test_each_step_opens_the_next_and_wrong_fields_are_marked(hand) -> None:
     expect(page.get_by_role("button", name="Get Permission Level")).to_be_enabled()
 
 
-def test_choices_stay_on_the_phone(hand) -> None:
+def test_choices_stay_on_the_phone(hand):
     hand.register("BQ Curie 2")
     hand.go("Calibration")
     hand.page.get_by_label("Force").fill("0,5")
@@ -258,7 +256,7 @@ def test_choices_stay_on_the_phone(hand) -> None:
     assert (kept["label"], kept["server"], kept["port"]) == ("BQ Curie 2", "127.0.0.1", "5600")
 
 
-def test_who_registers_as_a_robot_may_not_drive_and_is_told_so(hand) -> None:
+def test_who_registers_as_a_robot_may_not_drive_and_is_told_so(hand):
     hand.go("Authentication")
     hand.page.get_by_label("Device type").select_option("Robot")
     hand.tap("Register")
@@ -268,7 +266,7 @@ def test_who_registers_as_a_robot_may_not_drive_and_is_told_so(hand) -> None:
     hand.alert("permission")
 
 
-def test_of_two_phones_the_second_is_told_who_drives(hand, world, visits) -> None:
+def test_of_two_phones_the_second_is_told_who_drives(hand, world, visits):
     hand.drive("robot-2", "first phone")
     other = Hand(visits(**SCREEN), world.phone)
     other.register("second phone")
@@ -290,7 +288,7 @@ def test_of_two_phones_the_second_is_told_who_drives(hand, world, visits) -> Non
     other.leave()
 
 
-def test_emergency_stop_works_from_every_screen_once_a_robot_is_chosen(hand) -> None:
+def test_emergency_stop_works_from_every_screen_once_a_robot_is_chosen(hand):
     stop = hand.page.get_by_role("button", name="Emergency stop")
     expect(stop).to_be_disabled()
     expect(hand.page.get_by_text("register first")).to_be_visible()
@@ -305,7 +303,7 @@ def test_emergency_stop_works_from_every_screen_once_a_robot_is_chosen(hand) -> 
         assert '"robots":[0]' in (answer.value.request.post_data or ""), screen
 
 
-def test_without_a_sensor_the_stick_keys_and_gamepad_steer(world, visits) -> None:
+def test_without_a_sensor_the_stick_keys_and_gamepad_steer(world, visits):
     hand = Hand(visits(**SCREEN), world.phone, sensor=False)
     hand.register()
     hand.take()
@@ -341,7 +339,7 @@ window.addEventListener = function (kind, ...rest) {
   if (!kind.startsWith('device')) add.call(this, kind, ...rest); };"""
 
 
-def test_a_sensor_that_may_not_be_read_is_told_with_the_way_out(world, visits) -> None:
+def test_a_sensor_that_may_not_be_read_is_told_with_the_way_out(world, visits):
     hand = Hand(visits(**SCREEN), world.phone, sensor=False, script=DENIED)
     hand.go("Calibration")
     hand.tap("Switch the sensor on")
@@ -357,9 +355,7 @@ window.addEventListener = function (kind, hear, ...rest) {
   add.call(this, kind, (e) => (asked || !kind.startsWith('device')) && hear(e), ...rest); };"""
 
 
-def test_a_phone_that_wants_a_tap_first_is_asked_by_calibrate_and_again_by_start(
-    world, visits
-) -> None:
+def test_a_phone_that_wants_a_tap_first_is_asked_by_calibrate_and_again_by_start(world, visits):
     hand = Hand(visits(**SCREEN), world.phone, script=TAP_FIRST)
     hand.register()
     hand.take()
@@ -384,7 +380,7 @@ window.addEventListener = function (kind, ...rest) {
   if (kind !== 'devicemotion') add.call(this, kind, ...rest); };"""
 
 
-def test_where_motion_is_missing_angles_become_what_gravity_would_be(world, visits) -> None:
+def test_where_motion_is_missing_angles_become_what_gravity_would_be(world, visits):
     hand = Hand(visits(**SCREEN), world.phone, sensor=False, script=ANGLES)
     hand.register()
     hand.go("Calibration")
@@ -398,7 +394,7 @@ def test_where_motion_is_missing_angles_become_what_gravity_would_be(world, visi
         assert any(xyz == pytest.approx(wanted, abs=0.001) for xyz in read), wanted
 
 
-def test_a_hostile_label_is_shown_as_text(fake, visits) -> None:
+def test_a_hostile_label_is_shown_as_text(fake, visits):
     world = fake(*WORLD, "--hostile")
     hand = Hand(visits(**SCREEN), world.phone)
     hand.register("<img src=x onerror=alert(1)>")
@@ -408,7 +404,7 @@ def test_a_hostile_label_is_shown_as_text(fake, visits) -> None:
     hand.leave()
 
 
-def test_by_https_the_page_is_secure_and_its_sensor_works(world, visits) -> None:
+def test_by_https_the_page_is_secure_and_its_sensor_works(world, visits):
     """With a certificate that the browser is told to take; curl and Python verify it elsewhere."""
     hand = Hand(visits(**SCREEN, ignore_https_errors=True), world.phones)
     assert hand.page.url.startswith("https://")
@@ -420,13 +416,13 @@ def test_by_https_the_page_is_secure_and_its_sensor_works(world, visits) -> None
     hand.leave()
 
 
-def test_a_certificate_that_is_not_trusted_lets_no_browser_in(world, visits) -> None:
+def test_a_certificate_that_is_not_trusted_lets_no_browser_in(world, visits):
     page = visits(**SCREEN).context.new_page()
     with pytest.raises(Exception, match="ERR_CERT_AUTHORITY_INVALID"):
         page.goto(world.phones)
 
 
-def test_a_wrong_token_leads_to_a_page_of_words(world, visits) -> None:
+def test_a_wrong_token_leads_to_a_page_of_words(world, visits):
     page = visits(**SCREEN).context.new_page()
     answer = page.goto(f"{world.base}phone?token=wrong")
     assert answer is not None
@@ -434,7 +430,7 @@ def test_a_wrong_token_leads_to_a_page_of_words(world, visits) -> None:
     assert "token" in page.inner_text("body")
 
 
-def test_the_consoles_page_shows_the_code_to_who_may_drive(world, visits) -> None:
+def test_the_consoles_page_shows_the_code_to_who_may_drive(world, visits):
     page = visits().open(world.drive)
     page.get_by_role("button", name="Phone").click()
     code = page.get_by_role("img", name="Code of the address for phones")
@@ -448,7 +444,7 @@ def test_the_consoles_page_shows_the_code_to_who_may_drive(world, visits) -> Non
     expect(other.get_by_role("button", name="Phone")).to_have_count(0)
 
 
-def test_the_consoles_address_leads_to_the_phones_screens(world, visits) -> None:
+def test_the_consoles_address_leads_to_the_phones_screens(world, visits):
     page = visits(**SCREEN).tab()
     page.goto(f"{world.drive}#/phone/calibration")
     expect(page.get_by_role("heading", name="Calibration", level=1)).to_be_visible()
@@ -456,7 +452,7 @@ def test_the_consoles_address_leads_to_the_phones_screens(world, visits) -> None
     expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
 
 
-def test_who_may_drive_needs_no_second_registration(world, visits) -> None:
+def test_who_may_drive_needs_no_second_registration(world, visits):
     hand = Hand(visits(**SCREEN), world.drive.replace("/?", "/phone?"))
     hand.go("Authentication")
     hand.page.get_by_label("Robot", exact=True).select_option(label="robot-1")

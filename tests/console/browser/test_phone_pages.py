@@ -1,7 +1,5 @@
 """The pages of phones and guards for everyone: sizes, themes, names, weight, no fault for axe."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -53,7 +51,7 @@ def look(page: Page, size: str, scheme: Any) -> tuple[int, int]:
     return width, height
 
 
-def test_every_screen_fits_and_axe_finds_nothing_serious(fake, visits) -> None:
+def test_every_screen_fits_and_axe_finds_nothing_serious(fake, visits):
     hand = Hand(visits(320, 568, has_touch=True, is_mobile=True), fake(*WORLD).phone)
     for name, show in screens(hand):
         show()
@@ -69,7 +67,7 @@ def test_every_screen_fits_and_axe_finds_nothing_serious(fake, visits) -> None:
     hand.leave()
 
 
-def test_the_guards_page_fits_and_axe_finds_nothing_serious(fake, visits) -> None:
+def test_the_guards_page_fits_and_axe_finds_nothing_serious(fake, visits):
     page = visits(320, 568).tab()
     page.goto(fake(*WORLD).phone.replace("/phone?", "/guard?"))
     expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
@@ -87,7 +85,7 @@ def test_the_guards_page_fits_and_axe_finds_nothing_serious(fake, visits) -> Non
     expect(page.get_by_role("heading", name="Who are you?")).to_be_visible()
 
 
-def test_how_to_trust_the_console_can_be_read_by_everybody(fake, visits) -> None:
+def test_how_to_trust_the_console_can_be_read_by_everybody(fake, visits):
     page = visits(320, 568).tab()
     page.goto(f"{fake(*WORLD).base}trust")
     expect(page.get_by_role("heading", name="Trust this console")).to_be_visible()
@@ -95,7 +93,7 @@ def test_how_to_trust_the_console_can_be_read_by_everybody(fake, visits) -> None
     assert faults(page) == []
 
 
-def test_public_names_are_there(fake, visits) -> None:
+def test_public_names_are_there(fake, visits):
     hand = Hand(visits(360, 740, has_touch=True, is_mobile=True), fake(*WORLD).phone)
     page = hand.page
     hand.go("Authentication")
@@ -110,7 +108,7 @@ def test_public_names_are_there(fake, visits) -> None:
     expect(hand.status("Link")).to_have_count(1)
 
 
-def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(fake, visits) -> None:
+def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(fake, visits):
     world = fake(*WORLD)
     answers: list[Response] = []
     page = visits(360, 740).tab()

@@ -1,7 +1,5 @@
 """A phone on the program itself: from the scan to the tables, over modelled and over real links."""
 
-from __future__ import annotations
-
 import re
 import signal
 from collections.abc import Iterator
@@ -48,9 +46,7 @@ def start(hand: Hand) -> None:
 
 
 @pytest.mark.parametrize("links", ["modelled", "real"])
-def test_a_phone_registers_drives_by_tilt_and_is_a_row(
-    visits, programs: Programs, tmp_path: Path, links: str
-) -> None:
+def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_path, links):
     record, out, motion = tmp_path / "run.mcap", tmp_path / "out", tmp_path / "motion"
     words = ("--record", record, "-o", out, "--keep-motion", motion, "--links", links)
     console = programs.start("console", "--no-open", *WORDS, *words)

@@ -1,7 +1,5 @@
 """A recording in a real browser: it plays, stands and jumps, and nobody can be told to act."""
 
-from __future__ import annotations
-
 import functools
 import re
 from collections.abc import Callable, Iterator
@@ -102,7 +100,7 @@ def choose(page: Page, name: str) -> None:
     assert becomes(chosen)
 
 
-def test_a_recording_plays_stands_and_jumps(drilled) -> None:
+def test_a_recording_plays_stands_and_jumps(drilled):
     page = drilled()
     page.get_by_role("button", name="Play").click()
     assert becomes(lambda: shown(page) >= 1)
@@ -128,7 +126,7 @@ def test_a_recording_plays_stands_and_jumps(drilled) -> None:
     assert becomes(lambda: shown(page) > there)
 
 
-def test_nothing_in_it_can_be_told_to_act(drilled) -> None:
+def test_nothing_in_it_can_be_told_to_act(drilled):
     page = drilled()
 
     expect(page.get_by_role("button", name="Emergency stop")).to_have_count(0)
@@ -139,7 +137,7 @@ def test_nothing_in_it_can_be_told_to_act(drilled) -> None:
     expect(page.get_by_role("region", name="Map")).to_be_visible()
 
 
-def test_two_people_see_the_same_moment(drilled) -> None:
+def test_two_people_see_the_same_moment(drilled):
     one, two = drilled(person=1), drilled(person=2)
     one.get_by_role("button", name="Next event").click()
 
@@ -149,7 +147,7 @@ def test_two_people_see_the_same_moment(drilled) -> None:
     expect(two.get_by_role("button", name="Play")).to_be_visible()
 
 
-def test_a_line_of_the_story_leads_to_its_moment(drilled) -> None:
+def test_a_line_of_the_story_leads_to_its_moment(drilled):
     page = drilled("story")
     later = page.get_by_role("list", name="Still to come").get_by_role("button")
     text = later.nth(2).inner_text()
@@ -161,7 +159,7 @@ def test_a_line_of_the_story_leads_to_its_moment(drilled) -> None:
     assert becomes(lambda: shown(page) == 60 * minutes + seconds)
 
 
-def test_the_log_holds_what_was_asked_up_to_the_moment(drilled) -> None:
+def test_the_log_holds_what_was_asked_up_to_the_moment(drilled):
     page = drilled("main")
     rows = page.get_by_role("table", name="Requests").locator("tbody tr")
     position = page.get_by_role("slider", name="Replay position")
@@ -173,7 +171,7 @@ def test_the_log_holds_what_was_asked_up_to_the_moment(drilled) -> None:
     expect(rows.filter(has_text="EventReport")).to_have_count(0)
 
 
-def test_the_camera_shows_a_picture_with_its_age(address, visit, folder: Path) -> None:
+def test_the_camera_shows_a_picture_with_its_age(address, visit, folder):
     page = visit.open(address("replay", folder / "drive.mcap", "--console"), "robots/robot-1")
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("slider", name="Replay position").focus()
@@ -184,8 +182,8 @@ def test_the_camera_shows_a_picture_with_its_age(address, visit, folder: Path) -
 
 
 def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
-    address, visit, folder: Path
-) -> None:
+    address, visit, folder
+):
     page = visit.tab()
     page.goto(address("console", "--results", folder))
     rows = page.get_by_role("table", name="Recordings").locator("tbody tr")
@@ -212,9 +210,7 @@ def test_recordings_of_a_folder_are_a_click_away_and_its_report_runs_no_script(
             assert page.evaluate("document.documentElement.scrollWidth") <= width, name
 
 
-def test_the_audit_log_of_a_recording_is_shown_with_its_chain(
-    address, audited: Path, folder: Path, visit
-) -> None:
+def test_the_audit_log_of_a_recording_is_shown_with_its_chain(address, audited, folder, visit):
     page = visit.open(address("replay", audited, "--console"), "audit")
 
     table = page.get_by_role("table", name="Audit log")

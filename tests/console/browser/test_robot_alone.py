@@ -2,8 +2,6 @@
 client that is none of this program's.
 """
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
@@ -62,8 +60,8 @@ def state(page: Page) -> str:
 
 
 def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_off(
-    tmp_path: Path, visit, programs: Programs
-) -> None:
+    tmp_path, visit, programs
+):
     dva = a_dva(programs)
     robot, page, address = a_robot(programs, visit)
     assert state(page) == "off"
@@ -104,8 +102,8 @@ def test_a_robot_is_registered_opened_driven_by_a_strange_client_and_switched_of
 
 
 def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_meanwhile(
-    tmp_path: Path, visit, programs: Programs
-) -> None:
+    tmp_path, visit, programs
+):
     dva = a_dva(programs)
     robot, page, _ = a_robot(programs, visit, "pibot", "--dva", dva, *QUICK)
     robot.wait_to_say("registered at", "listening on")
@@ -125,7 +123,7 @@ def test_a_robot_that_registers_at_once_is_driven_by_hand_and_busy_for_a_client_
     assert b"answered with code 0" in said
 
 
-def test_a_dva_that_is_not_there_is_told_and_the_robot_stays_off(visit, programs) -> None:
+def test_a_dva_that_is_not_there_is_told_and_the_robot_stays_off(visit, programs):
     nobody = f"127.0.0.1:{two_free_ports('127.0.0.1')}"
     _, page, _ = a_robot(programs, visit, "--set", "request.timeout_s=0.5")
     page.get_by_label("DVA").fill("nowhere")

@@ -1,7 +1,5 @@
 """A robot's windows in a browser: over modelled links, over real ones, with hostile names."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -113,7 +111,7 @@ def driving(page: Page) -> Iterator[None]:
     expect(page.get_by_role("button", name="Take control")).to_be_enabled()
 
 
-def test_the_list_leads_to_the_windows_of_each_robot(shared, console: str) -> None:
+def test_the_list_leads_to_the_windows_of_each_robot(shared, console):
     page = shared(console)
     page.get_by_role("link", name="Robots").click()
     table = page.get_by_role("table", name="Robots")
@@ -127,7 +125,7 @@ def test_the_list_leads_to_the_windows_of_each_robot(shared, console: str) -> No
     expect(page.get_by_role("heading", name="robot-2", level=1)).to_be_visible()
 
 
-def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(opened) -> None:
+def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(opened):
     page = opened()
     with in_hand(page):
         before = spokes(page)
@@ -143,7 +141,7 @@ def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(ope
     expect(page.get_by_role("status", name="Mode")).to_contain_text("Idle")
 
 
-def test_wheels_stand_still_for_who_wants_no_motion_and_the_number_is_there(opened) -> None:
+def test_wheels_stand_still_for_who_wants_no_motion_and_the_number_is_there(opened):
     page = opened()
     page.emulate_media(reduced_motion="reduce")
     with in_hand(page):
@@ -155,7 +153,7 @@ def test_wheels_stand_still_for_who_wants_no_motion_and_the_number_is_there(open
     page.emulate_media(reduced_motion="no-preference")
 
 
-def test_the_slider_drives_by_keys_alone_and_springs_back(opened) -> None:
+def test_the_slider_drives_by_keys_alone_and_springs_back(opened):
     page = opened()
     button = page.get_by_role("button", name="Take manual control")
     assert becomes(lambda: button.is_disabled() or button.press("Enter") or button.is_disabled())
@@ -171,8 +169,8 @@ def test_the_slider_drives_by_keys_alone_and_springs_back(opened) -> None:
 
 
 def test_a_page_that_is_closed_lets_the_robot_stand_and_another_one_sees_why(
-    visit, opened, console: str
-) -> None:
+    visit, opened, console
+):
     driver, other = windows_of(visit.open(console, "robots/robot-1")), opened()
     take(driver)
     driver.keyboard.down("ArrowUp")
@@ -190,8 +188,8 @@ def test_a_page_that_is_closed_lets_the_robot_stand_and_another_one_sees_why(
 
 
 def test_a_robot_in_a_hand_is_busy_for_a_driver_and_a_driven_one_goes_into_no_hand(
-    opened, shared, console: str
-) -> None:
+    opened, shared, console
+):
     hand, driver = opened(), shared(console, "drive", person=2)
     with in_hand(hand):
         driver.get_by_role("button", name="Take control").click()
@@ -204,7 +202,7 @@ def test_a_robot_in_a_hand_is_busy_for_a_driver_and_a_driven_one_goes_into_no_ha
     expect(driver.get_by_role("button", name="Take control")).to_be_enabled()
 
 
-def test_an_emergency_wins_over_the_hand_that_drives(opened, shared, console: str) -> None:
+def test_an_emergency_wins_over_the_hand_that_drives(opened, shared, console):
     hand, other = opened(), shared(console, "drive", person=2)
     take(hand)
     hand.keyboard.down("ArrowUp")
@@ -216,7 +214,7 @@ def test_an_emergency_wins_over_the_hand_that_drives(opened, shared, console: st
     hand.keyboard.up("ArrowUp")
 
 
-def test_the_log_and_the_latency_show_a_drive_in_its_order(opened, shared, console: str) -> None:
+def test_the_log_and_the_latency_show_a_drive_in_its_order(opened, shared, console):
     windows, driver = opened(), shared(console, "drive", person=2)
     log = windows.get_by_role("table", name="Messages")
     with driving(driver), held(driver, "ArrowUp"):
@@ -232,7 +230,7 @@ def test_the_log_and_the_latency_show_a_drive_in_its_order(opened, shared, conso
     assert "0 ok" in log.inner_text()
 
 
-def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(opened) -> None:
+def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(opened):
     page = opened()
     knobs = page.get_by_role("region", name="Faults")
     expect(knobs).to_contain_text("none")
@@ -247,14 +245,14 @@ def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(opened) -> None
     expect(page.locator(".picture-age")).to_have_class(re.compile("fresh"))
 
 
-def test_who_may_look_only_sees_all_and_changes_nothing(visit, addresses) -> None:
+def test_who_may_look_only_sees_all_and_changes_nothing(visit, addresses):
     page = windows_of(visit.open(addresses[1], "robots/robot-1"))
     expect(page.get_by_role("button", name="Take manual control")).to_be_disabled()
     expect(page.get_by_label("Freeze")).to_be_disabled()
     expect(page.get_by_text("This address may only look.")).to_be_visible()
 
 
-def test_over_real_links_all_windows_are_the_same(own_programs: Programs, visit) -> None:
+def test_over_real_links_all_windows_are_the_same(own_programs, visit):
     address, _ = started(own_programs, "--links", "real")
     page = windows_of(visit.open(address, "robots/robot-1"))
     for region in REGIONS:
@@ -268,9 +266,7 @@ def test_over_real_links_all_windows_are_the_same(own_programs: Programs, visit)
     expect(page.get_by_role("table", name="Messages")).to_contain_text("SetTeleOp")
 
 
-def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(
-    own_programs: Programs, visit
-) -> None:
+def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(own_programs, visit):
     address, _ = started(own_programs, "--set", "robot.profile=pibot")
     page = windows_of(visit.open(address, "robots/robot-1"))
     with in_hand(page), held(page, "ArrowUp"):
@@ -280,7 +276,7 @@ def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(
             expect(page.get_by_role("region", name="Top view")).to_contain_text("left")
 
 
-def test_a_name_that_is_hostile_is_shown_as_text(fake, visit) -> None:
+def test_a_name_that_is_hostile_is_shown_as_text(fake, visit):
     address = fake("--robots", "2", "--people", "3", "--site", "office-block", "--hostile").drive
     page = visit.open(address, "robots")
     table = page.get_by_role("table", name="Robots")
@@ -295,9 +291,7 @@ def test_a_name_that_is_hostile_is_shown_as_text(fake, visit) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 1280])
-def test_axe_finds_nothing_serious_and_nothing_is_too_wide(
-    opened, shared, console, scheme, width
-) -> None:
+def test_axe_finds_nothing_serious_and_nothing_is_too_wide(opened, shared, console, scheme, width):
     page = opened(width=width, scheme=scheme)
     assert faults(page) == []
     assert page.evaluate("document.querySelector('.body').scrollWidth") <= width

@@ -1,7 +1,5 @@
 """The program itself: a drive over 500 ms to the fire, whose recording holds; a real link."""
 
-from __future__ import annotations
-
 import re
 import signal
 from collections.abc import Iterator
@@ -29,9 +27,7 @@ def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
     return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
 
 
-def test_of_a_real_link_nothing_can_be_chosen_but_the_robots_computers(
-    visit, programs: Programs
-) -> None:
+def test_of_a_real_link_nothing_can_be_chosen_but_the_robots_computers(visit, programs):
     _, address = started(programs, "--links", "real")
     page = visit.open(address, "network")
 
@@ -46,9 +42,7 @@ def test_of_a_real_link_nothing_can_be_chosen_but_the_robots_computers(
     expect(page.locator(".picture-age")).to_contain_text("old")
 
 
-def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(
-    tmp_path: Path, visit, programs: Programs
-) -> None:
+def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(tmp_path, visit, programs):
     record = tmp_path / "drive.mcap"
     console, address = started(programs, "--record", record, *NEAR_FIRE)
     page = visit.open(address, "drive")

@@ -1,7 +1,5 @@
 """The guided tour, from its button to the person's own two times."""
 
-from __future__ import annotations
-
 from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
@@ -30,7 +28,7 @@ def drive(page: Page, leg: int) -> None:
     page.keyboard.up("ArrowUp")
 
 
-def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, visit) -> None:
+def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, visit):
     page = visit.open(own_world("--robots", "2", "--people", "0")[0].drive, "map")
     tour = page.get_by_role("complementary", name="Tour")
     page.get_by_role("button", name="Take the tour").click()
@@ -51,7 +49,7 @@ def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, vis
     assert distance(page, 0) > 1.5
 
 
-def test_a_leg_can_be_begun_again_from_where_the_robot_is(own_world, visit) -> None:
+def test_a_leg_can_be_begun_again_from_where_the_robot_is(own_world, visit):
     page = visit.open(own_world("--robots", "2", "--people", "0")[0].drive, "map")
     page.get_by_role("button", name="Take the tour").click()
     drive(page, 0)

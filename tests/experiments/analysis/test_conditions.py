@@ -1,7 +1,5 @@
 """A report says in which conditions a request that is sent again has time for its reply."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
@@ -22,39 +20,39 @@ def said(factors: dict[str, list[Any]], treatments: dict[str, Any] | None = None
     return timeout_remark({"drive": SCENARIO}, study).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def test_nine_seconds_are_enough_for_a_second_each_way() -> None:
+def test_nine_seconds_are_enough_for_a_second_each_way():
     text = said({"link.delay_s": [0.0, 1.0]})
     assert unnamed(text, "above four round trips", "every condition (8.05 s") == []
 
 
-def test_conditions_with_too_short_a_time_out_are_named() -> None:
+def test_conditions_with_too_short_a_time_out_are_named():
     """Needed are 0.45, 0.85 and 1.65 s."""
     text = said({"command.timeout_s": [0.6, 1.2, 2.4], "link.delay_s": [0.05, 0.1, 0.2]})
     assert re.search(r"600 ms with .* 200 ms, 400 ms; 1\.2 s with .* 400 ms\. There", text)
     assert "In all others" in text
 
 
-def test_where_all_are_too_short_there_are_no_others() -> None:
+def test_where_all_are_too_short_there_are_no_others():
     text = said({"command.timeout_s": [0.3], "link.delay_s": [0.1]})
     assert re.search(r"300 ms with .* 200 ms", text)
     assert "others" not in text
 
 
-def test_what_a_treatment_changes_counts_only_together() -> None:
+def test_what_a_treatment_changes_counts_only_together():
     """0.6 s stands with 10 ms each way alone, so that it is enough."""
     near = {"command.timeout_s": 0.6, "link.delay_s": 0.01}
     text = said({"place": ["near", "far"]}, {"place": {"near": near, "far": {"link.delay_s": 1.0}}})
     assert text.startswith("The time-out is above")
 
 
-def test_each_direction_counts_with_its_own_delay() -> None:
+def test_each_direction_counts_with_its_own_delay():
     """0.3 s up and 0.1 s down: 1.65 s, and not 0.85 s."""
     factors: dict[str, list[Any]] = {"command.timeout_s": [1.0], "link.delay_s": [0.1]}
     assert "trips of 400 ms" in said(factors | {"link.up.delay_s": [0.3]})
     assert said(factors).startswith("The time-out is above")
 
 
-def test_the_mean_of_a_law_of_processing_counts() -> None:
+def test_the_mean_of_a_law_of_processing_counts():
     law = {"law": "lognormal", "mean_s": 1.0}
     factors: dict[str, list[Any]] = {"place": ["slow"]}
     assert "trips of 0" in said(
@@ -62,11 +60,11 @@ def test_the_mean_of_a_law_of_processing_counts() -> None:
     )
 
 
-def test_where_nobody_asks_nothing_is_said() -> None:
+def test_where_nobody_asks_nothing_is_said():
     assert timeout_remark({"drive": {"link": {"delay_s": 0.1}}}, {}) == ""
 
 
-def test_in_a_range_the_farthest_end_counts() -> None:
+def test_in_a_range_the_farthest_end_counts():
     """Four round trips of 600 ms, and 200 ms."""
     ranges = {"link.delay_s": {"low": 0.0, "high": 0.3}, "link.loss": {"low": 0.0, "high": 0.1}}
     ranges["robot.processing_s"] = {"low": 0.02, "high": 0.2}
@@ -75,7 +73,7 @@ def test_in_a_range_the_farthest_end_counts() -> None:
     assert told.endswith("(2.6\N{NO-BREAK SPACE}s at most).")
 
 
-def test_what_lies_in_a_range_is_said_to_vary() -> None:
+def test_what_lies_in_a_range_is_said_to_vary():
     design = {"sobol": 8, "ranges": {"link.delay_s": {"low": 0.0, "high": 0.3}}}
     factors = keys_of({"factors": {"point": list(range(8))}, "design": design})
     assert ("one-way delay", ["varied"]) in conditions({"drive": SCENARIO}, factors)

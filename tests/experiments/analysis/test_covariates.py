@@ -1,7 +1,5 @@
 """A study's answer adjusted for what is known of persons and trials beforehand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +41,14 @@ def half_width(found: Any) -> float:
     return float((found.high - found.low)[-1] / 2)
 
 
-def test_the_answers_band_is_adjusted_and_shorter() -> None:
+def test_the_answers_band_is_adjusted_and_shorter():
     runs = synthetic_results.columns(rows())
     plain, ours = (finding_of(view_of(study(*names), runs)) for names in ((), ("caution_off",)))
     assert half_width(ours) < 0.7 * half_width(plain)
     assert ours.persons == plain.persons == 30
 
 
-def test_a_covariate_whose_mean_cannot_be_zero_is_left_out_and_told(tmp_path: Path) -> None:
+def test_a_covariate_whose_mean_cannot_be_zero_is_left_out_and_told(tmp_path):
     runs = synthetic_results.columns(rows(shift=3.0))
     view = view_of(study("caution_off"), runs)
     assert view.covariates == ()
@@ -70,13 +68,13 @@ def remark(found: Reading) -> str:
     return told
 
 
-def test_the_report_says_what_it_is_adjusted_for_and_what_that_was_worth(tmp_path: Path) -> None:
+def test_the_report_says_what_it_is_adjusted_for_and_what_that_was_worth(tmp_path):
     many, few = (reading(tmp_path / str(n), rows(persons=n)) for n in (30, 8))
     assert "as long as without" in remark(many)
     assert "too few persons" in remark(few)
 
 
-def test_a_product_of_columns_is_one_covariate() -> None:
+def test_a_product_of_columns_is_one_covariate():
     assert multiplied("caution_off * way_off_m") == ["caution_off", "way_off_m"]
     runs = synthetic_results.columns([row | {"one": 1.0} for row in rows()])
     alone, product = (
@@ -96,25 +94,23 @@ def test_a_product_of_columns_is_one_covariate() -> None:
         ),
     ],
 )
-def test_a_covariate_that_the_runs_do_not_have_is_refused(
-    tmp_path: Path, more: str, said: str
-) -> None:
+def test_a_covariate_that_the_runs_do_not_have_is_refused(tmp_path, more, said):
     with pytest.raises(ConfigError, match=said.replace("*", r"\*")):
         cell_grid.cells(study_in(tmp_path, text=STUDY + more))
 
 
-def test_covariates_without_an_answer_are_refused(tmp_path: Path) -> None:
+def test_covariates_without_an_answer_are_refused(tmp_path):
     bare = STUDY.partition("answer:")[0] + MEASURED + KNOWN
     with pytest.raises(ConfigError, match="adjusted for covariates"):
         study_in(tmp_path, text=bare)
 
 
-def test_a_study_without_covariates_is_the_same_study_as_ever(tmp_path: Path) -> None:
+def test_a_study_without_covariates_is_the_same_study_as_ever(tmp_path):
     assert "covariates" not in study_in(tmp_path).asked()
     assert "covariates" in study_in(tmp_path, text=STUDY + MEASURED + KNOWN).asked()
 
 
-def test_a_study_stops_at_the_interval_that_it_shows() -> None:
+def test_a_study_stops_at_the_interval_that_it_shows():
     asked = load_study("how-late-at-250-ms", ["stop.most_persons=48"])
     found = [
         {

@@ -1,7 +1,5 @@
 """How many robots one person can serve, against cases with a known answer."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -13,29 +11,29 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 
 
-def test_one_robot_alone_is_served_at_once_by_either_theory() -> None:
+def test_one_robot_alone_is_served_at_once_by_either_theory():
     need = Need(neglect=50.0, interaction=10.0)
     assert need.rate_without_waiting(1) == pytest.approx(1 / 60)
     assert need.rate_with_waiting(1) == pytest.approx(1 / 60)
 
 
-def test_the_fan_out_is_how_many_interactions_fit_into_a_cycle() -> None:
+def test_the_fan_out_is_how_many_interactions_fit_into_a_cycle():
     need = Need(neglect=50.0, interaction=10.0)
     assert need.fan_out == pytest.approx(6.0)
     assert [need.rate_without_waiting(n) for n in (3, 6, 9)] == pytest.approx([0.05, 0.1, 0.1])
 
 
-def test_two_machines_and_one_repairman_are_as_in_the_books() -> None:
+def test_two_machines_and_one_repairman_are_as_in_the_books():
     """P(idle) = 1 / (1 + 2r + 2r^2) with r = interaction / neglect: 1 / 5 for r = 1."""
     need = Need(neglect=20.0, interaction=20.0)
     assert need.rate_with_waiting(2) == pytest.approx((1 - 1 / 5) / 20.0)
 
 
-def test_with_very_many_robots_the_operator_is_never_idle() -> None:
+def test_with_very_many_robots_the_operator_is_never_idle():
     assert Need(50.0, 10.0).rate_with_waiting(100) == pytest.approx(0.1)
 
 
-def test_a_queue_with_a_finite_source_is_as_when_it_is_played() -> None:
+def test_a_queue_with_a_finite_source_is_as_when_it_is_played():
     """Six robots, exponential times, one operator: 20,000 s played event by event."""
     need, rng, robots = Need(30.0, 10.0), np.random.default_rng(5), 6
     ready, free, served, now = rng.exponential(30.0, robots), 0.0, 0, 0.0
@@ -69,18 +67,18 @@ class Kept(Results):
         return {n: np.array(v) for n, v in {"events": events, "runs": runs}[name].items()}
 
 
-def test_what_is_closed_before_the_warm_up_is_over_does_not_count() -> None:
+def test_what_is_closed_before_the_warm_up_is_over_does_not_count():
     results, where = Kept(Path(), {}), {"robot.count": 1}
     assert settled_per_person(results, "hall", where, 100.0) == pytest.approx([2 / 300, 1 / 300])
     assert settled_per_person(results, "hall", where, 200.0) == pytest.approx([1 / 200, 1 / 200])
 
 
-def test_interaction_is_from_the_first_sight_to_the_judgement_and_all_else_is_neglect() -> None:
+def test_interaction_is_from_the_first_sight_to_the_judgement_and_all_else_is_neglect():
     need = need_of(Kept(Path(), {}), "hall", {"robot.count": 1}, 100.0)
     assert need.interaction == pytest.approx((10.0 + 20.0 + 5.0) / 3)
     assert need.neglect + need.interaction == pytest.approx(200.0)
 
 
-def test_where_nothing_was_settled_nothing_is_known() -> None:
+def test_where_nothing_was_settled_nothing_is_known():
     with pytest.raises(ConfigError, match="no settled event"):
         need_of(Kept(Path(), {}), "hall", {"robot.count": 9}, 0.0)

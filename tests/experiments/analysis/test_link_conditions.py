@@ -1,7 +1,5 @@
 """A report says what is special about a link, and is silent about what goes without saying."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from dva_sim.experiments.analysis.conditions import conditions
@@ -27,11 +25,11 @@ def told(**link: Any) -> dict[str, list[str]]:
     return {name: value for name, value in rows.items() if name in SPECIAL}
 
 
-def test_a_plain_link_has_nothing_special() -> None:
+def test_a_plain_link_has_nothing_special():
     assert told(delay_s=0.1, loss=0.01) == {}
 
 
-def test_what_is_special_is_told() -> None:
+def test_what_is_special_is_told():
     found = told(
         loss=0.02,
         bursts={"mean_s": 0.1},

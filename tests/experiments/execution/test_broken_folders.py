@@ -1,7 +1,5 @@
 """What a results folder may have come to, and what is said of it: one line each time."""
 
-from __future__ import annotations
-
 import functools
 import os
 import shutil
@@ -29,9 +27,7 @@ def never(job: object) -> kit.Tables:
 
 
 @pytest.mark.parametrize("damage", ["tables/runs.parquet", "manifest.json", "machine.json"])
-def test_what_is_damaged_or_gone_is_made_again_from_the_journal(
-    tmp_path: Path, out: Path, damage: str
-) -> None:
+def test_what_is_damaged_or_gone_is_made_again_from_the_journal(tmp_path, out, damage):
     whole = kit.files(out)
     for change in (lambda file: file.write_bytes(b"PAR1 no more"), Path.unlink):
         change(out / damage)
@@ -42,8 +38,8 @@ def test_what_is_damaged_or_gone_is_made_again_from_the_journal(
 
 @pytest.mark.parametrize("is_dirty", [None, True])
 def test_tables_that_are_written_are_left_alone_unless_the_program_is_being_changed(
-    tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch, is_dirty: bool | None
-) -> None:
+    tmp_path, out, monkeypatch, is_dirty
+):
     state = {"commit": None, "dirty": is_dirty}
     monkeypatch.setattr("dva_sim.experiments.results.manifest.program_state", lambda: state)
     study = kit.study_in(tmp_path)
@@ -62,19 +58,19 @@ def test_tables_that_are_written_are_left_alone_unless_the_program_is_being_chan
     assert kit.files(run_study(study, out, jobs=1, episode=never)) == whole
 
 
-def test_a_damaged_table_is_told_with_its_file(out: Path) -> None:
+def test_a_damaged_table_is_told_with_its_file(out):
     (out / "tables" / "runs.parquet").write_bytes(b"PAR1 no more")
     with pytest.raises(ConfigError, match=r"runs\.parquet: is damaged"):
         Results.load(out).table("runs")
 
 
-def test_a_table_of_other_results_is_no_evidence_for_these(tmp_path: Path, out: Path) -> None:
+def test_a_table_of_other_results_is_no_evidence_for_these(tmp_path, out):
     shutil.copy(out / "tables" / "tracks.parquet", out / "tables" / "runs.parquet")
     with pytest.raises(ConfigError, match="of other results"):
         write_report(out)
 
 
-def test_a_damaged_journal_is_told_with_what_to_do(tmp_path: Path, out: Path) -> None:
+def test_a_damaged_journal_is_told_with_what_to_do(tmp_path, out):
     content = bytearray((out / JOURNAL).read_bytes())
     content[100:3000] = b"\xff" * 2900
     (out / JOURNAL).write_bytes(content)
@@ -83,9 +79,7 @@ def test_a_damaged_journal_is_told_with_what_to_do(tmp_path: Path, out: Path) ->
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
-def test_a_disk_that_fills_up_at_the_manifest_is_told(
-    tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_fills_up_at_the_manifest_is_told(tmp_path, out, monkeypatch):
     whole = kit.files(out)
     (out / "manifest.json").unlink()
 
@@ -99,7 +93,7 @@ def test_a_disk_that_fills_up_at_the_manifest_is_told(
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)) == whole
 
 
-def test_what_a_killed_runner_left_behind_is_removed(tmp_path: Path, out: Path) -> None:
+def test_what_a_killed_runner_left_behind_is_removed(tmp_path, out):
     (out / ".tables-abc").mkdir()
     (out / ".tables-abc" / "runs.duckdb").write_bytes(b"half")
     (out / ".manifest.json.123").write_text("{")
@@ -108,7 +102,7 @@ def test_what_a_killed_runner_left_behind_is_removed(tmp_path: Path, out: Path) 
 
 
 @pytest.mark.system
-def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_told(tmp_path, out):
     """In a mount namespace, since nobody keeps root from writing otherwise."""
     words = ["unshare", "--map-root-user", "--mount"]
     program = (
@@ -147,8 +141,8 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path, out: Path) -> N
 
 
 def test_a_worker_that_was_stopped_is_ended_and_its_runs_are_made_by_another(
-    tmp_path: Path, out: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, out, monkeypatch
+):
     if not Path("/proc/self/stat").exists():
         pytest.skip("this system does not tell which processes are stopped")
     monkeypatch.setattr(scheduling, "_LOOK_S", 0.2)
@@ -169,19 +163,19 @@ def ticks(count: int, limit_s: float) -> None:
             signal.raise_signal(signal.SIGALRM)
 
 
-def test_time_in_which_a_process_was_stopped_does_not_count_as_its_runs() -> None:
+def test_time_in_which_a_process_was_stopped_does_not_count_as_its_runs():
     """A process that was stopped for an hour finds one signal waiting, not 3600."""
     ticks(1, limit_s=3600.0)
     with pytest.raises(scheduling.RunTooLong, match="more than its 60 s"):
         ticks(60, limit_s=60.0)
 
 
-def test_a_dry_run_of_another_study_in_the_folder_is_refused(tmp_path: Path, out: Path) -> None:
+def test_a_dry_run_of_another_study_in_the_folder_is_refused(tmp_path, out):
     with pytest.raises(ConfigError, match="holds another study"):
         dry_run(kit.study_in(tmp_path, "seed=4"), out)
 
 
-def test_the_tables_lock_ends_with_the_runner_that_holds_it(tmp_path: Path, out: Path) -> None:
+def test_the_tables_lock_ends_with_the_runner_that_holds_it(tmp_path, out):
     def full(*_: object) -> None:
         raise DvaSimError("the disk is full")
 

@@ -1,7 +1,6 @@
 import math
 import random
 import sqlite3
-from pathlib import Path
 
 import pytest
 from helpers.studies.small_study import study_in
@@ -17,7 +16,7 @@ def outcome(seed: int, tables: str | None = "{}", error: str | None = None) -> R
     return RunOutcome(("abc", seed), tables, 0.5, error)
 
 
-def test_a_run_kept_twice_is_kept_once_and_as_it_was_first(tmp_path: Path):
+def test_a_run_kept_twice_is_kept_once_and_as_it_was_first(tmp_path):
     with Checkpoint(tmp_path, "me") as one, Checkpoint(tmp_path, "me") as two:
         one.add([outcome(1, '{"runs":[]}')])
         two.add([outcome(1, '{"late":[]}'), outcome(2)])
@@ -26,7 +25,7 @@ def test_a_run_kept_twice_is_kept_once_and_as_it_was_first(tmp_path: Path):
         assert two.costs() == {("abc", 1): 0.5, ("abc", 2): 0.5}
 
 
-def test_floats_come_back_to_the_last_bit(tmp_path: Path):
+def test_floats_come_back_to_the_last_bit(tmp_path):
     job = cell_grid.jobs(study_in(tmp_path))[0]
     luck = random.Random(1)
     values = [luck.uniform(-1, 1) * 10.0 ** luck.randint(-300, 300) for _ in range(200)]
@@ -37,7 +36,7 @@ def test_floats_come_back_to_the_last_bit(tmp_path: Path):
     assert list(map(repr, found)) == list(map(repr, values))
 
 
-def test_a_success_takes_the_place_of_a_failure_but_not_the_reverse(tmp_path: Path):
+def test_a_success_takes_the_place_of_a_failure_but_not_the_reverse(tmp_path):
     with Checkpoint(tmp_path, "me") as journal:
         journal.add([outcome(1, None, "fell"), outcome(2, None, "sank")])
         journal.add([outcome(1)])
@@ -46,19 +45,19 @@ def test_a_success_takes_the_place_of_a_failure_but_not_the_reverse(tmp_path: Pa
         assert journal.done() == {("abc", 1)}
 
 
-def test_a_journal_of_another_study_is_refused(tmp_path: Path):
+def test_a_journal_of_another_study_is_refused(tmp_path):
     Checkpoint(tmp_path, "mine").__exit__(None, None, None)
     with pytest.raises(ConfigError, match=r"another study \(mine, not yours\)"):
         Checkpoint(tmp_path, "yours")
 
 
-def test_a_file_that_is_no_journal_is_refused(tmp_path: Path):
+def test_a_file_that_is_no_journal_is_refused(tmp_path):
     (tmp_path / JOURNAL).write_text("a diary, rather" * 100)
     with pytest.raises(ConfigError, match="not the journal"):
         Checkpoint(tmp_path, "me")
 
 
-def test_a_full_disk_is_told_in_one_line_and_loses_nothing(tmp_path: Path):
+def test_a_full_disk_is_told_in_one_line_and_loses_nothing(tmp_path):
     with Checkpoint(tmp_path, "me") as journal:
         journal.add([outcome(1)])
         journal._db.execute("PRAGMA max_page_count = 1")
@@ -68,7 +67,7 @@ def test_a_full_disk_is_told_in_one_line_and_loses_nothing(tmp_path: Path):
         assert journal.done() == {("abc", 1)}
 
 
-def test_a_journal_held_by_another_program_is_told_in_one_line(tmp_path: Path, monkeypatch):
+def test_a_journal_held_by_another_program_is_told_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr("dva_sim.experiments.execution.checkpoint._PATIENCE_S", 0)
     with Checkpoint(tmp_path, "me") as journal:
         journal._db.execute("PRAGMA busy_timeout = 0")

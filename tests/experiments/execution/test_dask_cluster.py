@@ -1,7 +1,5 @@
 """Runs on a dask cluster of this machine give the same bytes, and what goes wrong is told."""
 
-from __future__ import annotations
-
 import signal
 import socket
 import sqlite3
@@ -33,9 +31,7 @@ def dask(tmp_path: Path) -> Iterator[DaskCluster]:
 
 
 @pytest.mark.system
-def test_a_worker_killed_half_way_loses_and_doubles_nothing(
-    tmp_path: Path, dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_worker_killed_half_way_loses_and_doubles_nothing(tmp_path, dask, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study = kit.study_in(tmp_path)
     plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
@@ -60,11 +56,8 @@ def test_a_worker_killed_half_way_loses_and_doubles_nothing(
 
 @pytest.mark.system
 def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
-    tmp_path: Path,
-    dask: DaskCluster,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, dask, monkeypatch, capfd
+):
     monkeypatch.chdir(tmp_path)
     study = kit.study_in(tmp_path)
     plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
@@ -90,9 +83,7 @@ def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
 
 
 @pytest.mark.system
-def test_a_cluster_nobody_works_or_answers_in_is_told(
-    dask: DaskCluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_cluster_nobody_works_or_answers_in_is_told(dask, monkeypatch):
     with dask_cluster.DaskCluster(dask.address) as place:
         place.look_after(is_idle=True)
         monkeypatch.setattr(dask_cluster, "_WORKERS_S", 0.0)
@@ -107,9 +98,7 @@ def test_a_cluster_nobody_works_or_answers_in_is_told(
 
 
 @pytest.mark.system
-def test_a_worker_with_another_profile_near_it_is_refused(
-    tmp_path: Path, dask: DaskCluster
-) -> None:
+def test_a_worker_with_another_profile_near_it_is_refused(tmp_path, dask):
     phones = tmp_path / "elsewhere" / "agents" / "phones"
     phones.mkdir(parents=True)
     (phones / "default.yaml").write_text("filter: none\n")
@@ -120,7 +109,7 @@ def test_a_worker_with_another_profile_near_it_is_refused(
         )
 
 
-def test_programs_differ_in_what_a_run_depends_on_not_in_their_commit() -> None:
+def test_programs_differ_in_what_a_run_depends_on_not_in_their_commit():
     here = {"dva-sim": "1.0", "fingerprint": "abc", "commit": "123", "dirty": False, "numpy": "2.0"}
     assert dask_cluster.differences(here, here | {"commit": None, "dirty": None}) == ""
     assert dask_cluster.differences(here, here | {"numpy": "1.9"}) == "numpy 1.9 (here 2.0)"
@@ -129,14 +118,12 @@ def test_programs_differ_in_what_a_run_depends_on_not_in_their_commit() -> None:
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.1:8786", "foo://127.0.0.1:1", "tcp://:"])
-def test_an_address_that_is_none_is_refused(tmp_path: Path, address: str) -> None:
+def test_an_address_that_is_none_is_refused(tmp_path, address):
     with pytest.raises(ConfigError, match="should be like tcp://"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler=address)
 
 
-def test_a_scheduler_that_is_not_there_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.01)
     with pytest.raises(ConfigError, match=r"tcp://127\.0\.0\.1:9: nothing"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
@@ -146,9 +133,7 @@ def test_a_scheduler_that_is_not_there_is_told(
     ("says", "told"),
     [(b"HTTP/1.0 400 Bad request\r\n\r\n", "something else"), (b"", r"nothing within 0\.2 s")],
 )
-def test_another_program_is_not_taken_for_a_scheduler(
-    says: bytes, told: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_program_is_not_taken_for_a_scheduler(says, told, monkeypatch):
     monkeypatch.setattr(dask_cluster, "_CONNECT_S", 30.0 if says else 0.2)
     over = threading.Event()
 
@@ -167,18 +152,18 @@ def test_another_program_is_not_taken_for_a_scheduler(
         listener.join()
 
 
-def test_what_to_install_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_to_install_is_told(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ConfigError, match=r"pip install 'dva-sim\[cluster\]'"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
 
 
-def test_processes_and_a_scheduler_exclude_each_other(tmp_path: Path) -> None:
+def test_processes_and_a_scheduler_exclude_each_other(tmp_path):
     with pytest.raises(ConfigError, match="not both"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, scheduler="tcp://127.0.0.1:9")
 
 
-def test_a_run_in_a_thread_of_a_worker_has_its_limit_too() -> None:
+def test_a_run_in_a_thread_of_a_worker_has_its_limit_too():
     from concurrent.futures import ThreadPoolExecutor
 
     def stalls() -> None:
@@ -230,13 +215,13 @@ print(seen.count("call"))
 
 
 @pytest.mark.system
-def test_after_a_limit_in_a_thread_a_profiler_still_gets_on() -> None:
+def test_after_a_limit_in_a_thread_a_profiler_still_gets_on():
     """In a process of its own: it would not come back, and nothing after it either."""
     done = patience.run([sys.executable, "-c", LOOKED_AT], capture_output=True, text=True)
     assert done.stdout.strip() == "2", done.stderr
 
 
-def test_a_run_that_takes_the_limit_for_its_own_is_told_again(tmp_path: Path) -> None:
+def test_a_run_that_takes_the_limit_for_its_own_is_told_again(tmp_path):
     from concurrent.futures import ThreadPoolExecutor
 
     def stubborn(job: object) -> kit.Tables:

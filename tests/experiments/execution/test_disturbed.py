@@ -1,7 +1,5 @@
 """Kills at any moment, two runners at once and full disks: the end is that of a quiet run."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -31,7 +29,7 @@ def told(*words: str | Path) -> dict[str, Any]:
 @pytest.mark.invariant("S9")
 @pytest.mark.soak
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path: Path) -> None:
+def test_a_hundred_kills_at_any_moment_lose_and_double_nothing(tmp_path):
     found = told(*STUDY, "kills", tmp_path)
     assert min(found["call"], found["writing"], found["clock"]) >= kit.KILLS_EACH
     assert found["equal"] == found["ended"] >= 100 // kit.KILLS_A_STUDY
@@ -49,7 +47,7 @@ def mounts_are_allowed(folder: Path) -> bool:
 
 
 @pytest.mark.system
-def test_a_full_disk_is_told_in_one_line_and_nothing_is_lost(tmp_path: Path) -> None:
+def test_a_full_disk_is_told_in_one_line_and_nothing_is_lost(tmp_path):
     if not mounts_are_allowed(tmp_path):
         pytest.skip("this system lets nobody but root mount a small disk")
     found = told(*NAMESPACE, *STUDY, "disk", tmp_path)

@@ -1,22 +1,16 @@
 """The fingerprint of the program: what makes old runs stale, and what does not."""
 
-from __future__ import annotations
-
 from pathlib import Path
-
-import pytest
 
 import dva_sim
 from dva_sim.experiments.study.hashing import _CODE, _WORDS, _code, fingerprint
 
 
-def test_the_fingerprint_stays_while_nothing_changes() -> None:
+def test_the_fingerprint_stays_while_nothing_changes():
     assert fingerprint() == fingerprint()
 
 
-def test_a_profile_in_the_working_folder_changes_it_and_a_page_does_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_profile_in_the_working_folder_changes_it_and_a_page_does_not(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     before = fingerprint()
     phones = tmp_path / "agents" / "phones"
@@ -27,7 +21,7 @@ def test_a_profile_in_the_working_folder_changes_it_and_a_page_does_not(
     assert fingerprint() != before
 
 
-def test_what_is_left_out_of_it_is_imported_by_nothing_that_counts() -> None:
+def test_what_is_left_out_of_it_is_imported_by_nothing_that_counts():
     counted = {name: path.read_text() for name, path in _code(_CODE)}
     assert "simulation/full/measures.py" in counted
     for words in _WORDS:

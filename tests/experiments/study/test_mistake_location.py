@@ -1,7 +1,5 @@
 """Where a mistake is told: at the `--set` that makes it, at its key, or in its file."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.studies.small_study import STUDY, write_study
 from helpers.wording import unnamed

@@ -1,7 +1,5 @@
 """A study that may stop early: the same rounds, and so the same bytes, after any interruption."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,7 @@ def stopped(folder: Path) -> dict[str, Any]:
     return dict(Results.load(folder).manifest["stopped"])
 
 
-def test_a_study_stops_after_the_round_that_is_enough(tmp_path: Path) -> None:
+def test_a_study_stops_after_the_round_that_is_enough(tmp_path):
     study = kit.study_in(tmp_path, text=TEXT)
     out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
     how = stopped(out)
@@ -36,7 +34,7 @@ def test_a_study_stops_after_the_round_that_is_enough(tmp_path: Path) -> None:
     assert set(runs["person"].tolist()) == set(range(3 + 2 * (how["rounds"] - 1)))
 
 
-def test_an_interrupted_study_stops_after_the_same_round(tmp_path: Path) -> None:
+def test_an_interrupted_study_stops_after_the_same_round(tmp_path):
     study = kit.study_in(tmp_path, text=TEXT)
     plain = run_study(study, tmp_path / "plain", jobs=1, episode=steady)
     last = Results.load(plain).manifest["runs"]
@@ -53,14 +51,14 @@ def test_an_interrupted_study_stops_after_the_same_round(tmp_path: Path) -> None
     assert kit.files(out) == kit.files(plain)
 
 
-def test_a_study_that_never_has_enough_runs_all_its_rounds(tmp_path: Path) -> None:
+def test_a_study_that_never_has_enough_runs_all_its_rounds(tmp_path):
     text = TEXT.replace("half_width: 0.1", "half_width: 0.0001").replace("40", "7")
     study = kit.study_in(tmp_path, text=text)
     out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
     assert stopped(out) == {"rounds": 3, "of": 3, "why": None}
 
 
-def test_a_spent_budget_ends_after_a_whole_round_and_stays_ended(tmp_path: Path) -> None:
+def test_a_spent_budget_ends_after_a_whole_round_and_stays_ended(tmp_path):
     study = kit.study_in(tmp_path, text=kit.STUDY + "budget_s: 0.000001\n")
     seen = []
     out = run_study(
@@ -73,7 +71,7 @@ def test_a_spent_budget_ends_after_a_whole_round_and_stays_ended(tmp_path: Path)
     assert json.loads(first["manifest.json"])["status"]["reproducible"] is False
 
 
-def test_a_budget_that_is_not_spent_changes_nothing_but_the_label(tmp_path: Path) -> None:
+def test_a_budget_that_is_not_spent_changes_nothing_but_the_label(tmp_path):
     study = kit.study_in(tmp_path, text=kit.STUDY + "budget_s: 3600\n")
     out = run_study(study, tmp_path / "out", jobs=1, episode=steady)
     assert stopped(out) == {"rounds": 2, "of": 2, "why": None}

@@ -1,7 +1,5 @@
 """A study that is larger than anybody means is refused at once; a large one says what it does."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
 

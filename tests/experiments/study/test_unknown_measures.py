@@ -1,7 +1,5 @@
 """Which measures a scenario can have, and what comes of one that its runs do not hold."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import pytest

@@ -1,7 +1,5 @@
 """What axe-core finds wrong with a page for those who see, hear or move otherwise."""
 
-from __future__ import annotations
-
 import json
 
 from helpers.paths import TESTS

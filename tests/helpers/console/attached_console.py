@@ -1,7 +1,5 @@
 """A console at the DVA of a world that runs in virtual time, and what one does at its page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

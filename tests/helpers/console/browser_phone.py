@@ -1,7 +1,5 @@
 """A phone in a hand: a small screen with touch, a sensor that reads what the test says, taps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

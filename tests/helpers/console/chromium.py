@@ -1,7 +1,5 @@
 """The system's Chromium; `python tests/helpers/console/chromium.py` says whether there is one."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager

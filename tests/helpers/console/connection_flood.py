@@ -4,8 +4,6 @@
 that is cut, and prints a line when all have been opened once. It ends with its standard input.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import contextlib

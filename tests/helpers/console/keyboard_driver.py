@@ -1,7 +1,5 @@
 """Somebody who drives by keys: turns, goes, waits; what they go by is where the robot is."""
 
-from __future__ import annotations
-
 import math
 import time
 from typing import Any

@@ -1,7 +1,5 @@
 """Lines of a log of messages, as the world tells them to the web process."""
 
-from __future__ import annotations
-
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 

@@ -1,7 +1,5 @@
 """A desk with a small team, for tests: what is said to it, what it wants said, and a plain map."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Situations small enough to see: ETA as rows, responders as letters."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Permissions as the DVA gives them: it says so, is asked by the robot, and confirms it."""
 
-from __future__ import annotations
-
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.core.dva import Dva
 from dva_sim.core.sessions import Grant

@@ -1,7 +1,5 @@
 """Days that go wrong: a desk at random among devices that fail, lie, vanish and come back."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """A DVA that says what a test wants it to say, and notes what it is told, in virtual time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Damage that somebody who knows the protocol would do to a message."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from random import Random

@@ -1,7 +1,5 @@
 """What the specification says about bytes, read without the codec: tree, rules, schema, values."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import fields, is_dataclass

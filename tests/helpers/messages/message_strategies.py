@@ -1,7 +1,5 @@
 """One strategy per body: everything the protocol can say, at its bounds too."""
 
-from __future__ import annotations
-
 from hypothesis import strategies as st
 
 from dva_sim.protocol import messages as m

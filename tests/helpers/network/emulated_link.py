@@ -1,7 +1,5 @@
 """What tests of the emulated link need: whether there is one, and who lives because of it."""
 
-from __future__ import annotations
-
 import os
 import select
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """A port for a program that must have the same one again when it is started anew."""
 
-from __future__ import annotations
-
 import random
 import socket
 

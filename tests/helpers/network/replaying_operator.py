@@ -1,7 +1,5 @@
 """An operator who only repeats what one did before: the same messages, nobody who thinks."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager

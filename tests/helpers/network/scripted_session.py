@@ -1,7 +1,5 @@
 """One session of one robot and one scripted operator, in virtual time or over sockets."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial

@@ -4,8 +4,6 @@ What a test says about a `World` it says about virtual time, about sockets, and 
 with keys alike. Nothing here waits for a fixed time where it can wait for a condition.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass

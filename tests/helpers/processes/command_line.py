@@ -4,8 +4,6 @@ To start a program takes a second or more of computing. Only one test of `test_c
 and whoever needs a process that can be stopped: see `programs`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import sys

@@ -1,7 +1,5 @@
 """Another version of the program as a folder, and programs that end with the one that asked."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

@@ -1,7 +1,5 @@
 """How long tests wait for what should take a moment: nothing fails because a machine is busy."""
 
-from __future__ import annotations
-
 import functools
 import subprocess
 import time

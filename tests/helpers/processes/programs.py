@@ -1,7 +1,5 @@
 """The program as users start it, and a list of everything that was started for a test."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import signal

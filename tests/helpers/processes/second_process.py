@@ -1,7 +1,5 @@
 """The same program run twice: in this process, and in one that hashes words otherwise."""
 
-from __future__ import annotations
-
 import io
 import sys
 from contextlib import redirect_stdout

@@ -5,8 +5,6 @@ cache of pytest keeps the figures of each commit that was tested here; before th
 of `cpu_by_room.json` are shown, which `--write-cpu-by-room` writes.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -73,15 +71,16 @@ class Table(Meter):
         self._workers = 0.0
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        room = Path(report.location[0]).relative_to(TESTS.name).parts[0]
-        self._rooms[room] += getattr(report, "cpu_s", 0.0)
+        self._rooms[room_of(report.nodeid)] += getattr(report, "cpu_s", 0.0)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
         self._workers += getattr(node, "workeroutput", {}).get("cpu_s", 0.0)
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        self._rooms[REST] = spent() + self._workers - self._rooms.total()
+        times = os.times()
+        own = self._workers + times.user + times.system if self._workers else spent()
+        self._rooms[REST] = own - self._rooms.total()
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         figures = {room: round(cpu, 2) for room, cpu in self._rooms.items()}
@@ -95,6 +94,12 @@ class Table(Meter):
         if self._config.cache and (here := commits()[:1]):
             kept = [each for each in known.items() if each[0] not in here]
             self._config.cache.set(KEY, dict([*kept, (here[0], figures)][-MOST_KEPT:]))
+
+
+def room_of(nodeid: str) -> str:
+    """The folder below `tests` in which a test lies."""
+    parts = Path(nodeid.partition("::")[0]).parts
+    return parts[1] if parts[:1] == (TESTS.name,) and len(parts) > 1 else REST
 
 
 def commits() -> list[str]:

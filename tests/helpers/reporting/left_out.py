@@ -1,7 +1,5 @@
 """What a run of the tests left out, and how to run it; and how many tests may be skipped."""
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -4,8 +4,6 @@ Run as `python -m disturbed_study kills FOLDER` or `... disk FOLDER` (in a mount
 own); it prints what happened as JSON. Children are forked, so that a kill costs no start.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

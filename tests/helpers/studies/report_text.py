@@ -1,7 +1,5 @@
 """What a reader sees of a report."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ It exists to test figures and reports. Request/reply is made slower as delay gro
 effect the caller knows, so that tests can say what a report must find.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 from pathlib import Path

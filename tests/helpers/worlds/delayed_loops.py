@@ -1,7 +1,5 @@
 """Small closed loops for strategies: what is asked for happens exactly, a delay later."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

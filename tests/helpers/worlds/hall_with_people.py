@@ -1,7 +1,5 @@
 """Bare halls with people in them, in virtual time and in the physics, for tests."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

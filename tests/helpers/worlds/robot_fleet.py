@@ -1,7 +1,5 @@
 """Robots that drive missions in real physics, each with its own map, without any network."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Laws of the delay against what is known of each; bands are four standard errors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a scenario says of its link, felt by who drives over it."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

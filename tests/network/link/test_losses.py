@@ -1,7 +1,5 @@
 """Losses by chance and in bursts against what is known of them; bands are four standard errors."""
 
-from __future__ import annotations
-
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -32,7 +30,7 @@ def runs(lost: list[bool], what: bool) -> list[int]:
     return [length for key, length in found if key is what]
 
 
-def test_bursts_in_time_lose_the_share_asked_for_in_runs_as_long_as_asked_for() -> None:
+def test_bursts_in_time_lose_the_share_asked_for_in_runs_as_long_as_asked_for():
     every, length, share, n = 0.01, 0.2, 0.1, 400_000
     lost = fates(n, every, loss=share, bursts={"mean_s": length})
     bursts = n * every * share / length
@@ -44,7 +42,7 @@ def test_bursts_in_time_lose_the_share_asked_for_in_runs_as_long_as_asked_for() 
     assert np.mean(found) == pytest.approx(expected, abs=4 * expected / len(found) ** 0.5)
 
 
-def test_lengths_of_bursts_have_no_memory() -> None:
+def test_lengths_of_bursts_have_no_memory():
     found = np.array(runs(fates(400_000, 0.01, loss=0.1, bursts={"mean_s": 0.2}), True))
     stays = 1 - 1 / found.mean()
     for length in (5, 10, 20, 40):
@@ -55,7 +53,7 @@ def test_lengths_of_bursts_have_no_memory() -> None:
 
 
 @pytest.mark.parametrize(("inside", "length"), [(1.0, 4.0), (1.0, 1.2), (0.5, 8.0)])
-def test_bursts_of_packets_lose_the_share_asked_for(inside: float, length: float) -> None:
+def test_bursts_of_packets_lose_the_share_asked_for(inside, length):
     n, share = 200_000, 0.05
     bursts = {"mean_packets": length, "loss": inside}
     lost = fates(n, 0.01, loss=share, bursts=bursts)
@@ -69,19 +67,19 @@ def test_bursts_of_packets_lose_the_share_asked_for(inside: float, length: float
         assert np.mean(found) == pytest.approx(length, abs=4 * spread / len(found) ** 0.5)
 
 
-def test_bursts_of_packets_do_not_ask_how_often_one_sends() -> None:
+def test_bursts_of_packets_do_not_ask_how_often_one_sends():
     config = {"loss": 0.1, "bursts": {"mean_packets": 5}}
     assert fates(5000, 0.001, **config) == fates(5000, 1.0, **config)
 
 
-def test_bursts_in_time_are_met_by_all_who_send_then() -> None:
+def test_bursts_in_time_are_met_by_all_who_send_then():
     config = {"loss": 0.2, "bursts": {"mean_s": 0.5}}
     often, seldom = fates(7000, 0.01, **config), fates(1000, 0.07, **config)
     assert seldom == often[::7]
     assert 100 < sum(seldom) < 300
 
 
-def test_a_burst_may_let_some_through() -> None:
+def test_a_burst_may_let_some_through():
     lost = fates(200_000, 0.01, loss=0.1, bursts={"mean_s": 1.0, "loss": 0.5})
     assert np.mean(lost) == pytest.approx(0.1, abs=0.015)
     # After a loss the burst most likely still holds: half of the next packets are lost, too.
@@ -89,11 +87,11 @@ def test_a_burst_may_let_some_through() -> None:
     assert np.mean(after) == pytest.approx(0.5, abs=0.02)
 
 
-def test_bursts_without_a_loss_are_none() -> None:
+def test_bursts_without_a_loss_are_none():
     assert link(loss=0, bursts={"mean_s": 1}).is_ideal()
 
 
-def test_losses_of_one_millisecond_come_in_pairs_as_often_as_chance_has_them() -> None:
+def test_losses_of_one_millisecond_come_in_pairs_as_often_as_chance_has_them():
     line, p, n = link(loss=0.1), 0.1, 20_000
     pairs = [[line.carry(t * 0.01, 100) is None for _ in range(2)] for t in range(n)]
     assert np.mean(pairs) == pytest.approx(p, abs=4 * (p * (1 - p) / (2 * n)) ** 0.5)
@@ -111,6 +109,6 @@ def test_losses_of_one_millisecond_come_in_pairs_as_often_as_chance_has_them() -
         ({"loss": 0.1, "down": {"loss": 0.6}, "bursts": {"mean_s": 1, "loss": 0.5}}, "loss 0.6"),
     ],
 )
-def test_bursts_that_cannot_be_are_refused(config: dict[str, Any], words: str) -> None:
+def test_bursts_that_cannot_be_are_refused(config, words):
     with pytest.raises(ConfigError, match=words):
         validate(LinkConfig, config)

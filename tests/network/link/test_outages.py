@@ -1,7 +1,5 @@
 """When nothing gets through, and to whom."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -25,18 +23,18 @@ def heard(line: Link, times: list[float]) -> list[float]:
 SECONDS = [float(t) for t in range(12)]
 
 
-def test_what_would_cross_during_an_outage_is_lost() -> None:
+def test_what_would_cross_during_an_outage_is_lost():
     line = link(outages=[{"from_s": 3, "for_s": 4}])
     assert heard(line, SECONDS) == [0, 1, 2, 7, 8, 9, 10, 11]
     assert (line.offered, line.lost, line.dropped) == (12, 4, 0)
 
 
-def test_an_outage_may_come_again_and_again() -> None:
+def test_an_outage_may_come_again_and_again():
     line = link(outages=[{"from_s": 2, "for_s": 1.5, "every_s": 5}])
     assert heard(line, SECONDS) == [0, 1, 4, 5, 6, 9, 10, 11]
 
 
-def test_an_outage_may_concern_one_direction_and_several_may_overlap() -> None:
+def test_an_outage_may_concern_one_direction_and_several_may_overlap():
     outages = [
         {"from_s": 2, "for_s": 2, "direction": "up"},
         {"from_s": 3, "for_s": 2, "direction": "down"},
@@ -46,13 +44,13 @@ def test_an_outage_may_concern_one_direction_and_several_may_overlap() -> None:
     assert heard(link("down", outages=outages), SECONDS) == [0, 1, 2, 5, 6, 7, 9, 10, 11]
 
 
-def test_a_packet_is_lost_when_it_would_leave_the_queue_not_when_it_enters_it() -> None:
+def test_a_packet_is_lost_when_it_would_leave_the_queue_not_when_it_enters_it():
     line = link(outages=[{"from_s": 1, "for_s": 2}], rate_bps=8e3, queue_bytes=9000)
     fates = [line.carry(0.5, 1000) is None for _ in range(4)]  # they leave at 1.5, 2.5, 3.5, 4.5
     assert fates == [True, True, False, False]
 
 
-def test_a_train_is_looked_at_packet_by_packet_where_there_are_outages() -> None:
+def test_a_train_is_looked_at_packet_by_packet_where_there_are_outages():
     line = link(outages=[{"from_s": 100, "for_s": 1}])
     assert line.carry_train(0.0, 3, 3000) is None
     assert line.offered == 0
@@ -68,7 +66,7 @@ def parted(source: str, destination: str) -> tuple[Link, Link]:
     return part_links((link("up"), link("down")), source, destination, partitions)
 
 
-def test_a_partition_cuts_one_way_between_some_nodes_only() -> None:
+def test_a_partition_cuts_one_way_between_some_nodes_only():
     gap = [0, 1, 2, 7, 8, 9, 10, 11]
     out, back = parted("operator-2", "robot-1")
     assert (heard(out, SECONDS), heard(back, SECONDS)) == (gap, SECONDS)
@@ -79,7 +77,7 @@ def test_a_partition_cuts_one_way_between_some_nodes_only() -> None:
         assert (heard(out, SECONDS), heard(back, SECONDS)) == (SECONDS, SECONDS)
 
 
-def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others() -> None:
+def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others():
     whole = link("up", rate_bps=8e3, queue_bytes=9000, delay_s=0.5)
     partitions = LinkConfig(partitions=PARTED).partitions  # type: ignore[arg-type]
     mine, _ = part_links((whole, link("down")), "operator-1", "robot-1", partitions)
@@ -95,7 +93,7 @@ def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others() -
     assert not mine.is_ideal()
 
 
-def test_a_partition_of_nobody_is_refused() -> None:
+def test_a_partition_of_nobody_is_refused():
     partitions = LinkConfig(partitions=PARTED).partitions  # type: ignore[arg-type]
     check_partitions(partitions, ["dva", "operator-1", "robot-1"])
     with pytest.raises(ConfigError, match=r"'operator-\*' .*known: "):
@@ -111,6 +109,6 @@ def test_a_partition_of_nobody_is_refused() -> None:
         ("partitions", {"from_s": 1, "for_s": 2, "to": "x"}, "unknown key 'partitions.0.to'"),
     ],
 )
-def test_gaps_that_cannot_be_are_refused(key: str, given: dict[str, Any], words: str) -> None:
+def test_gaps_that_cannot_be_are_refused(key, given, words):
     with pytest.raises(ConfigError, match=words):
         validate(LinkConfig, {key: [given]})

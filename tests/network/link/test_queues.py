@@ -1,7 +1,5 @@
 """Queues in bytes and in packets, per direction; what a link says of itself."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -17,7 +15,7 @@ def link(direction: Any = "up", **config: Any) -> Link:
     return make_link(LinkConfig(**config), direction, Streams(1), "link")
 
 
-def test_a_queue_may_count_packets_with_the_one_under_way() -> None:
+def test_a_queue_may_count_packets_with_the_one_under_way():
     line = link(rate_bps=8e3, queue_packets=3)
     assert [line.carry(0.0, 1000) for _ in range(4)] == [1.0, 2.0, 3.0, None]
     assert line.carry(0.9, 10) is None
@@ -26,26 +24,26 @@ def test_a_queue_may_count_packets_with_the_one_under_way() -> None:
     assert line.backlog_bytes(1.0) == pytest.approx(2010)
 
 
-def test_packets_count_whatever_their_size() -> None:
+def test_packets_count_whatever_their_size():
     small, large = link(rate_bps=8e3, queue_packets=100), link(rate_bps=8e3, queue_packets=100)
     for line, size in ((small, 40), (large, 9000)):
         assert sum(line.carry(0.0, size) is not None for _ in range(150)) == 100
 
 
-def test_a_queue_of_packets_before_a_recorded_link(tmp_path: Any) -> None:
+def test_a_queue_of_packets_before_a_recorded_link(tmp_path):
     path = tmp_path / "slow.up"
     path.write_text("1000\n2000\n")
     line = link(trace_up=str(path), queue_packets=4)
     assert [line.carry(0.0, 1500) is None for _ in range(6)] == [False] * 4 + [True] * 2
 
 
-def test_a_train_does_not_jump_a_queue_that_counts_packets() -> None:
+def test_a_train_does_not_jump_a_queue_that_counts_packets():
     line = link(queue_packets=5)
     assert line.carry_train(0.0, 3, 3000) is None
     assert line.offered == 0
 
 
-def test_each_direction_may_have_its_own_rate_and_queue() -> None:
+def test_each_direction_may_have_its_own_rate_and_queue():
     config = {
         "rate_bps": 8e6,
         "queue_bytes": 5000,
@@ -58,7 +56,7 @@ def test_each_direction_may_have_its_own_rate_and_queue() -> None:
     assert [down.carry(0.0, 1000) is None for _ in range(4)] == [False, False, False, True]
 
 
-def test_a_link_tells_its_rate_and_room(tmp_path: Any) -> None:
+def test_a_link_tells_its_rate_and_room(tmp_path):
     path = tmp_path / "a.up"
     path.write_text("5\n")
     plain, recorded = link(queue_bytes=9000), link(trace_up=str(path))
@@ -77,16 +75,16 @@ def test_a_link_tells_its_rate_and_room(tmp_path: Any) -> None:
         {"up": {"loss": 0.01}},
     ],
 )
-def test_a_link_that_may_lose_or_spread_is_not_ideal(config: dict[str, Any]) -> None:
+def test_a_link_that_may_lose_or_spread_is_not_ideal(config):
     assert not link(**config).is_ideal()
 
 
-def test_a_link_is_ideal_whatever_its_delay_rate_and_queue() -> None:
+def test_a_link_is_ideal_whatever_its_delay_rate_and_queue():
     assert link(delay_s=1.0, rate_bps=1e4, queue_packets=3).is_ideal()
     assert link("down", up={"loss": 0.01}).is_ideal()
     assert not make_link(LinkConfig(), "up", Streams(1), "x", lambda: None).is_ideal()
 
 
-def test_what_no_queue_can_be_is_refused() -> None:
+def test_what_no_queue_can_be_is_refused():
     with pytest.raises(ConfigError, match="queue_packets: "):
         validate(LinkConfig, {"queue_packets": 0})

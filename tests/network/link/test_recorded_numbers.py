@@ -4,11 +4,8 @@ The digests were recorded with the link of version 0.5.0 where nothing is left t
 loss or jitter they are of version 0.6.0, which gave packets of one millisecond luck of their own.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -78,27 +75,27 @@ CASES: dict[str, dict[str, float]] = {
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_a_link_answers_as_it_did(case: str, direction: str) -> None:
+def test_a_link_answers_as_it_did(case, direction):
     settings = LinkConfig(**CASES[case])  # type: ignore[arg-type]
     link = make_link(settings, direction, Streams(7), "robot-1/link")  # type: ignore[arg-type]
     assert digest(link) == RECORDED[f"{case} {direction}"]
 
 
 @pytest.mark.parametrize("case", ["jitter", "crowded"])
-def test_a_radio_link_answers_as_it_did(case: str) -> None:
+def test_a_radio_link_answers_as_it_did(case):
     settings = LinkConfig(**CASES[case])  # type: ignore[arg-type]
     link = make_link(settings, "up", Streams(7), "robot-1/link", Poor)
     assert digest(link) == RECORDED[f"{case} radio"]
 
 
-def test_a_recorded_link_answers_as_it_did(tmp_path: Path) -> None:
+def test_a_recorded_link_answers_as_it_did(tmp_path):
     trace = tmp_path / "seven.up"
     trace.write_text("".join(f"{ms}\n" for ms in range(3, 2001, 7)))
     settings = LinkConfig(trace_up=str(trace), loss=0.02, queue_bytes=6000)
     assert digest(make_link(settings, "up", Streams(7), "robot-1/link")) == RECORDED["trace up"]
 
 
-def test_a_link_made_by_hand_answers_as_it_did() -> None:
+def test_a_link_made_by_hand_answers_as_it_did():
     settings = LinkConfig(delay_s=0.2, jitter_s=0.1, loss=0.2)
     link = Link(settings, ConstantRate(1e6), Streams(3), "line")
     assert digest(link) == RECORDED["by hand"]

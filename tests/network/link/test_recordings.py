@@ -1,7 +1,5 @@
 """Recorded links: packet opportunities, delay logs, what ping prints."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A session beside TCP flows on one line: shapes that every run of it must have."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a sender learns from acknowledgements."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

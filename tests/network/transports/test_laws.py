@@ -1,7 +1,5 @@
 """The laws of rate, with their numbers visible; each is fed by hand."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

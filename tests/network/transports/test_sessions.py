@@ -1,7 +1,5 @@
 """Datagram sessions on a link, one message or a few at a time, with arrivals worked out by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The delay from a picture to its effect: its stages, their sum, and the whole as measured."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

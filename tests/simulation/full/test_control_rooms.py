@@ -1,7 +1,5 @@
 """Control rooms in a run: what they are told, who wins, and a robot in their own hands."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """A drive that is disturbed at a stated moment, and when its operator knows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest
@@ -25,7 +23,7 @@ def disturbed(pattern: str, kind: str, heeds: bool = True, **changes: Any) -> Ru
 @pytest.mark.invariant("S2", "S5")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_who_heeds_refusals_knows_within_two_seconds(pattern: str, kind: str) -> None:
+def test_who_heeds_refusals_knows_within_two_seconds(pattern, kind):
     recording = disturbed(pattern, kind).run()
     row = run_row(recording)
     assert row["driven_on_s"] < 2.0
@@ -37,19 +35,19 @@ def test_who_heeds_refusals_knows_within_two_seconds(pattern: str, kind: str) ->
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
-def test_as_the_document_has_it_nobody_knows_for_long(pattern: str) -> None:
+def test_as_the_document_has_it_nobody_knows_for_long(pattern):
     row = run_row(disturbed(pattern, "revoke", heeds=False).run())
     assert row["driven_on_s"] > 10.0
     assert not row["alerted"]
 
 
-def test_what_is_told_by_the_dva_is_known_at_once_by_every_pattern() -> None:
+def test_what_is_told_by_the_dva_is_known_at_once_by_every_pattern():
     row = run_row(disturbed("pub-sub", "revoke", **{"disturbance.holder_told": True}).run())
     assert row["driven_on_s"] < 0.1
     assert row["drive_outcome"] == "gave up"
 
 
-def test_of_a_run_without_disturbance_nothing_is_measured_of_one() -> None:
+def test_of_a_run_without_disturbance_nothing_is_measured_of_one():
     scenario = scenarios.load("drive-to-event")
     assert "driven_on_s" not in measures_of(scenarios.build(scenario, {}))
     assert "disturbance" not in scenarios.build(scenario, {}).model_dump()
@@ -67,7 +65,7 @@ def until(run: Run, condition: Any, limit: float) -> None:
 
 
 @pytest.mark.invariant("S6")
-def test_a_guard_that_says_ok_and_only_lives_on_holds_no_event() -> None:
+def test_a_guard_that_says_ok_and_only_lives_on_holds_no_event():
     base = {"robot.count": 0, "guard.count": 2, "guard.mobilisation_s": 5, "horizon_s": 200}
     changes = base | {"operator.count": 0, "dispatch.depart_within_s": 60}
     run = Run(scenarios.build(scenarios.load("drive-to-event"), changes), 1)

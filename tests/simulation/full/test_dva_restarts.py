@@ -1,7 +1,5 @@
 """A DVA that is killed while events are open, and started anew from its memory."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What somebody says in the DVA's name, without keys, gives nobody a robot."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 

@@ -1,7 +1,5 @@
 """What is reported and not there, reported twice, or dealt with."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

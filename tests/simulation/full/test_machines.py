@@ -1,7 +1,5 @@
 """What keeps a robot going, or not: power, its drive, a wet floor."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

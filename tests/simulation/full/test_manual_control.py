@@ -1,9 +1,5 @@
 """A robot of a run in somebody's hand: it moves, is stopped, and the audit believes nobody."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import pytest
 from helpers.dva.permissions import enter
 
@@ -62,7 +58,7 @@ def bench() -> InHand:
     return InHand()
 
 
-def test_a_hand_drives_a_robot_and_breaks_no_rule(bench: InHand) -> None:
+def test_a_hand_drives_a_robot_and_breaks_no_rule(bench):
     assert bench.hand.take(HAND).code == m.OK
     assert set(bench.drive(3.0)) == {m.OK}
     assert bench.robot.body.speed == pytest.approx(0.3, abs=0.02)
@@ -73,7 +69,7 @@ def test_a_hand_drives_a_robot_and_breaks_no_rule(bench: InHand) -> None:
 
 
 @pytest.mark.invariant("S1")
-def test_a_hand_that_falls_silent_is_stopped_by_the_watchdog(bench: InHand) -> None:
+def test_a_hand_that_falls_silent_is_stopped_by_the_watchdog(bench):
     bench.hand.take(HAND)
     bench.drive(2.0)
     bench.let(2.5)
@@ -84,14 +80,14 @@ def test_a_hand_that_falls_silent_is_stopped_by_the_watchdog(bench: InHand) -> N
 
 
 @pytest.mark.invariant("S4")
-def test_a_hand_gets_no_more_than_the_motors_limits(bench: InHand) -> None:
+def test_a_hand_gets_no_more_than_the_motors_limits(bench):
     bench.hand.take(HAND)
     bench.drive(4.0, speed=9.0)
     assert bench.robot.body.speed <= 0.5 * 1.02
     assert bench.broken == set()
 
 
-def test_an_emergency_stops_a_hand_for_good(bench: InHand) -> None:
+def test_an_emergency_stops_a_hand_for_good(bench):
     bench.hand.take(HAND)
     bench.drive(2.0)
     bench.asks(m.Emergency())
@@ -165,12 +161,8 @@ def is_driven_by_messages_too(bench: InHand) -> None:
     ],
 )
 def test_a_planted_fault_is_found_by_its_rule_and_without_it_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-    what: str,
-    fault: Callable[..., object],
-    happens: Callable[[InHand], object],
-    rule: str,
-) -> None:
+    monkeypatch, what, fault, happens, rule
+):
     honest = InHand()
     happens(honest)
     honest.let(1.0)
@@ -183,7 +175,7 @@ def test_a_planted_fault_is_found_by_its_rule_and_without_it_nothing(
     assert faulty.broken == {rule}
 
 
-def test_every_fault_is_told_acts_and_leaves_no_trace_when_it_is_undone(bench: InHand) -> None:
+def test_every_fault_is_told_acts_and_leaves_no_trace_when_it_is_undone(bench):
     robot, frames = bench.robot, []
     robot.filmed = lambda _, frame: frames.append(frame)
     bench.run.network.subscribe(OPERATOR, ROBOT, "frame|", lambda _: None)
@@ -217,7 +209,7 @@ def test_every_fault_is_told_acts_and_leaves_no_trace_when_it_is_undone(bench: I
     assert bench.broken == set()
 
 
-def test_who_asks_a_robot_that_drops_its_replies_has_a_time_out(bench: InHand) -> None:
+def test_who_asks_a_robot_that_drops_its_replies_has_a_time_out(bench):
     faults, lost = RobotFaults(bench.robot, lambda robot, reply: lost.append(reply)), []
     device, answers = bench.run.stage.device("operator", 9), []
     faults.drop_replies(True)
@@ -231,7 +223,7 @@ def test_who_asks_a_robot_that_drops_its_replies_has_a_time_out(bench: InHand) -
     assert answers[1].code == m.OK
 
 
-def test_a_frozen_robot_runs_on_to_its_watchdog_and_wakes_up_idle(bench: InHand) -> None:
+def test_a_frozen_robot_runs_on_to_its_watchdog_and_wakes_up_idle(bench):
     faults = RobotFaults(bench.robot)
     bench.hand.take(HAND)
     bench.drive(2.0)

@@ -1,7 +1,5 @@
 """Who repeats what an operator did sends the same, so that the difference is what one costs."""
 
-from __future__ import annotations
-
 import pytest
 from helpers.network.replaying_operator import replay, taped
 
@@ -9,7 +7,7 @@ from dva_sim.simulation import scenario as scenarios
 
 
 @pytest.mark.parametrize("profile", ["default", "dissertation"])
-def test_a_run_with_its_commands_repeated_is_the_same_run(profile: str) -> None:
+def test_a_run_with_its_commands_repeated_is_the_same_run(profile):
     changes = {"pattern": "latest-wins", "phone.profile": profile}
     scenario = scenarios.build(scenarios.load("drive-to-event"), changes)
     tape, full = taped(scenario, 1)

@@ -1,7 +1,5 @@
 """Measures of whole runs that are no matter of one drive."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The audit of the safety rules: for each rule a program with a planted bug that breaks it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """What is known of a run beforehand is the same whatever the treatment, and zero on the average."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

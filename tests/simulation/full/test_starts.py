@@ -1,7 +1,5 @@
 """Robots and guards can begin a given way from the event, wherever it is."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any
@@ -30,13 +28,13 @@ def way_of(run: Run, place: tuple[float, float]) -> float:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_a_guard_begins_as_far_from_the_event_as_it_is_told(seed: int) -> None:
+def test_a_guard_begins_as_far_from_the_event_as_it_is_told(seed):
     guard = {"count": 1, "way_m": 12.0}
     run = Run(drill(guard=guard, **GUARD_ALONE), seed)
     assert way_of(run, run.field.guards[0].walking.place) == pytest.approx(12.0, abs=0.5)
 
 
-def test_robots_begin_as_far_from_the_event_and_apart_from_each_other_and_the_guard() -> None:
+def test_robots_begin_as_far_from_the_event_and_apart_from_each_other_and_the_guard():
     run = Run(drill(robot={"count": 3, "way_m": 9.0}, guard={"count": 1, "way_m": 9.0}), 4)
     bodies = [robot.body for robot in run.field.robots.values()]
     places = [(b.x, b.y) for b in bodies] + [run.field.guards[0].walking.place]
@@ -45,7 +43,7 @@ def test_robots_begin_as_far_from_the_event_and_apart_from_each_other_and_the_gu
     assert min(gaps) >= 1.5
 
 
-def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person() -> None:
+def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person():
     near, far = (
         simulate(drill(guard={"count": 1, "way_m": way}, **GUARD_ALONE), 3) for way in (6.0, 24.0)
     )
@@ -54,12 +52,12 @@ def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person()
     assert 18.0 / 2.2 < times[1] - times[0] < 18.0 / 0.6  # the same mobilisation, the same pace
 
 
-def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is() -> None:
+def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is():
     with pytest.raises(ConfigError, match=r"500 m .*guard-1"):
         Run(drill(guard={"count": 1, "way_m": 500.0}, **GUARD_ALONE), 1)
 
 
-def test_more_robots_and_guards_than_a_plan_has_places_begin_apart_wherever_it_is_free() -> None:
+def test_more_robots_and_guards_than_a_plan_has_places_begin_apart_wherever_it_is_free():
     run = Run(drill(robot={"count": 30}, guard={"count": 20}), 1)
     site, bases, posts = run.stage.site, run.stage.site.robot_bases, run.stage.site.guard_posts
     assert (len(bases), len(posts)) == (30, 20)
@@ -73,18 +71,18 @@ def test_more_robots_and_guards_than_a_plan_has_places_begin_apart_wherever_it_i
         assert min(gaps) >= 1.5
 
 
-def test_a_robot_begins_at_the_same_place_however_many_more_there_are() -> None:
+def test_a_robot_begins_at_the_same_place_however_many_more_there_are():
     few, many = (Run(drill(robot={"count": count}), 1).stage.site for count in (5, 12))
     assert many.robot_bases[:5] == few.robot_bases
 
 
-def test_another_seed_has_other_places_for_robots_without_a_base_of_their_own() -> None:
+def test_another_seed_has_other_places_for_robots_without_a_base_of_their_own():
     one, other = (Run(drill(robot={"count": 5}), seed).stage.site for seed in (1, 2))
     assert one.robot_bases[:3] == other.robot_bases[:3]
     assert one.robot_bases[3:] != other.robot_bases[3:]
 
 
-def test_more_robots_than_fit_are_refused_with_how_many_do() -> None:
+def test_more_robots_than_fit_are_refused_with_how_many_do():
     with pytest.raises(ConfigError, match="900") as refused:
         Run(drill(robot={"count": 900}), 1)
     found = re.search(r"'caparica' .* (\d+) robots", str(refused.value))
@@ -93,23 +91,23 @@ def test_more_robots_than_fit_are_refused_with_how_many_do() -> None:
     assert len(Run(drill(robot={"count": most}), 1).field.robots) == most
 
 
-def test_more_bystanders_than_fit_are_refused_with_how_many_found_a_place() -> None:
+def test_more_bystanders_than_fit_are_refused_with_how_many_found_a_place():
     with pytest.raises(ConfigError, match=r" \d+ bystanders"):
         Run(drill(bystander={"count": 1000}, **GUARD_ALONE, guard={"count": 1}), 1)
 
 
-def test_who_finds_no_place_so_far_from_the_event_is_told_with_how_many_did() -> None:
+def test_who_finds_no_place_so_far_from_the_event_is_told_with_how_many_did():
     with pytest.raises(ConfigError, match=r"robot-\d+; \d+ of the team"):
         Run(drill(robot={"count": 60, "way_m": 9.0}), 1)
 
 
-def test_a_fire_breaks_out_as_far_from_everybody_as_can_be_where_robots_are_everywhere() -> None:
+def test_a_fire_breaks_out_as_far_from_everybody_as_can_be_where_robots_are_everywhere():
     run = Run(drill(robot={"count": 50}), 1)
     place = run.field.incidents[0].hazard.position
     assert min(math.dist(place, (b.x, b.y)) for b in run.stage.site.robot_bases) > 1.0
 
 
-def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their_profile() -> None:
+def test_guards_get_ready_in_the_time_the_scenario_says_with_the_spread_of_their_profile():
     at_once, late = (
         simulate(drill(guard={"count": 1, "mobilisation_s": m}, **GUARD_ALONE), 2)
         for m in (1.0, 90.0)

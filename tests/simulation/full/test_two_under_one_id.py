@@ -1,7 +1,5 @@
 """Two devices under one id: the first keeps it while it is heard, and both sides say so once."""
 
-from __future__ import annotations
-
 from helpers.wording import counted
 
 from dva_sim.simulation import scenario as scenarios
@@ -12,7 +10,7 @@ ROBOT = id_of("robot", 1)
 ELSEWHERE = "10.0.0.66:5600"
 
 
-def test_the_second_robot_of_an_id_is_refused_and_that_is_told_once_at_each_side() -> None:
+def test_the_second_robot_of_an_id_is_refused_and_that_is_told_once_at_each_side():
     run = Run(scenarios.build(scenarios.load("drive-to-event"), {"horizon_s": 120}), 1)
     run.clock.run(10.0)
     second = run.stage.device("robot", 1)

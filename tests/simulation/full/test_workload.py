@@ -1,7 +1,5 @@
 """How busy operators are and how they steer: each measure by a case one can work out by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -24,23 +24,23 @@ def built(**changes: object) -> Scenario:
     return scenarios.build(scenarios.load("drive-to-event"), keys)
 
 
-def test_time_outs_that_nobody_gave_follow_the_link() -> None:
+def test_time_outs_that_nobody_gave_follow_the_link():
     usual, far = built(link__delay_s=1.0), built(link__delay_s=2.0)
     assert (usual.request.timeout_s, usual.command.timeout_s) == (9.0, 9.0)
     assert far.request.timeout_s == far.command.timeout_s == pytest.approx(1.25 * (16 + 0.05))
 
 
-def test_each_direction_and_the_robots_computer_count_for_the_time_out() -> None:
+def test_each_direction_and_the_robots_computer_count_for_the_time_out():
     far = built(link__up={"delay_s": 3.0}, robot__processing_s=2.0)
     assert far.request.timeout_s == pytest.approx(1.25 * (12 + 2))
 
 
-def test_time_outs_that_were_given_stay() -> None:
+def test_time_outs_that_were_given_stay():
     far = built(link__delay_s=2.0, request__timeout_s=5.0, command__timeout_s=4.0)
     assert (far.request.timeout_s, far.command.timeout_s) == (5.0, 4.0)
 
 
-def test_beyond_nine_seconds_of_round_trips_one_still_drives() -> None:
+def test_beyond_nine_seconds_of_round_trips_one_still_drives():
     scenario = built(link__delay_s=1.5)
     assert contradictions(scenario) == []
     recording = simulate(scenario, seed=2)
@@ -109,32 +109,32 @@ def test_beyond_nine_seconds_of_round_trips_one_still_drives() -> None:
         ),
     ],
 )
-def test_what_does_not_go_together_is_told_with_its_key(changes, key, told) -> None:
+def test_what_does_not_go_together_is_told_with_its_key(changes, key, told):
     (one,) = contradictions(built(**changes))
     assert one.startswith(key)
     assert told in one
 
 
 @pytest.mark.parametrize("name", available("experiments/scenarios"))
-def test_shipped_scenarios_do_not_contradict_themselves(name: str) -> None:
+def test_shipped_scenarios_do_not_contradict_themselves(name):
     document = scenarios.load(name)
     if document.data.get("model", "full") == "full":
         assert contradictions(scenarios.build(document)) == []
 
 
-def test_in_a_live_run_the_modelled_link_plays_no_part_and_that_is_said() -> None:
+def test_in_a_live_run_the_modelled_link_plays_no_part_and_that_is_said():
     (one,) = contradictions(built(link__delay_s=5.0), live=True)
     assert one.startswith("link.delay_s: a live run")
 
 
-def test_a_study_tells_each_kind_once_with_the_number_of_configurations() -> None:
+def test_a_study_tells_each_kind_once_with_the_number_of_configurations():
     study = load_study("req-rep-vs-pub-sub", ["link.delay_s=[0, 3, 4]"], version="quick")
     told = contradictions_in(cell_grid.cells(study))
     assert [one.split()[0] for one in told].count("robot.max_age_s") == 1
     assert any("in 4 of 11 configurations" in one for one in told)
 
 
-def test_an_episode_begins_with_the_warning() -> None:
+def test_an_episode_begins_with_the_warning():
     out = Console(file=io.StringIO(), width=200)
     pairs = ["link.delay_s=1.2", "request.timeout_s=9", "horizon_s=20"]
     stories.episode(EpisodeRequest("drive-to-event", 1, pairs), out)
@@ -142,7 +142,7 @@ def test_an_episode_begins_with_the_warning() -> None:
     assert first.startswith("warning: request.timeout_s 9 is below 9.65 s")
 
 
-def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys) -> None:
+def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys):
     path = tmp_path / "late.yaml"
     path.write_text("events: [{kind: fire, at_s: 90}]\nhorizon_s: 60\n")
     assert check([str(path)]) == 0
@@ -151,20 +151,20 @@ def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys) -> None:
     assert second.endswith("scenario: valid")
 
 
-def test_a_live_run_says_it_before_anything_starts() -> None:
+def test_a_live_run_says_it_before_anything_starts():
     out = Console(file=io.StringIO(), width=200)
     live.warn(out, LiveOptions("drive-to-event", ("link.delay_s=0.5",)))
     assert out.file.getvalue().startswith("warning: link.delay_s: a live run")
 
 
-def test_the_dva_heeds_no_sensor_that_no_robot_carries() -> None:
+def test_the_dva_heeds_no_sensor_that_no_robot_carries():
     carried = [{"name": "smoke"}]
     made = built(robot__sensors=carried, dva__sensors=["smoke", "gas"])
     (one,) = contradictions(made)
     assert one.startswith("dva.sensors names 'gas'")
 
 
-def test_what_the_dva_does_beside_is_written_only_where_it_does_something() -> None:
+def test_what_the_dva_does_beside_is_written_only_where_it_does_something():
     usual = built()
     assert "dva" not in usual.model_dump()
     assert built(dva__sensors=["gas"]).model_dump()["dva"]["sensors"] == ("gas",)

@@ -1,7 +1,5 @@
 """Laws of chance: their moments are those of their draws, and draws keep their place."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

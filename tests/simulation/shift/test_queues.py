@@ -1,7 +1,5 @@
 """Queues whose course can be worked out by hand: the desk adds nothing and loses nothing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -33,7 +31,7 @@ def waits(recording: TimedRecording) -> list[float]:
     return (recording.columns["assigned"] - recording.columns["detected"]).round(6).tolist()
 
 
-def test_one_server_that_takes_15_s_falls_5_s_further_behind_with_each_event_every_10_s() -> None:
+def test_one_server_that_takes_15_s_falls_5_s_further_behind_with_each_event_every_10_s():
     recording = play(responders=[{"name": "server", "look": 15}], drain=True)
     assert recording.columns["occurred"].tolist() == [10.0 * k for k in range(1, 11)]
     assert waits(recording) == [5.0 * k for k in range(10)]
@@ -41,7 +39,7 @@ def test_one_server_that_takes_15_s_falls_5_s_further_behind_with_each_event_eve
     assert recording.utilisation(0) == 0.9  # from 10 s to the horizon at 100 s
 
 
-def test_waits_are_those_of_lindley_s_recursion_on_the_same_luck() -> None:
+def test_waits_are_those_of_lindley_s_recursion_on_the_same_luck():
     """W(n+1) = max(0, W(n) + S(n) - A(n)), with services and arrivals as they were drawn.
 
     References:
@@ -64,7 +62,7 @@ def test_waits_are_those_of_lindley_s_recursion_on_the_same_luck() -> None:
     assert np.abs(np.array(waits(recording)) - expected).max() < 1e-2  # microseconds add up
 
 
-def test_the_integral_of_how_many_wait_is_the_sum_of_the_waits() -> None:
+def test_the_integral_of_how_many_wait_is_the_sum_of_the_waits():
     """Little's law as an identity: nothing before the measured time, and nothing after it."""
     recording = play(
         responders=[{"name": "server", "count": 2, "look": {"law": "exponential", "mean_s": 17}}],
@@ -80,7 +78,7 @@ def test_the_integral_of_how_many_wait_is_the_sum_of_the_waits() -> None:
     assert sum(u.busy for u in recording.units) == pytest.approx(recording.served.sum(), abs=1e-3)
 
 
-def test_all_times_twice_as_long_give_responses_twice_as_long() -> None:
+def test_all_times_twice_as_long_give_responses_twice_as_long():
     def run(scale: float) -> TimedRecording:
         return play(
             area={"width_m": 100, "height_m": 50},
@@ -107,7 +105,7 @@ def test_all_times_twice_as_long_give_responses_twice_as_long() -> None:
     assert (one.columns["outcome"] == two.columns["outcome"]).all()
 
 
-def test_the_third_of_three_at_once_finds_no_place_where_one_may_wait() -> None:
+def test_the_third_of_three_at_once_finds_no_place_where_one_may_wait():
     recording = play(
         responders=[{"name": "server", "look": 50}],
         demand=[{"batch": {"count": 3, "at_s": 5}}],
@@ -119,7 +117,7 @@ def test_the_third_of_three_at_once_finds_no_place_where_one_may_wait() -> None:
     assert recording.columns["closed"][2] == 5.0
 
 
-def test_where_nobody_may_wait_what_finds_nobody_free_is_lost_at_once() -> None:
+def test_where_nobody_may_wait_what_finds_nobody_free_is_lost_at_once():
     recording = play(
         responders=[{"name": "server", "look": 25}],
         dispatch={"escalate_after_s": 0},
@@ -131,7 +129,7 @@ def test_where_nobody_may_wait_what_finds_nobody_free_is_lost_at_once() -> None:
     assert recording.count("escalated") == 6
 
 
-def test_an_event_that_waits_20_s_for_somebody_is_escalated_exactly_then() -> None:
+def test_an_event_that_waits_20_s_for_somebody_is_escalated_exactly_then():
     recording = play(
         responders=[{"name": "server", "look": 1000}],
         demand=[{"batch": {"count": 2}}],
@@ -141,7 +139,7 @@ def test_an_event_that_waits_20_s_for_somebody_is_escalated_exactly_then() -> No
     assert recording.count("escalated") == 1
 
 
-def test_who_loses_patience_takes_the_report_back_and_an_event_nobody_was_sent_to_expires() -> None:
+def test_who_loses_patience_takes_the_report_back_and_an_event_nobody_was_sent_to_expires():
     recording = play(
         responders=[{"name": "server", "look": 12}],
         demand=[{"batch": {"count": 3}, "patience": 20}],
@@ -152,7 +150,7 @@ def test_who_loses_patience_takes_the_report_back_and_an_event_nobody_was_sent_t
     assert recording.columns["closed"].tolist() == [12.0, 24.0, 20.0]
 
 
-def test_an_event_that_two_have_reported_is_one_and_expires_when_both_take_it_back() -> None:
+def test_an_event_that_two_have_reported_is_one_and_expires_when_both_take_it_back():
     recording = play(
         responders=[{"name": "server", "look": 1000}],
         demand=[{"batch": {"count": 2}, "patience": 20, "repeats": {"share": 1, "after": 5}}],
@@ -163,7 +161,7 @@ def test_an_event_that_two_have_reported_is_one_and_expires_when_both_take_it_ba
     assert recording.columns["closed"][1] == 20.0
 
 
-def test_reports_of_two_events_near_each_other_are_one_to_the_dva() -> None:
+def test_reports_of_two_events_near_each_other_are_one_to_the_dva():
     """The second shares the first's fate, and nothing is lost."""
     recording = play(
         area={"width_m": 3, "height_m": 3},
@@ -177,7 +175,7 @@ def test_reports_of_two_events_near_each_other_are_one_to_the_dva() -> None:
     assert recording.count("confirmed") == 2
 
 
-def test_severe_events_are_served_first_by_a_policy_that_looks_at_severity() -> None:
+def test_severe_events_are_served_first_by_a_policy_that_looks_at_severity():
     recording = play(
         responders=[{"name": "server", "look": 10}],
         demand=[
@@ -192,7 +190,7 @@ def test_severe_events_are_served_first_by_a_policy_that_looks_at_severity() -> 
     assert by_stream[1].tolist() == [10.0, 20.0]
 
 
-def test_each_of_three_sources_rests_40_s_after_its_event_was_closed() -> None:
+def test_each_of_three_sources_rests_40_s_after_its_event_was_closed():
     recording = play(
         responders=[{"name": "server", "look": 10}],
         demand=[{"sources": {"count": 3, "rest": 40}}],
@@ -202,7 +200,7 @@ def test_each_of_three_sources_rests_40_s_after_its_event_was_closed() -> None:
     assert recording.columns["occurred"].tolist() == [40, 40, 40, 90, 100, 110]
 
 
-def test_a_batch_that_waits_for_the_shift_to_begin_is_decided_as_one() -> None:
+def test_a_batch_that_waits_for_the_shift_to_begin_is_decided_as_one():
     """Times are drawn for each pair; the least sum of them is found over all pairs."""
     travel = {"law": "exponential", "mean_s": 100.0}
     recording = play(
@@ -223,7 +221,7 @@ def test_a_batch_that_waits_for_the_shift_to_begin_is_decided_as_one() -> None:
     assert taken == pytest.approx(cost[linear_sum_assignment(cost)].sum(), abs=1e-4)
 
 
-def test_batches_hold_the_same_sums_as_rows_do() -> None:
+def test_batches_hold_the_same_sums_as_rows_do():
     given = {
         "responders": [{"name": "server", "look": {"law": "exponential", "mean_s": 8}}],
         "demand": [{"between": POISSON}],

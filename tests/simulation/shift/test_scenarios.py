@@ -1,8 +1,5 @@
 """Mistakes in a timed scenario are told where they are, with what would be right."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -66,14 +63,14 @@ ROBOT = {"name": "robot", "kind": "robot"}
         ),
     ],
 )
-def test_a_mistake_is_told_in_one_line(wrong: dict[str, Any], told: str) -> None:
+def test_a_mistake_is_told_in_one_line(wrong, told):
     with pytest.raises(ConfigError) as problem:
         build(GOOD | wrong)
     assert told in str(problem.value)
     assert "\n" not in str(problem.value)
 
 
-def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path: Path) -> None:
+def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path):
     file = tmp_path / "shift.yaml"
     file.write_text(
         "model: timed\nresponders: [{name: guard}]\ndemand:\n"
@@ -85,7 +82,7 @@ def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path: Path) -> None:
     assert "above 0" in str(problem.value)
 
 
-def test_a_wrong_policy_in_a_file_has_its_line(tmp_path: Path) -> None:
+def test_a_wrong_policy_in_a_file_has_its_line(tmp_path):
     file = tmp_path / "shift.yaml"
     file.write_text(
         "model: timed\nresponders: [{name: guard}]\ndemand: [{between: 3}]\n"
@@ -97,31 +94,31 @@ def test_a_wrong_policy_in_a_file_has_its_line(tmp_path: Path) -> None:
     assert "fastest" in str(problem.value)
 
 
-def test_changes_reach_into_lists_by_number() -> None:
+def test_changes_reach_into_lists_by_number():
     scenario = build(GOOD, {"responders.0.count": 3, "demand.0.between": 7, "horizon_s": 60})
     assert scenario.names == ["guard-1", "guard-2", "guard-3"]
     assert scenario.demand[0].between.mean == 7
 
 
 @pytest.mark.parametrize("key", ["responders.4.count", "responders.x.count", "demand.0.kind.x"])
-def test_a_change_of_what_is_not_there_is_refused(key: str) -> None:
+def test_a_change_of_what_is_not_there_is_refused(key):
     with pytest.raises(ConfigError):
         build(GOOD, {key: 1})
 
 
-def test_a_site_with_too_few_posts_is_told_before_anything_runs() -> None:
+def test_a_site_with_too_few_posts_is_told_before_anything_runs():
     scenario = build(GOOD | SITE | {"responders": [{"name": "guard", "base": "post-9"}]})
     with pytest.raises(ConfigError, match="post-9"):
         rehearse_timed(scenario, 1)
 
 
 @pytest.mark.parametrize("never", [None, float("inf")])
-def test_an_event_may_wait_forever(never: float | None) -> None:
+def test_an_event_may_wait_forever(never):
     scenario = build(GOOD | {"dispatch": {"escalate_after_s": never}})
     assert scenario.dispatch.escalate_after_s == never
 
 
-def test_the_oracle_refuses_what_no_plan_of_tours_describes() -> None:
+def test_the_oracle_refuses_what_no_plan_of_tours_describes():
     scenario = build(GOOD | {"dispatch": {"policy": "oracle"}})
     with pytest.raises(ConfigError, match="after: return"):
         rehearse_timed(scenario, 1)

@@ -1,7 +1,5 @@
 """Teams on the ground: who goes, how far, and what everybody does on the way and there."""
 
-from __future__ import annotations
-
 import functools
 import math
 from typing import Any
@@ -98,12 +96,12 @@ def lone_guard(**given: Any) -> dict[str, Any]:
 # --- ways ------------------------------------------------------------------------------
 
 
-def test_fifty_metres_at_2_mps_after_10_s_of_getting_ready_take_35_s() -> None:
+def test_fifty_metres_at_2_mps_after_10_s_of_getting_ready_take_35_s():
     columns = play(lone_guard()).columns
     assert [columns[name][0] for name in TIMES] == [0.0, 0.0, 10.0, 35.0, 40.0, 40.0]
 
 
-def test_one_who_returns_is_busy_until_back_at_base() -> None:
+def test_one_who_returns_is_busy_until_back_at_base():
     demand = [{"batch": {"count": 2}, "zones": {"there": 1}}]
     recording = play(lone_guard(guard={"after": "return"}, demand=demand))
     # There after 35 s, sure after 40 s, back after 65 s; then the same again.
@@ -113,7 +111,7 @@ def test_one_who_returns_is_busy_until_back_at_base() -> None:
     assert recording.units[0].spent["return"] == pytest.approx(50.0, abs=1e-3)
 
 
-def test_one_who_stays_sets_out_from_where_the_last_event_was() -> None:
+def test_one_who_stays_sets_out_from_where_the_last_event_was():
     demand = [
         {"name": "first", "batch": {"count": 1}, "zones": {"there": 1}},
         {"name": "second", "batch": {"count": 1, "at_s": 50}, "zones": {"there": 1}},
@@ -123,7 +121,7 @@ def test_one_who_stays_sets_out_from_where_the_last_event_was() -> None:
     assert recording.columns["arrived"].tolist() == [35.0, 60.0]
 
 
-def test_one_who_is_called_on_the_way_back_turns_around_at_once() -> None:
+def test_one_who_is_called_on_the_way_back_turns_around_at_once():
     demand = [
         {"name": "first", "batch": {"count": 1}, "zones": {"there": 1}},
         {"name": "second", "batch": {"count": 1, "at_s": 50}, "zones": {"there": 1}},
@@ -134,7 +132,7 @@ def test_one_who_is_called_on_the_way_back_turns_around_at_once() -> None:
     assert recording.columns["arrived"][1] == pytest.approx(60.0, abs=1e-3)
 
 
-def test_each_room_of_the_site_is_reached_by_the_planner_s_way() -> None:
+def test_each_room_of_the_site_is_reached_by_the_planner_s_way():
     from dva_sim.worlds.planning import Planner
     from dva_sim.worlds.site import FOOTPRINT, load_site
 
@@ -154,7 +152,7 @@ def test_each_room_of_the_site_is_reached_by_the_planner_s_way() -> None:
         assert site.rooms[columns["zone"][k]].contains(columns["x"][k], columns["y"][k])
 
 
-def test_from_half_way_nine_ways_in_ten_are_as_long_as_the_planner_finds_within_a_tenth() -> None:
+def test_from_half_way_nine_ways_in_ten_are_as_long_as_the_planner_finds_within_a_tenth():
     from dva_sim.simulation.shift.travel import Rooms
 
     rooms = Rooms("caparica", 1, "path")
@@ -171,7 +169,7 @@ def test_from_half_way_nine_ways_in_ten_are_as_long_as_the_planner_finds_within_
     assert np.abs(errors).max() < 0.20
 
 
-def test_turning_the_whole_area_by_a_quarter_changes_no_time() -> None:
+def test_turning_the_whole_area_by_a_quarter_changes_no_time():
     guards = [(5.0, 5.0), (80.0, 20.0), (40.0, 50.0)]
     events = [(10.0, 40.0), (70.0, 55.0), (90.0, 5.0), (33.0, 12.0)]
 
@@ -208,7 +206,7 @@ def test_turning_the_whole_area_by_a_quarter_changes_no_time() -> None:
 # --- what is done there ------------------------------------------------------------------
 
 
-def test_who_has_found_a_fire_deals_with_it_without_getting_ready_again() -> None:
+def test_who_has_found_a_fire_deals_with_it_without_getting_ready_again():
     scenario = lone_guard(guard={"act": 60}, dispatch={"containment": True})
     recording = play(scenario)
     columns = recording.columns
@@ -218,7 +216,7 @@ def test_who_has_found_a_fire_deals_with_it_without_getting_ready_again() -> Non
     assert recording.count("contained") == 1
 
 
-def test_a_robot_looks_while_a_guard_stands_by_outside_and_enters_when_it_is_sure() -> None:
+def test_a_robot_looks_while_a_guard_stands_by_outside_and_enters_when_it_is_sure():
     scenario = lone_guard(
         responders=[
             {"name": "guard", "base": [0, 0], "speed_mps": 2.0, "act": 60},
@@ -240,7 +238,7 @@ def test_a_robot_looks_while_a_guard_stands_by_outside_and_enters_when_it_is_sur
     assert recording.operators == [pytest.approx(columns["confirmed"][0])]
 
 
-def test_who_stands_by_at_a_false_alarm_is_sent_home() -> None:
+def test_who_stands_by_at_a_false_alarm_is_sent_home():
     scenario = lone_guard(
         responders=[
             {"name": "guard", "base": [0, 0], "speed_mps": 2.0, "after": "recall"},
@@ -255,7 +253,7 @@ def test_who_stands_by_at_a_false_alarm_is_sent_home() -> None:
     assert recording.exposure == 0.0
 
 
-def test_a_guard_is_exposed_from_the_danger_radius_on_and_until_out_of_it() -> None:
+def test_a_guard_is_exposed_from_the_danger_radius_on_and_until_out_of_it():
     recording = play(lone_guard())
     hazard = make_hazard("fire", (30.0, 40.0), 0.0)
     exposure = recording.units[0].exposure
@@ -266,14 +264,14 @@ def test_a_guard_is_exposed_from_the_danger_radius_on_and_until_out_of_it() -> N
     assert exposure["leave"] == pytest.approx(hazard.danger_radius(40.0) / 2.0)
 
 
-def test_a_robot_is_never_exposed() -> None:
+def test_a_robot_is_never_exposed():
     robot = {"kind": "robot", "name": "robot"}
     recording = play(lone_guard(guard=robot, operators={"count": 1}))
     assert recording.count("confirmed") == 1
     assert recording.exposure == 0.0
 
 
-def test_one_on_the_way_to_a_small_fire_is_sent_to_a_large_one_near_by() -> None:
+def test_one_on_the_way_to_a_small_fire_is_sent_to_a_large_one_near_by():
     demand = [
         {"name": "small", "batch": {"count": 1}, "zones": {"there": 1}, "severity": 0.1},
         {"name": "large", "batch": {"count": 1, "at_s": 15}, "zones": {"near": 1}, "severity": 1.0},
@@ -285,13 +283,13 @@ def test_one_on_the_way_to_a_small_fire_is_sent_to_a_large_one_near_by() -> None
     assert recording.counters["preempted"] == 1
 
 
-def test_bids_are_kept_where_nothing_disturbs_the_way() -> None:
+def test_bids_are_kept_where_nothing_disturbs_the_way():
     recording = play(lone_guard(dispatch={"policy": "auction"}))
     assert recording.counters["auctions"] == 1
     assert recording.columns["arrived"].tolist() == [35.0]
 
 
-def test_an_idle_guard_is_moved_to_where_events_are_expected() -> None:
+def test_an_idle_guard_is_moved_to_where_events_are_expected():
     stations = [{"name": "far", "at": "there"}, {"name": "near", "at": "near"}]
     scenario = lone_guard(
         guard={"speed_mps": 1.0},
@@ -303,7 +301,7 @@ def test_an_idle_guard_is_moved_to_where_events_are_expected() -> None:
     assert recording.columns["arrived"][0] == pytest.approx(410.0)  # it waits there already
 
 
-def test_lists_of_preference_decide_by_zone() -> None:
+def test_lists_of_preference_decide_by_zone():
     guards = [{"name": "guard", "count": 2, "base": [0, 0], "look": 5}]
     lists = {"there": ["guard-2", "guard-1"], "near": ["guard-1", "guard-2"]}
     demand = [
@@ -322,7 +320,7 @@ def test_lists_of_preference_decide_by_zone() -> None:
 
 
 @pytest.mark.parametrize("policy", known_policies())
-def test_every_policy_meets_the_same_events_and_breaks_no_rule(policy: str) -> None:
+def test_every_policy_meets_the_same_events_and_breaks_no_rule(policy):
     recording = play(MIXED, dispatch__policy=policy)
     same = mixed()
     assert recording.events > 45
@@ -334,7 +332,7 @@ def test_every_policy_meets_the_same_events_and_breaks_no_rule(policy: str) -> N
     )
 
 
-def test_a_look_takes_as_long_whoever_looks_and_whenever() -> None:
+def test_a_look_takes_as_long_whoever_looks_and_whenever():
     look = {"law": "exponential", "mean_s": 30}
     one = play(MIXED, responders__0__look=look, responders__1__look=look)
     other = play(
@@ -356,14 +354,14 @@ print(recording.counters, [dict(u.spent) for u in recording.units])
 """
 
 
-def test_the_same_seed_gives_the_same_bytes_in_two_processes() -> None:
+def test_the_same_seed_gives_the_same_bytes_in_two_processes():
     scenario = MIXED | {"dispatch": {"policy": "random"}}
     here, elsewhere = told_here_and_elsewhere(PROGRAM.format(scenario=scenario))
     assert here == elsewhere
     assert len(here) > 10_000
 
 
-def test_a_further_guard_changes_no_other_guard_s_luck() -> None:
+def test_a_further_guard_changes_no_other_guard_s_luck():
     alone, together = (
         play(lone_guard(guard={"base": "random", "speed_sd_mps": 0.3, "name": "guard-1"})),
         play(
@@ -389,7 +387,7 @@ def test_a_further_guard_changes_no_other_guard_s_luck() -> None:
 # --- a reference that knows the future -------------------------------------------------------
 
 
-def test_who_knows_the_future_needs_no_more_time_in_sum_than_who_does_not() -> None:
+def test_who_knows_the_future_needs_no_more_time_in_sum_than_who_does_not():
     scenario = {
         "model": "timed",
         "area": AREA,
@@ -411,7 +409,7 @@ def test_who_knows_the_future_needs_no_more_time_in_sum_than_who_does_not() -> N
 # --- the shipped shift -----------------------------------------------------------------------
 
 
-def test_the_shipped_shift_loses_no_event_and_breaks_no_rule() -> None:
+def test_the_shipped_shift_loses_no_event_and_breaks_no_rule():
     document = load_yaml("experiments/scenarios/patrol-shift.yaml")
     recording = simulate_timed(build(document, {"horizon_s": 3600}), 1)
     assert not recording.violations

@@ -1,7 +1,5 @@
 """Drives over a recorded link."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

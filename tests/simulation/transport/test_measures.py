@@ -1,7 +1,5 @@
 """What is measured of a session, by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

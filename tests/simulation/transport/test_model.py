@@ -1,7 +1,5 @@
 """The model `transports` as a study and the command line see it."""
 
-from __future__ import annotations
-
 import io
 import math
 

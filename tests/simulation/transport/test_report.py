@@ -1,7 +1,5 @@
 """The report of a study of transports, from SYNTHETIC numbers in which TCP is slower."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -43,7 +43,7 @@ def between() -> Iterator[Pretended]:
     made.close()
 
 
-def test_a_packet_of_either_end_comes_out_at_the_other(between: Pretended) -> None:
+def test_a_packet_of_either_end_comes_out_at_the_other(between):
     between.a.send(PACKET)
     between.b.send(PACKET + b"back")
     between.turn()
@@ -55,7 +55,7 @@ def test_a_packet_of_either_end_comes_out_at_the_other(between: Pretended) -> No
     assert 0 <= told["emu_late_p50_ms"] <= told["emu_late_max_ms"]
 
 
-def test_packets_keep_their_order(between: Pretended) -> None:
+def test_packets_keep_their_order(between):
     for number in range(100):
         between.a.send(PACKET + bytes([number]))
     for _ in range(5):
@@ -63,7 +63,7 @@ def test_packets_keep_their_order(between: Pretended) -> None:
     assert [between.b.recv(100)[-1] for _ in range(100)] == list(range(100))
 
 
-def test_what_is_not_ipv4_is_neither_forwarded_nor_counted(between: Pretended) -> None:
+def test_what_is_not_ipv4_is_neither_forwarded_nor_counted(between):
     between.a.send(b"\x60" + b"." * 39)
     between.turn()
     between.turn()
@@ -72,7 +72,7 @@ def test_what_is_not_ipv4_is_neither_forwarded_nor_counted(between: Pretended) -
     assert between.forwarder.told()["emu_pkts_ab"] == 0
 
 
-def test_a_packet_that_is_not_due_yet_stays_inside() -> None:
+def test_a_packet_that_is_not_due_yet_stays_inside():
     slow = Pretended(delay_s=3600)
     slow.a.send(PACKET)
     slow.turn()
@@ -82,7 +82,7 @@ def test_a_packet_that_is_not_due_yet_stays_inside() -> None:
     slow.close()
 
 
-def test_an_end_that_is_gone_takes_nothing_and_stops_nobody(between: Pretended) -> None:
+def test_an_end_that_is_gone_takes_nothing_and_stops_nobody(between):
     between.a.send(PACKET)
     between.turn()
     between.b.close()
@@ -90,11 +90,11 @@ def test_an_end_that_is_gone_takes_nothing_and_stops_nobody(between: Pretended) 
     assert between.forwarder.told()["emu_pkts_ab"] == 1
 
 
-def test_forwarding_ends_at_its_deadline(between: Pretended) -> None:
+def test_forwarding_ends_at_its_deadline(between):
     assert between.forwarder.run([], deadline=0.0) is None
 
 
-def test_lateness_is_told_in_milliseconds() -> None:
+def test_lateness_is_told_in_milliseconds():
     wires = (
         EmulatedWire(WireConfig(), Streams(1), "ab"),
         EmulatedWire(WireConfig(), Streams(1), "ba"),

@@ -18,14 +18,14 @@ print(notes.read())
 """
 
 
-def test_notes_of_a_process_are_read_after_it_ended() -> None:
+def test_notes_of_a_process_are_read_after_it_ended():
     told = patience.run(
         [sys.executable, "-c", A_PROCESS_NOTES_AND_ENDS], capture_output=True, text=True, check=True
     )
     assert told.stdout == "[(4, 0, 1.5), (8, 3, 2.25)]\n"
 
 
-def test_there_is_no_note_without_room() -> None:
+def test_there_is_no_note_without_room():
     notes = Notes(1)
     notes.add(NoteKind.ALERT, 1, 1.0)
     with pytest.raises(MemoryError, match="more than 1 notes"):

@@ -51,14 +51,14 @@ def relayed() -> Iterator[Relayed]:
     made.close()
 
 
-def test_bytes_cross_in_both_directions_and_in_order(relayed: Relayed) -> None:
+def test_bytes_cross_in_both_directions_and_in_order(relayed):
     payload = os.urandom(50_000)
     assert relayed.carry(relayed.near, relayed.far, payload) == payload
     assert relayed.carry(relayed.far, relayed.near, payload[::-1]) == payload[::-1]
     assert relayed.proxy.told()["emu_pkts_ab"] >= 50_000 / CHUNK_BYTES
 
 
-def test_the_end_of_a_stream_crosses_after_its_bytes(relayed: Relayed) -> None:
+def test_the_end_of_a_stream_crosses_after_its_bytes(relayed):
     relayed.near.sendall(b"last")
     relayed.near.close()
     arrived = b""
@@ -69,7 +69,7 @@ def test_the_end_of_a_stream_crosses_after_its_bytes(relayed: Relayed) -> None:
     assert relayed.far.recv(100) == b""
 
 
-def test_a_full_queue_holds_the_sender_back_and_drops_nothing() -> None:
+def test_a_full_queue_holds_the_sender_back_and_drops_nothing():
     """One chunk at a time over a line of 100 Mbit/s."""
     narrow = Relayed(rate_bps=1e8, queue_pkts=1)
     payload = os.urandom(100_000)
@@ -79,7 +79,7 @@ def test_a_full_queue_holds_the_sender_back_and_drops_nothing() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="programs are tied together as Linux does")
-def test_programs_are_measured_through_the_relay() -> None:
+def test_programs_are_measured_through_the_relay():
     """Fifty milliseconds away and five of service; the first twenty round trips."""
     row = measure(CONDITION, 1, "proxy")
     assert float(row["age_p50"]) >= 55
@@ -88,6 +88,6 @@ def test_programs_are_measured_through_the_relay() -> None:
 
 
 @pytest.mark.parametrize("asked", [{"loss": 0.01}, {"reorder": True}])
-def test_a_relay_does_not_pretend_what_it_cannot_do(asked: dict[str, object]) -> None:
+def test_a_relay_does_not_pretend_what_it_cannot_do(asked):
     with pytest.raises(EmulatorError, match="lose nor reorder"):
         measure(dataclasses.replace(CONDITION, **asked), 1, "proxy")  # type: ignore[arg-type]

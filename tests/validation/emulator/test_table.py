@@ -17,16 +17,16 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "sub" / "own.csv"
 
 
-def test_rows_are_there_as_soon_as_they_are_appended(path: Path) -> None:
+def test_rows_are_there_as_soon_as_they_are_appended(path):
     assert path.read_text() == 'cell,age\none,5\n"two, three",\n'
 
 
-def test_a_table_that_is_opened_again_knows_its_rows(path: Path) -> None:
+def test_a_table_that_is_opened_again_knows_its_rows(path):
     with Table(path, COLUMNS) as table:
         assert table.rows == [{"cell": "one", "age": "5"}, {"cell": "two, three", "age": ""}]
 
 
-def test_half_a_row_of_a_killed_writer_is_cut_off(path: Path) -> None:
+def test_half_a_row_of_a_killed_writer_is_cut_off(path):
     whole = path.read_text()
     for length in range(1, len("three,7")):
         path.write_text(whole + "three,7"[:length])
@@ -35,36 +35,36 @@ def test_half_a_row_of_a_killed_writer_is_cut_off(path: Path) -> None:
         assert path.read_text() == whole
 
 
-def test_half_a_header_is_written_anew(path: Path) -> None:
+def test_half_a_header_is_written_anew(path):
     path.write_text("cell,a")
     with Table(path, COLUMNS) as table:
         assert table.rows == []
     assert path.read_text() == "cell,age\n"
 
 
-def test_two_campaigns_cannot_write_to_one_table(path: Path) -> None:
+def test_two_campaigns_cannot_write_to_one_table(path):
     with Table(path, COLUMNS), pytest.raises(ConfigError, match="by another campaign"):
         Table(path, COLUMNS)
 
 
-def test_another_table_is_not_written_to(path: Path) -> None:
+def test_another_table_is_not_written_to(path):
     with pytest.raises(ConfigError, match="other columns"):
         Table(path, ("cell", "length"))
 
 
-def test_a_place_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(ConfigError, match="cannot be written"):
         Table(tmp_path, COLUMNS)
 
 
-def test_the_machine_stands_beside_the_table(path: Path) -> None:
+def test_the_machine_stands_beside_the_table(path):
     with Table(path, COLUMNS) as table:
         table.sign({"cores": 2, "libzmq": "4.3.5"})
         table.sign({"cores": 2, "libzmq": "4.3.5"})
     assert json.loads(path.with_suffix(".machine.json").read_text())["cores"] == 2
 
 
-def test_rows_of_two_machines_do_not_meet_in_one_table(path: Path) -> None:
+def test_rows_of_two_machines_do_not_meet_in_one_table(path):
     with Table(path, COLUMNS) as table:
         table.sign({"cores": 2, "libzmq": "4.3.5"})
         with pytest.raises(ConfigError, match=r"elsewhere \(cores was 2, is 8\): begin another"):

@@ -18,21 +18,21 @@ def releases(of: EmulatedWire, times: list[float], size: int = 1000) -> list[flo
     return [of.offer(now, size) for now in times]
 
 
-def test_a_packet_leaves_when_it_came_where_nothing_is_set() -> None:
+def test_a_packet_leaves_when_it_came_where_nothing_is_set():
     assert releases(wire(), [1.0, 1.0, 2.5]) == [1.0, 1.0, 2.5]
 
 
-def test_a_packet_comes_out_after_the_delay() -> None:
+def test_a_packet_comes_out_after_the_delay():
     assert releases(wire(delay_s=0.25), [1.0, 2.0]) == [1.25, 2.25]
 
 
-def test_packets_wait_for_one_another_on_a_slow_line() -> None:
+def test_packets_wait_for_one_another_on_a_slow_line():
     """1000 bytes at 80 kbit/s take 0.1 s."""
     out = releases(wire(rate_bps=80e3, delay_s=0.5), [0.0, 0.0, 0.05, 1.0])
     assert out == pytest.approx([0.6, 0.7, 0.8, 1.6])
 
 
-def test_a_packet_that_finds_the_queue_full_is_dropped() -> None:
+def test_a_packet_that_finds_the_queue_full_is_dropped():
     """Of two places one is taken by the packet that is being sent."""
     slow = wire(rate_bps=80e3, queue_pkts=2)
     assert releases(slow, [0.0, 0.0, 0.0]) == [pytest.approx(0.1), pytest.approx(0.2), None]
@@ -40,7 +40,7 @@ def test_a_packet_that_finds_the_queue_full_is_dropped() -> None:
     assert (slow.counts.offered, slow.counts.lost, slow.counts.tail) == (4, 0, 1)
 
 
-def test_a_lost_packet_has_used_the_line() -> None:
+def test_a_lost_packet_has_used_the_line():
     certain = wire(rate_bps=80e3, loss=0.9)
     out = releases(certain, [0.0] * 50)
     arrived = [round(at / 0.1) for at in out if at is not None]
@@ -48,7 +48,7 @@ def test_a_lost_packet_has_used_the_line() -> None:
     assert all(at == pytest.approx(0.1 * place) for place, at in enumerate(out, 1) if at)
 
 
-def test_each_packet_is_lost_by_itself() -> None:
+def test_each_packet_is_lost_by_itself():
     """Within three sigma: the share, and the share of losses that follow a loss."""
     lost = np.array([at is None for at in releases(wire(loss=0.1), [0.0] * MANY)])
     assert abs(lost.mean() - 0.1) < 3 * math.sqrt(0.1 * 0.9 / MANY)
@@ -56,7 +56,7 @@ def test_each_packet_is_lost_by_itself() -> None:
     assert abs(after.mean() - 0.1) < 3 * math.sqrt(0.1 * 0.9 / len(after))
 
 
-def test_losses_in_bursts_keep_their_share_and_their_length() -> None:
+def test_losses_in_bursts_keep_their_share_and_their_length():
     """Runs of 5 on average: a loss follows a loss with 4/5, within three sigma.
 
     The share of a chain of two states has 1 + r over 1 - r times the variance of single
@@ -70,7 +70,7 @@ def test_losses_in_bursts_keep_their_share_and_their_length() -> None:
     assert abs(lost.mean() - 0.1) < 3 * sigma
 
 
-def test_jitter_is_uniform_around_the_delay() -> None:
+def test_jitter_is_uniform_around_the_delay():
     """Packets a second apart: no two wait for one another. Mean and spread within 3 sigma."""
     times = [float(second) for second in range(MANY)]
     out = releases(wire(delay_s=0.1, jitter_s=0.02), times)
@@ -81,7 +81,7 @@ def test_jitter_is_uniform_around_the_delay() -> None:
     assert delays.std() == pytest.approx(0.02 / math.sqrt(3), rel=0.02)
 
 
-def test_packets_overtake_only_where_they_may() -> None:
+def test_packets_overtake_only_where_they_may():
     times = [0.001 * step for step in range(1000)]
     ordered = releases(wire(delay_s=0.1, jitter_s=0.02), times)
     assert ordered == sorted(ordered, key=lambda at: at or 0.0)
@@ -89,13 +89,13 @@ def test_packets_overtake_only_where_they_may() -> None:
     assert free != sorted(free, key=lambda at: at or 0.0)
 
 
-def test_the_same_seed_has_the_same_luck_and_another_one_another() -> None:
+def test_the_same_seed_has_the_same_luck_and_another_one_another():
     times = [0.01 * step for step in range(200)]
     first, again, other = (wire(seed, loss=0.3, delay_s=1, jitter_s=1) for seed in (1, 1, 2))
     assert releases(first, times) == releases(again, times) != releases(other, times)
 
 
-def test_jitter_does_not_change_which_packets_are_lost() -> None:
+def test_jitter_does_not_change_which_packets_are_lost():
     lost = [
         [at is None for at in releases(wire(loss=0.3, delay_s=1, jitter_s=jitter), [0.0] * 100)]
         for jitter in (0.0, 0.5)
@@ -103,14 +103,14 @@ def test_jitter_does_not_change_which_packets_are_lost() -> None:
     assert lost[0] == lost[1]
 
 
-def test_the_backlog_empties_as_packets_leave() -> None:
+def test_the_backlog_empties_as_packets_leave():
     """1000 bytes at 64 kbit/s take an eighth of a second."""
     slow = wire(rate_bps=64e3)
     releases(slow, [0.0, 0.0, 0.0])
     assert [slow.backlog(now) for now in (0.0, 0.125, 0.3, 0.375)] == [3, 2, 1, 0]
 
 
-def test_a_condition_sets_both_directions() -> None:
+def test_a_condition_sets_both_directions():
     condition = Condition("pub", 10, delay_ms=100, jitter_frac=0.2, loss=0.05, rate_kbit=64)
     config = WireConfig.of(condition)
     assert (config.delay_s, config.jitter_s) == (pytest.approx(0.1), pytest.approx(0.02))

@@ -1,7 +1,5 @@
 """When detectors sound, and which one first."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """What heat, smoke, gas and water do to people, by the numbers of the standards."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Gas in the air, against what can be worked out by hand: puffs, walls, fresh air, draughts."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every kind of hazard promises, and what a fire is in the open."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

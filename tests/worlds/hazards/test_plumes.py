@@ -1,7 +1,5 @@
 """Gas outdoors: how wide puffs and plumes are, and that nothing of them is lost."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -15,12 +13,12 @@ AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0} 
 
 
 @pytest.mark.parametrize(("stability", "metres"), AT_1_KM.items())
-def test_a_kilometre_off_a_plume_is_as_wide_as_martin_says(stability: str, metres: float) -> None:
+def test_a_kilometre_off_a_plume_is_as_wide_as_martin_says(stability, metres):
     assert sigma_y(stability, 1000.0) == pytest.approx(metres, rel=1e-9)
     assert sigma_y(stability, 2000.0) == pytest.approx(metres * 2.0**0.894)
 
 
-def test_the_widths_are_those_of_the_target_file() -> None:
+def test_the_widths_are_those_of_the_target_file():
     if not TARGETS.is_file():
         pytest.skip("the file of published numbers is not beside the project")
     checks = {check["id"]: check for check in json.loads(TARGETS.read_text())["checks"]}
@@ -29,15 +27,15 @@ def test_the_widths_are_those_of_the_target_file() -> None:
 
 
 @pytest.mark.parametrize("stability", CLASSES)
-def test_both_halves_of_a_height_meet_at_a_kilometre(stability: str) -> None:
+def test_both_halves_of_a_height_meet_at_a_kilometre(stability):
     near, far = sigma_z(stability, 1000.0), sigma_z(stability, 1000.001)
     assert near == pytest.approx(far, rel=0.03)
 
 
 @pytest.mark.parametrize("stability", CLASSES)
 def test_nearer_than_a_hundred_metres_the_height_of_a_plume_is_proportional_to_the_distance(
-    stability: str,
-) -> None:
+    stability,
+):
     """The fit holds from 0.1 km on; below it is a straight line from the leak."""
     at_100 = sigma_z(stability, 100.0)
     assert sigma_z(stability, 100.001) == pytest.approx(at_100, rel=1e-4)
@@ -46,14 +44,14 @@ def test_nearer_than_a_hundred_metres_the_height_of_a_plume_is_proportional_to_t
     assert plume(0.01, 2.0, stability, 1e-3, 0.0, 0.0) == 1.0  # pure gas at the leak
 
 
-def test_the_stabler_the_air_the_narrower_the_plume() -> None:
+def test_the_stabler_the_air_the_narrower_the_plume():
     for distance in (20.0, 100.0, 500.0, 3000.0):
         widths = [sigma_y(c, distance) for c in "ABCDEF"]
         assert widths == sorted(widths, reverse=True)
         assert min(sigma_z(c, distance) for c in "ABCDEF") > 0.0
 
 
-def test_through_every_section_of_a_plume_goes_what_is_set_free() -> None:
+def test_through_every_section_of_a_plume_goes_what_is_set_free():
     """0.01 m3/s in a wind of 2 m/s, class D, 200 m off."""
     across, up = sigma_y("D", 200.0), sigma_z("D", 200.0)
     ys, zs = np.linspace(-6 * across, 6 * across, 121), np.linspace(0.0, 6 * up, 121)

@@ -1,7 +1,5 @@
 """Smoke under ceilings, against correlations of fire engineering and the books of what burns."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Water that fills rooms and finds the doors."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -25,14 +23,14 @@ def rooms(areas: list[float], doors: list[tuple[int, int, float]]) -> Spaces:
     )
 
 
-def test_a_closed_room_is_as_deep_as_inflow_times_time_over_area() -> None:
+def test_a_closed_room_is_as_deep_as_inflow_times_time_over_area():
     """2 L/s on 40 m2 for ten minutes: 30 mm."""
     filling = Filling(rooms([40.0], []), 0, 2e-3)
     water = March(filling.dry(), filling.step).at(600.0)
     assert water[0] / 40.0 == pytest.approx(0.030, rel=1e-9)
 
 
-def test_water_is_in_the_rooms_or_has_run_out() -> None:
+def test_water_is_in_the_rooms_or_has_run_out():
     doors = [(0, 1, 1.0), (1, 2, 1.2), (2, 3, 0.9), (0, 3, 1.0)]  # 3 is outdoors
     filling = Filling(rooms([30.0, 60.0, 20.0], doors), 1, 0.05)
     march = March(filling.dry(), filling.step)
@@ -43,7 +41,7 @@ def test_water_is_in_the_rooms_or_has_run_out() -> None:
     assert march.at(1800.0)[3] > 10.0
 
 
-def test_two_rooms_come_to_one_level() -> None:
+def test_two_rooms_come_to_one_level():
     """3 m3 in a room of 30 m2; behind a level door lie 60 m2: both end 33 mm deep."""
     filling = Filling(rooms([30.0, 60.0], [(0, 1, 1.0)]), 0, 0.0, sill=0.0)
     march = March(np.array([3.0, 0.0, 0.0]), filling.step)
@@ -53,7 +51,7 @@ def test_two_rooms_come_to_one_level() -> None:
     assert depths[-1] == pytest.approx([1 / 30, 1 / 30], rel=1e-3)
 
 
-def test_a_sill_keeps_water_back_until_it_is_full() -> None:
+def test_a_sill_keeps_water_back_until_it_is_full():
     """10 mm on 40 m2 are 0.4 m3: the other room stays dry for 200 s at 2 L/s."""
     filling = Filling(rooms([40.0, 40.0], [(0, 1, 1.0)]), 0, 2e-3, sill=0.01)
     march = March(filling.dry(), filling.step)
@@ -61,7 +59,7 @@ def test_a_sill_keeps_water_back_until_it_is_full() -> None:
     assert march.at(240.0)[1] > 0.0
 
 
-def test_a_weir_lets_through_1_7_times_width_times_head_to_one_and_a_half() -> None:
+def test_a_weir_lets_through_1_7_times_width_times_head_to_one_and_a_half():
     """(2/3)^1.5 sqrt(g) = 1.705: 0.1 m over 1.2 m are 65 L/s, none if it is as deep behind."""
     head, width = np.array([0.1, 0.1, 0.0, 0.1]), np.full(4, 1.2)
     flow = over_weir(head, np.array([-1.0, 0.1, -0.1, 0.05]), width)
@@ -70,7 +68,7 @@ def test_a_weir_lets_through_1_7_times_width_times_head_to_one_and_a_half() -> N
     assert flow[3] / flow[0] == pytest.approx((1 - 0.5**1.5) ** 0.385)
 
 
-def test_in_the_end_a_door_lets_out_as_much_as_comes() -> None:
+def test_in_the_end_a_door_lets_out_as_much_as_comes():
     filling = Filling(rooms([30.0], [(0, 1, 1.0)]), 0, 0.01, sill=0.02)
     depth = March(filling.dry(), filling.step).at(7200.0)[0] / 30.0
     assert depth == pytest.approx(0.02 + (0.01 / 1.705) ** (2 / 3), rel=1e-3)
