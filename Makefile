@@ -9,7 +9,7 @@ BENCH := $(VENV)/.bench
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-soak tools check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-long test-soak tools check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -36,7 +36,7 @@ test: $(DEV)  ## the tests that are quick, which are nearly all
 	@echo "Running the quick tests ..."
 	@$(PYTEST) --cpu-by-room -m "not system and not soak and not browser"
 
-test-all: test-browser check test test-system  ## what must pass: all but the long tests; make -j2 does two at a time
+test-all: test-browser check test test-system test-long  ## what must pass; make -j2 does two at a time
 
 test-contract: $(DEV)  ## what every transport promises, in virtual time and over sockets
 	@$(PYTEST) -m contract
@@ -50,7 +50,11 @@ test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@echo "Running the tests in a browser ..."
 	@$(PYTEST) tests/console/browser
 
-test-soak: $(DEV)  ## long tests, and searches of 20 times as many cases, new ones each time
+test-long: $(DEV)  ## long searches and whole studies, the same cases each time
+	@echo "Running the long tests ..."
+	@$(PYTEST) -m soak
+
+test-soak: $(DEV)  ## the same and all searches with 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
 
 tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript

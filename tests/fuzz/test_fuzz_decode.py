@@ -63,10 +63,9 @@ def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
 )
 def test_the_search_finds_a_fault_put_into_the_decoder(tmp_path, file, right, wrong):
     broken = tmp_path / "broken"
-    for folder in ("dva_sim", "protocol", "tests/fuzz"):
+    for folder in ("dva_sim", "protocol", "tests/fuzz", "tests/helpers"):
         shutil.copytree(ROOT / folder, broken / folder)
-    for file_needed in [ROOT / "pyproject.toml", *(ROOT / "tests").glob("message_*.py")]:
-        shutil.copy(file_needed, broken / file_needed.relative_to(ROOT))
+    shutil.copy(ROOT / "pyproject.toml", broken)
     path = broken / "dva_sim" / "protocol" / file
     assert right in path.read_text()
     path.write_text(path.read_text().replace(right, wrong))

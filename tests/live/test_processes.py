@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from helpers.processes.command_line import call
 from helpers.processes.programs import Program, wait_until
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.decision_log import replay
 from dva_sim.protocol import messages as m
@@ -107,7 +108,8 @@ def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_don
     story, told = [line for line in run.said.splitlines() if "S3 broken" in line]
     assert re.fullmatch(r" +\d+\.\d s  robot-1 +S3 broken: obeys a command after an .*", story)
     assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: obeys a command after an .*", told)
-    assert run.complained == ["error: the run has broken S3"]
+    (complaint,) = run.complained  # on a busy machine S1, too: it moves for longer than allowed
+    assert unnamed(complaint, "S3") == []
     ended = call("check", tmp_path / "run.mcap")
     assert ended.returncode == 1
     assert f"run.mcap: {told}" in ended.stdout
