@@ -11,8 +11,9 @@ for annotations and f-strings. Its rank is the SHA-256 of its name. Each room gi
 of lowest rank: one, and more in proportion to how many it has.
 
 The tests that should notice are those of `make test` in the room of the fault, those that bear the
-name of its module first. Two copies of the working tree are at work side by side; a fault counts
-as noticed if a test fails, or if they all take longer than `PATIENCE_S`.
+name of its module first. Two copies of the working tree are at work side by side. A fault counts
+as noticed if a test fails with it, by itself too, and passes without it; or if pytest breaks down
+or takes longer than `PATIENCE_S`. For another commit run this file in a work tree of that commit.
 """
 
 import argparse
@@ -28,18 +29,20 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+import pytest
 from helpers.paths import ROOT
 
 MUTANTS = 60
 SIDE_BY_SIDE = 2
 PATIENCE_S = 900.0
+NOTHING_FAILED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 QUICK = "not system and not soak and not browser"  # as `make test` has it
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", re.MULTILINE)
 
@@ -285,14 +288,46 @@ def copy_of_the_tree(root: Path) -> None:
 
 
 def notice(mutant: Mutant, root: Path) -> str:
-    """Which test noticed a fault that is planted in a copy; empty if none did."""
-    kept = (root / mutant.file).read_bytes()
-    (root / mutant.file).write_bytes(mutant.in_place(kept))
-    for compiled in (root / mutant.file).parent.glob("__pycache__/*"):
+    """Which test noticed a fault that is planted in a copy; empty if none did.
+
+    It fails with the fault and passes without it, each time by itself; others are left out.
+    """
+    left_out = list[str]()
+    while True:
+        with planted(mutant, root):
+            code, failed = outcome(root, *nearest_tests(mutant, root), left_out=left_out)
+            fails_alone = bool(failed) and outcome(root, failed)[0] != 0
+        if not failed:
+            return "" if code in NOTHING_FAILED else f"pytest ended with {code}"
+        if fails_alone and outcome(root, failed)[0] == 0:
+            return failed
+        left_out.append(failed)
+
+
+@contextmanager
+def planted(mutant: Mutant, root: Path) -> Iterator[None]:
+    """A fault is in a copy for a while."""
+    file = root / mutant.file
+    kept = file.read_bytes()
+    put(file, mutant.in_place(kept))
+    try:
+        yield
+    finally:
+        put(file, kept)
+
+
+def put(file: Path, source: bytes) -> None:
+    """Write a module, of which nothing compiled is left."""
+    file.write_bytes(source)
+    for compiled in file.parent.glob(f"__pycache__/{file.stem}.*"):
         compiled.unlink()
-    pytest = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-m", QUICK]
+
+
+def outcome(root: Path, *tests: str, left_out: Sequence[str] = ()) -> tuple[int, str]:
+    """With which code pytest ends, and which test was the first to fail."""
+    words = [*("-m", QUICK), *(f"--deselect={test}" for test in left_out)]
     program = subprocess.Popen(
-        [*pytest, *nearest_tests(mutant, root)],
+        [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", *words, *tests],
         cwd=root,
         env=os.environ | {"PYTHONPATH": str(root)},
         stdin=subprocess.DEVNULL,
@@ -304,14 +339,10 @@ def notice(mutant: Mutant, root: Path) -> str:
     try:
         told, _ = program.communicate(timeout=PATIENCE_S)
     except subprocess.TimeoutExpired:
-        told = "FAILED (all together: not within patience)"
+        told = ""
     finally:
-        (root / mutant.file).write_bytes(kept)
         end(program)
-    if program.returncode == 0 or program.returncode == 5:  # all passed, or there is none
-        return ""
-    failed = FAILED.findall(told)
-    return failed[0] if failed else f"pytest ended with {program.returncode}"
+    return program.returncode, next(iter(FAILED.findall(told)), "")
 
 
 def end(program: subprocess.Popen[str]) -> None:
