@@ -1,4 +1,4 @@
-"""What holds for all tests: what a run tells at its end, and how long it looks for rare cases."""
+"""Settings for all tests: the summary at the end of a run, and the length of random searches."""
 
 import signal
 

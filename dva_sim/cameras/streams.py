@@ -1,6 +1,6 @@
 """Pictures of robots' cameras as streams that any browser or player shows.
 
-A picture is drawn once, whoever looks; while nobody looks, nothing is drawn. A slow viewer gets
+Each picture is drawn once for all viewers, and none without a viewer. A slow viewer gets
 the newest picture when it is ready for one, and never those between.
 """
 
@@ -196,7 +196,7 @@ def part(picture: Picture) -> bytes:
 
 
 def headers_of(picture: Picture) -> dict[str, str]:
-    """What a picture says about itself, in virtual time [ms]."""
+    """HTTP headers of a picture: its number and its times in virtual time [ms]."""
     return {
         "X-Frame-Number": str(picture.number),
         "X-Frame-Time-Ms": str(picture.captured_ms),

@@ -284,7 +284,7 @@ class Dva:
         if known is not None and known.is_new_life(message.message_id, message.timestamp):
             sends = self._gone(message.source, now)  # it knows nothing of what it held
         if known is not None and known.device.address != body.address:
-            self.sessions.forget(message.source)  # whoever holds it has to ask where it is
+            self.sessions.forget(message.source)  # its holder has to ask for the new address
         if known is None and self.registry.is_full:
             sends = self._make_room(now)
         entry = self.registry.register(message.source, body, now)

@@ -73,7 +73,7 @@ class Sessions:
         return held or robot in self.reserved
 
     def held(self, robot: str, holder: str | None, to_read: bool) -> Grant | None:
-        """Return the permission of a device, or of the holder whoever that is, if there is one.
+        """Return the permission of a device, or that of the current holder, if there is one.
 
         Args:
             robot: Id of the robot.

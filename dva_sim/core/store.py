@@ -220,7 +220,7 @@ class Store:
         return found
 
     def _time(self) -> float:
-        """How late it was when that was written last [s]; older files hold no more than events."""
+        """Return the time of the last write [s]; older files hold events only."""
         if self._is_about("time"):
             return self._about("time") / MICROSECONDS
         times = [0.0]

@@ -59,7 +59,7 @@ class LiveOptions:
 
     @property
     def shows_pictures(self) -> bool:
-        """Whether the robots' pictures are served: with keys, which HTTP lacks, if asked for."""
+        """Whether robots' pictures are served: with keys only on request, since HTTP has none."""
         return self.keys is None or self.camera_port is not None
 
     @property

@@ -187,7 +187,7 @@ def _devices_that_fit() -> int:
 
 @dataclass(frozen=True)
 class _FilmedWorld:
-    """What a service of pictures has to know of the world; see `FilmedRun`."""
+    """The world as the camera service needs it; see `FilmedRun`."""
 
     scenario: Scenario
     clock: Clock

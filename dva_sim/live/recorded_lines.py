@@ -195,7 +195,7 @@ class ToldRun:
         )
 
     def _traffic(self) -> Iterator[Sent]:
-        """Messages; a frame goes to whoever drives the robot, or to nobody by name."""
+        """Messages; the receiver of a frame is the robot's driver, or empty without one."""
         for sent in self.recorder.traffic or ():
             if sent.destination:
                 yield sent
@@ -262,7 +262,7 @@ class ToldRun:
         self._contained[number] = when
 
     def _event(self, number: int, kind: str, at: list[float], state: str, *more: Any) -> None:
-        """See `event_facts`; what an earlier version did not say is left open."""
+        """See `event_facts`; facts that an earlier version did not record stay unknown."""
         times, severity, sent = (*more, 0.0, {})[:3]
         event = Event(
             number, kind, Position(*at), severity, state=State(state), times=times, **sent

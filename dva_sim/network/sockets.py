@@ -524,7 +524,7 @@ class SocketNetwork:
         return True
 
     def _renew_publisher(self, node: str) -> None:
-        """Open what publishes anew: who subscribes is let in by the keys that there are now."""
+        """Reopen the publishing socket, so that subscribers are admitted by the current keys."""
         old = self._publishers[node].socket
         endpoint, old.linger = _text(old.last_endpoint).rstrip("\0"), 0
         self._discard(old)

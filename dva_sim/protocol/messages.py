@@ -243,7 +243,7 @@ class GetGrant:
     """A robot asks the DVA who may act on it: it takes nobody else's word for that.
 
     Attributes:
-        holder: Only whether that device may; None: whoever may.
+        holder: The device asked about; None: the current holder.
         level: `sensors`: what the holder may read; None: who may drive it, or send it somewhere.
     """
 

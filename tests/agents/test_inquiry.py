@@ -29,7 +29,7 @@ def test_one_question_is_under_way_at_a_time_and_claims_meanwhile_make_one_more(
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_question_may_be_asked_at_the_time_that_was_told_to_the_microsecond(seed):
-    """Else whoever asks when it is due is told the same time again, for ever."""
+    """Otherwise a caller who asks at the due time gets the same time again, for ever."""
     rng, inquiry, now, asked = random.Random(seed), Inquiry(), 0.0, 0
     while now < 30.0:
         inquiry.about_holder(RUI)

@@ -1,4 +1,4 @@
-"""What a command opens to a network without keys or tokens is said, and nothing else."""
+"""Warnings name what a command opens to a network without keys or tokens, and nothing else."""
 
 import pytest
 from helpers.processes.command_line import call

@@ -169,7 +169,7 @@ class Witness:
         return None
 
     def holder(self) -> str | None:
-        """Who holds it by a session that was confirmed to it, and whose end it has not heard."""
+        """The holder of a confirmed session whose end the robot has not heard."""
         held = (s for s in self.sessions if s in self.confirmed and s not in self.over)
         return next((h.holder for h in map(self.sessions.get, held) if h and h.drives), None)
 
