@@ -10,10 +10,11 @@ can be exchanged, a number made one greater, a truth turned, or a call or a resu
 for annotations and f-strings. Its rank is the SHA-256 of its name. Each room gives its candidates
 of lowest rank: one, and more in proportion to how many it has.
 
-The tests that should notice are those of `make test` in the room of the fault, those that bear the
-name of its module first. Two copies of the working tree are at work side by side. A fault counts
-as noticed if a test fails with it, by itself too, and passes without it; or if pytest breaks down
-or takes longer than `PATIENCE_S`. For another commit run this file in a work tree of that commit.
+The tests that should notice are those in the room of the fault, but for long ones and those in a
+browser; those that bear the name of its module come first. Two copies of the working tree are at
+work side by side. A fault counts as noticed if a test fails with it, by itself too, and passes
+without it; or if pytest breaks down or takes longer than `PATIENCE_S`. For another commit run this
+file in a work tree of that commit.
 """
 
 import argparse
@@ -43,7 +44,7 @@ MUTANTS = 60
 SIDE_BY_SIDE = 2
 PATIENCE_S = 900.0
 NOTHING_FAILED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
-QUICK = "not system and not soak and not browser"  # as `make test` has it
+LEFT_OUT = "not soak and not browser"
 FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", re.MULTILINE)
 
 OPERATORS = {
@@ -325,7 +326,7 @@ def put(file: Path, source: bytes) -> None:
 
 def outcome(root: Path, *tests: str, left_out: Sequence[str] = ()) -> tuple[int, str]:
     """With which code pytest ends, and which test was the first to fail."""
-    words = [*("-m", QUICK), *(f"--deselect={test}" for test in left_out)]
+    words = [*("-m", LEFT_OUT), *(f"--deselect={test}" for test in left_out)]
     program = subprocess.Popen(
         [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", *words, *tests],
         cwd=root,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -65,12 +67,8 @@ def load_yaml(path: str | Path) -> Document:
     """
     path = Path(path)
     text = read_text(path)
-    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
     try:
-        tree = _reader().load(text)
-        if not isinstance(tree, CommentedMap):
-            raise ConfigError("should be a mapping of keys to values", path, 1, 1)
-        return Document(_plain(tree, (), places), path, places)
+        data, places = _read(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = (error.problem or "is not valid YAML").split("\n")[0]
@@ -84,6 +82,16 @@ def load_yaml(path: str | Path) -> Document:
         raise ConfigError(str(error), path) from None
     except ValueError as error:  # such as the date 2001-13-32, or a number of 5000 digits
         raise ConfigError(f"has a value that cannot be read: {error}", path) from error
+    if not isinstance(data, dict):
+        raise ConfigError("should be a mapping of keys to values", path, 1, 1)
+    return Document(deepcopy(data), path, places)
+
+
+@lru_cache(maxsize=64)
+def _read(text: str) -> tuple[Any, Mapping[KeyPath, tuple[int, int]]]:
+    """Plain data and its places; kept, as each cell of a study reads the same scenario."""
+    places: dict[KeyPath, tuple[int, int]] = {(): (1, 1)}
+    return _plain(_reader().load(text), (), places), places
 
 
 _OWN = "tag:yaml.org,2002:"

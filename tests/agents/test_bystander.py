@@ -126,6 +126,7 @@ def test_a_second_alarm_makes_nobody_later_or_earlier():
     assert one.leaves_at == 20.0
 
 
+@pytest.mark.system
 def test_25_people_in_a_room_need_the_time_that_its_door_takes_and_no_less():
     """1.2 m: SFPE's 1.3 persons/s per metre of 0.9 m would be 21 s, 1.9 per metre of 1.2 m 11 s."""
     building = Building(two_rooms(1.2, width=9.0, height=7.0), refuges=[(8.0, 3.5)])

@@ -151,6 +151,7 @@ def test_an_emergency_is_done_after_two_services_whoever_sends_what(others, floo
     assert max(bench.times[data] - when for data, when in sent.items()) < 2 * SERVICE + 1e-4
 
 
+@pytest.mark.system
 def test_a_flood_of_emergencies_leaves_every_second_turn_and_no_backlog():
     bench = Bench()
     bench.flood([f"s {n}" for n in range(20)], EMERGENCY, rate=500.0)

@@ -146,6 +146,7 @@ def test_who_is_in_the_door_already_goes_first_whatever_its_number():
     assert untouched(within, comes)
 
 
+@pytest.mark.system
 def test_five_in_one_corridor_all_arrive():
     fleet = Fleet()
     for number, x in enumerate((4.0, 6.0), 1):

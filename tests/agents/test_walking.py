@@ -261,6 +261,7 @@ def test_the_fast_overtake_the_slow():
     assert people.arrived[1] < people.arrived[0] - 8.0
 
 
+@pytest.mark.system
 def test_nobody_walks_through_a_wall_or_anybody_even_in_a_crowd():
     people = People(two_rooms(door=1.1))
     rng = np.random.default_rng(4)
@@ -317,6 +318,7 @@ def flow_through(width, seed, count=32):
     return (last - first) / (passed[last] - passed[first])
 
 
+@pytest.mark.system
 def test_a_crowd_leaves_by_a_door_at_a_rate_that_has_been_seen_of_crowds():
     """At a door of 1.1 m. Nothing in the model was fitted to it.
 
@@ -419,6 +421,7 @@ print([repr(c) for w in people.walkings for c in w.place])
 """
 
 
+@pytest.mark.system
 def test_two_processes_walk_a_crowd_to_the_same_bit():
     here, elsewhere = told_here_and_elsewhere(CROWD)
     assert here == elsewhere

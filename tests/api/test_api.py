@@ -175,6 +175,7 @@ def test_a_new_study_is_written_and_registered(tmp_path):
     assert dva_sim.register(path, again=True).earlier == (made.hash,)
 
 
+@pytest.mark.system
 def test_an_episode_is_kept_drawn_and_played_again(tmp_path, capfd):
     kept, still = tmp_path / "a.mcap", tmp_path / "a.png"
     short = {"horizon_s": 15}

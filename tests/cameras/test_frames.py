@@ -1,5 +1,6 @@
 """Pictures between processes: whole, in any pieces, and found again after a crash."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +26,7 @@ def test_pictures_come_whole_out_of_any_pieces(sent, size):
     assert unpacker.skipped == 0
 
 
+@pytest.mark.system
 @given(st.lists(pictures, max_size=3), pictures, st.integers(1, 200), st.integers(1, 50))
 def test_after_a_record_that_broke_off_the_next_ones_are_found(before, broken, cut, size):
     whole = pack(broken)

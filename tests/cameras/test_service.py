@@ -29,6 +29,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import build, load
 
+pytestmark = pytest.mark.system
+
 ROBOT = id_of("robot", 1)
 
 

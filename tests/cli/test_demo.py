@@ -7,6 +7,8 @@ from dva_sim.cli.demo import FILM, PICTURE, STUDY, demo
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.kernel.errors import DvaSimError, ExitCode
 
+pytestmark = pytest.mark.system
+
 SLEEPS = "import time; time.sleep(600)"
 
 

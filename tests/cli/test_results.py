@@ -86,6 +86,7 @@ def test_show_tells_question_status_size_answer_and_every_cell(tmp_path, command
     assert "Tables: runs (" in out
 
 
+@pytest.mark.system
 def test_show_counts_failures_and_warns_of_them(folders, command):
     _, out, _ = command("show", folders["unlucky"])
     size = ("41 runs in 9", " 1 failed", "3 persons x 2 trials", "seed 3\n", "missing below: 1")

@@ -23,6 +23,8 @@ from dva_sim.simulation.full.stage import id_of, team_of
 from dva_sim.simulation.scenario import build, load
 from dva_sim.worlds.geo import GeoFrame
 
+pytestmark = pytest.mark.system
+
 ROBOT, ROOM = id_of("robot", 1), id_of("control-room", 1)
 HERE = GeoFrame(38.66, -9.2)
 
@@ -158,7 +160,6 @@ def live(programs: Programs, dva: str, part: str, *words: str) -> Program:
     return programs.start("live", "hands-on", "--only", part, "--dva", dva, *more)
 
 
-@pytest.mark.system
 def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     dva = f"127.0.0.1:{free_port()}"
     first = live(programs, dva, "dva")
@@ -195,7 +196,6 @@ def test_it_shows_what_runs_there_and_outlives_the_dva(programs):
     assert becomes(lambda: robots() == [("robot-1", "Idle"), ("robot-2", "Idle")])
 
 
-@pytest.mark.system
 def test_with_keys_it_attaches_as_the_control_room_of_its_key_and_decides(programs, tmp_path):
     dva, keys = f"127.0.0.1:{free_port()}", tmp_path / "keys"
     create_keys(keys, [*team_of(build(load("hands-on"))), ROOM])

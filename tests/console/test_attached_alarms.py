@@ -10,6 +10,8 @@ from helpers.wording import unnamed
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.attached.system import UNHEARD
 
+pytestmark = pytest.mark.system
+
 FIRE = "Fire, North office"
 
 

@@ -12,6 +12,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.mistakes import check_message
 
+pytestmark = pytest.mark.system
+
 
 @pytest.fixture
 def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[AttachedPage]:

@@ -9,6 +9,8 @@ from helpers.console.attached_console import OWN, AttachedPage, attached
 from dva_sim.console.attached.sensing import RENEW
 from dva_sim.protocol.mistakes import check_message
 
+pytestmark = pytest.mark.system
+
 
 @pytest.fixture
 def page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[AttachedPage]:

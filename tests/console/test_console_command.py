@@ -164,9 +164,9 @@ def test_what_an_earlier_run_left_of_a_recording_is_not_replaced(tmp_path):
 
 
 def shown(out):
-    """How much of a run its folder shows [s]."""
-    runs = load_so_far(out).runs
-    return runs["simulated_s"][0] if runs.rows else 0.0
+    """How much of a run its folder shows [s]; before its first line is kept it has no tables."""
+    results = load_so_far(out)
+    return results.runs["simulated_s"][0] if results.has("runs") else 0.0
 
 
 def test_its_results_are_written_though_the_recording_breaks_off(programs, tmp_path):

@@ -212,6 +212,7 @@ def test_a_robot_is_taken_over_from_an_operator_with_the_event_it_was_sent_to(mo
     assert one.seat()["drives"][0]["phase"] == "held"
 
 
+@pytest.mark.system
 def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room):
     done, text = room.do("mission", robot="robot-1", event=1)
     assert done, text

@@ -44,6 +44,7 @@ def held(page):
     return next(iter(page.world.person(0).robots.values()))
 
 
+@pytest.mark.system
 def test_while_pictures_are_drawn_the_drive_goes_on(page):
     page.let(3 * LIMIT)
     assert page.robot().controller.mode is Mode.TELEOPERATION

@@ -266,6 +266,7 @@ def test_who_loses_an_order_is_told_and_may_take_the_robot_again(monkeypatch):
     assert page.robot(order["robot"]).body.speed > 0.2
 
 
+@pytest.mark.system
 def test_a_robot_that_pushes_against_something_says_so_while_it_creeps(driving):
     robot = driving.robot()
     before = robot.body.in_contact

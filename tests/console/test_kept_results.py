@@ -20,6 +20,8 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.simulation.full.stage import DVA, id_of, kind_of
 
+pytestmark = pytest.mark.system
+
 
 def driven(monkeypatch, out, seed=1, end=KeptResults.write):
     """The results of two drives of two robots by one person, under two patterns."""

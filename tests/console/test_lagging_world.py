@@ -10,6 +10,8 @@ from dva_sim.console.actions import Actions
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.simulation.scenario import build, load
 
+pytestmark = pytest.mark.system
+
 
 @pytest.fixture
 def world():

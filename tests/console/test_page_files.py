@@ -108,6 +108,7 @@ def test_every_module_and_icon_of_the_pages_is_used():
     assert {name for name in names if f"'{name}'" in texts or f'"{name}"' in texts} == names
 
 
+@pytest.mark.system
 def test_types_of_the_pages_hold():
     own = Path(sys.prefix) / "node_modules" / ".bin"
     tsc = shutil.which("tsc", path=str(own)) or shutil.which("tsc")

@@ -231,6 +231,7 @@ def test_a_phone_can_be_steered_by_stick_and_by_tilt_again(driving):
     assert driving.robot().body.speed == pytest.approx(0.25, abs=0.04)
 
 
+@pytest.mark.system
 def test_the_newest_sample_that_has_acted_is_told_and_how_long_it_took(driving):
     drive = driving.drive()
     assert 0 < drive["input"]["n"] <= driving.phone()["samples"]
@@ -304,6 +305,7 @@ def answered(monkeypatch, **robot):
     return [trip for drive in page.world.recorder.drives for trip in drive.round_trips]
 
 
+@pytest.mark.system
 def test_with_the_dissertations_phone_and_pibot_a_reply_takes_seconds(monkeypatch):
     assert max(answered(monkeypatch, robot__profile="pibot", robot__processing_s=None)) > 1.0
 

@@ -85,6 +85,7 @@ def test_a_robot_that_dies_in_mid_drive_is_alerted_after_three_attempts(page):
     assert page.robot().controller.mode is not Mode.TELEOPERATION
 
 
+@pytest.mark.system
 def test_without_a_picture_one_drives_on_in_sight_of_the_robot(page):
     assert page.permit()["ok"]
     assert page.calibrate()["ok"]

@@ -151,6 +151,7 @@ def test_who_registers_anew_has_one_device_and_its_drive_is_over(driving):
     assert driving.permit()["ok"]
 
 
+@pytest.mark.system
 def test_ids_are_given_out_again_and_nothing_grows_without_end(page):
     devices = len(page.world.run.stage.devices)
     for n in range(20):
@@ -217,6 +218,7 @@ def test_any_calibration_is_one_or_refused(message):
         settings_of(message)
 
 
+@pytest.mark.system
 @settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.one_of(SOUND, MESSAGES), min_size=1, max_size=12))
 def test_no_stream_of_samples_breaks_the_world_or_leaves_its_limits(stream):

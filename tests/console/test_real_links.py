@@ -12,6 +12,8 @@ from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.sockets import NetworkError, SocketNetwork
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
+pytestmark = pytest.mark.system
+
 
 @pytest.fixture
 def page(monkeypatch):

@@ -17,6 +17,8 @@ from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.full.verdicts import RULES, verdicts
 from dva_sim.testing.evidence import judged_recording
 
+pytestmark = pytest.mark.system
+
 ROBOT = id_of("robot", 1)
 
 

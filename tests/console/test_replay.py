@@ -77,6 +77,7 @@ def playing():
         told.player.close()
 
 
+@pytest.mark.system
 def test_events_come_back_as_the_dva_knew_them(files):
     known, kept = drill().events, read_recording(files / "drill.mcap").playback.events
     assert known

@@ -19,6 +19,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.simulation.full.stage import DVA
 
+pytestmark = pytest.mark.system
+
 ANA = "02:00:00:00:00:77"
 
 

@@ -16,6 +16,8 @@ from PIL import Image
 
 from dva_sim.cameras.frames import Picture, pack
 
+pytestmark = pytest.mark.system
+
 
 def jpeg(shade: int, size: int = 0) -> bytes:
     """A picture of one shade, filled up to a number of bytes."""
@@ -299,7 +301,6 @@ def test_64_viewers_keep_out_their_like_and_not_a_higher_role(console):
         pass
 
 
-@pytest.mark.system
 def test_a_viewer_that_does_not_take_its_pictures_is_cut(console):
     stuck = Viewer(console, "robot-5", small=True)
     quick = Viewer(console, "robot-5")

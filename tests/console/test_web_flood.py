@@ -103,6 +103,7 @@ def test_a_body_that_does_not_come_is_not_waited_for_forever(console):
         assert raw.recv(100).split()[1] == b"408"
 
 
+@pytest.mark.system
 def test_requests_that_make_no_sense_after_their_answer_fill_no_pipe_and_stop_nothing(console):
     """Each of them was a traceback on standard error, which nobody reads until the end."""
     for _ in range(80):

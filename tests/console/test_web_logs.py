@@ -131,6 +131,7 @@ def test_a_page_that_looks_is_told_and_the_world_hears_what_is_looked_at(console
     assert console.next_asked("look")["logs"] == {}
 
 
+@pytest.mark.system
 def test_a_phone_may_not_look_at_logs(console):
     page = console.page(console.phone)
     page.ws.send(json.dumps({"do": "look", "logs": {"dva": {}}}))

@@ -281,6 +281,7 @@ def test_an_expired_certificate_is_renewed_at_the_start_and_a_phone_gets_in(tmp_
         assert ask(served, "/phone", token=served.phone).status == 200  # verified
 
 
+@pytest.mark.system
 def test_codes_are_dark_on_light_with_a_rim():
     address = "https://192.168.1.7:8766/?token=" + "x" * 32
     picture = svg(address).decode()

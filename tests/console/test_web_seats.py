@@ -117,6 +117,7 @@ def test_a_program_that_gets_no_robot_gets_no_seat(console):
     assert console.next_asked("release")["client"].startswith("p")
 
 
+@pytest.mark.system
 def test_a_page_of_a_lower_role_makes_room_for_a_supervisors():
     with serving() as served:
         supervise = served.serving["supervise"].partition("?token=")[2]

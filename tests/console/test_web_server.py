@@ -585,6 +585,7 @@ def test_a_taken_port_is_said_in_one_line():
     assert unnamed(line, "127.0.0.1", port, "Address already in use") == []
 
 
+@pytest.mark.system
 def test_no_list_of_processes_shows_a_token(console):
     for line in ("cmdline", "environ"):
         shown = Path(f"/proc/{console.process.pid}/{line}")

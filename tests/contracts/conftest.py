@@ -15,6 +15,10 @@ from helpers.network.transports import (
 
 from dva_sim.network.keys import KeyRing, create_keys
 
+SOCKETS = [
+    pytest.param(kind, marks=pytest.mark.system) for kind in ("sockets", "sockets with keys")
+]
+
 
 @pytest.fixture(scope="session")
 def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
@@ -23,14 +27,14 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     return KeyRing(folder)
 
 
-@pytest.fixture(params=[*VIRTUAL, LOSSY, "sockets", "sockets with keys"])
+@pytest.fixture(params=[*VIRTUAL, LOSSY, *SOCKETS])
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made = _world(request)
     yield made
     made.close()
 
 
-@pytest.fixture(params=["sockets", "sockets with keys"])
+@pytest.fixture(params=SOCKETS)
 def sockets(request: pytest.FixtureRequest) -> Iterator[SocketWorld]:
     made = SocketWorld(_ring(request))
     yield made

@@ -59,6 +59,7 @@ def ask_in_trouble(
         assert not asker.requester.busy
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("kind", VIRTUAL)
 @search(40)
 @given(
@@ -71,6 +72,7 @@ def test_each_request_ends_once_in_virtual_time(kind, seed, plan, window, attemp
     ask_in_trouble(VirtualWorld(VIRTUAL[kind]()), seed, plan, window, attempts)
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(("window", "keys"), [(1, False), (3, True)], ids=["plain", "with keys"])
 def test_each_request_ends_once_over_sockets(ring, window, keys):
     world = SocketWorld(ring if keys else None)
@@ -100,6 +102,7 @@ def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
     ask_in_trouble(world, seed, Plan(lose=0.1, double=0.3, hold=BRIEF), window)
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(("window", "keys"), [(1, False), (3, True)], ids=["plain", "with keys"])
 def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(ring, window, keys):
     world = SocketWorld(ring if keys else None)

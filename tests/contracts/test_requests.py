@@ -20,8 +20,13 @@ from dva_sim.network.messaging import QUEUE_LIMIT, Request
 pytestmark = pytest.mark.contract
 
 WORLDS = [("virtual messages", 1), ("virtual messages", 4), ("virtual segments", 4)]
-WORLDS += [("virtual datagrams", 1), (LOSSY, 4), ("sockets", 1), ("sockets with keys", 4)]
-WINDOWS = pytest.mark.parametrize(("world", "window"), WORLDS, indirect=["world"])
+WORLDS += [("virtual datagrams", 1), (LOSSY, 4)]
+SOCKETS = [("sockets", 1), ("sockets with keys", 4)]
+WINDOWS = pytest.mark.parametrize(
+    ("world", "window"),
+    [*WORLDS, *(pytest.param(*each, marks=pytest.mark.system) for each in SOCKETS)],
+    indirect=["world"],
+)
 
 
 def silent(_: Request) -> None:

@@ -256,6 +256,7 @@ while True:
 """
 
 
+@pytest.mark.system
 def test_a_process_that_is_killed_forgets_nothing_that_it_has_said(file):
     """Three kills, each amid the writing."""
     for enough in (3, 17, 60):

@@ -96,6 +96,7 @@ with version("HEAD") as folder:
 """
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_meter_that_is_stopped_leaves_no_folder_and_no_program_behind(tmp_path, number):
     environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONPATH": str(TESTS)}

@@ -8,6 +8,7 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import pytest
 from helpers.paths import ROOT
 
 PACKAGE = ROOT / "dva_sim"
@@ -55,6 +56,7 @@ def imported_early() -> dict[str, set[str]]:
     return {name: set(imports_of(tree_of(path).body)) for name, path in MODULES.items()}
 
 
+@pytest.mark.system
 def test_no_module_is_part_of_a_circle_of_imports():
     early = imported_early()
     graph = {name: {*early[name], *imports_of(late_in(path))} for name, path in MODULES.items()}

@@ -30,6 +30,13 @@ def test_the_newest_commit_that_was_tested_before_is_the_one_beside(monkeypatch)
     assert unnamed(cpu_by_room.before({"now": {"a": 1.0}})[0], "elsewhere") == []
 
 
+def test_figures_of_other_tests_are_not_beside(pytestconfig, monkeypatch):
+    all_tests = cpu_by_room.choice(pytestconfig)
+    assert cpu_by_room.choice(pytestconfig) == all_tests
+    monkeypatch.setattr(pytestconfig.option, "markexpr", "soak or x")
+    assert cpu_by_room.choice(pytestconfig) != all_tests
+
+
 @pytest.mark.system
 @pytest.mark.parametrize(("skipped", "code"), [(MOST_SKIPPED, 0), (MOST_SKIPPED + 1, 1)])
 def test_a_run_in_which_too_many_tests_are_skipped_has_failed(tmp_path, skipped, code):

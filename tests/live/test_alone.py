@@ -12,6 +12,8 @@ from dva_sim.live.options import LiveOptions
 from dva_sim.live.process import NobodyThere, run_part
 from dva_sim.network.realtime import LiveClock
 
+pytestmark = pytest.mark.system
+
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch):

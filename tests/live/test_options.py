@@ -6,6 +6,7 @@ from helpers.processes.command_line import call
 from dva_sim.live import supervisor
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(
     ("words", "said"),
     [

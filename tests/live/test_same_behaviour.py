@@ -18,6 +18,8 @@ from helpers.network.scripted_session import (
 
 from dva_sim.protocol import messages as m
 
+pytestmark = pytest.mark.system
+
 WAYS = {"req-rep": one_by_one, "pipelined": pipelined, "pub-sub": published}
 
 

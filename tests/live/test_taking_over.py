@@ -30,6 +30,8 @@ from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
+pytestmark = pytest.mark.system
+
 SUPERVISOR, OTHER = id_of("operator", 2), id_of("operator", 3)
 SHOWS_SMOKE = {"robot.sensors": [{"name": "smoke", "low": 0.5}], "dva.sensors": ["smoke"]}
 

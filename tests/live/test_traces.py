@@ -96,6 +96,7 @@ def drive(tmp_path: Path) -> Path:
 # --- the same again ------------------------------------------------------------------------
 
 
+@pytest.mark.system
 def test_a_trace_taken_over_sockets_is_decided_the_same_again(tmp_path):
     path = tmp_path / "robot-1.trace.jsonl"
     decisions = over_sockets(pipelined, trace=path)

@@ -16,6 +16,8 @@ from dva_sim.network.messaging import Request, Requester
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import READ_KEYS, SocketNetwork
 
+pytestmark = pytest.mark.system
+
 ROBOT, OPERATOR = "02:00:00:01:00:01", "02:00:00:03:00:01"
 STEP, WITHIN = 0.02, 3.0
 

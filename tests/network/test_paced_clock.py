@@ -8,6 +8,8 @@ import pytest
 
 from dva_sim.network.realtime import MOST_BEHIND, PacedClock
 
+pytestmark = pytest.mark.system
+
 SOON = 20.0  # no test waits longer for what should come at once [s]
 
 

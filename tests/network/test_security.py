@@ -18,6 +18,8 @@ from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.network.realtime import Poller
 from dva_sim.network.security import Reason, Refusal, Security
 
+pytestmark = pytest.mark.system
+
 ROBOT, OPERATOR = "02:00:00:01:00:01", "02:00:00:03:00:01"
 NULL_GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(48)
 

@@ -77,6 +77,7 @@ def understood(binding, data):
     return XmlParser().from_bytes(data, binding.Msg)
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("kind", BODIES, ids=lambda kind: kind.__name__)
 def test_every_element_of_every_message_is_the_same_in_the_binding_and_on_the_way_back(
     binding, kind

@@ -88,6 +88,7 @@ def test_both_ways_read_the_same(sent):
     assert repr(decode(data)) == repr(sent)
 
 
+@pytest.mark.system
 @search(60)
 @given(known_bodies.flatmap(with_header), st.integers(0, 2**32))
 def test_a_damaged_message_is_read_the_same_or_left_to_the_parser(sent, seed):

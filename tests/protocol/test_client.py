@@ -21,6 +21,8 @@ from dva_sim.simulation.full.control_room import add_dva
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import Stage, id_of, team_of
 
+pytestmark = pytest.mark.system
+
 SPECIFICATION = ROOT / "protocol" / "README.md"
 ROBOT = id_of("robot", 1)
 

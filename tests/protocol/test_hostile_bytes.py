@@ -47,6 +47,7 @@ def refused(old, new, data=GOOD):
     return caught.value.reason
 
 
+@pytest.mark.system
 def test_a_message_cut_off_anywhere_is_refused():
     for data in ALL.values():
         for end in range(len(data)):
@@ -67,6 +68,7 @@ def test_a_flipped_bit_in_any_kind_gives_what_the_bytes_say_or_a_refusal():
             decode_or_refuse(damaged)
 
 
+@pytest.mark.system
 def test_exchanged_dropped_and_doubled_elements_give_what_the_bytes_say_or_a_refusal():
     for data in ALL.values():
         found = list(LEAF.finditer(data))

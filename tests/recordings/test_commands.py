@@ -34,6 +34,7 @@ def test_an_episode_is_kept_and_told_again_word_for_word(tmp_path, capsys):
     assert "30 s simulated by dva-sim" in again
 
 
+@pytest.mark.system
 def test_pictures_come_from_the_file_alone(folder, tmp_path, capsys, monkeypatch):
     def never(*_):
         raise AssertionError("simulated again")

@@ -19,6 +19,8 @@ from dva_sim.experiments.report.figures.style import styled
 from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 
+pytestmark = pytest.mark.system
+
 VALUES = [61.0, 70.0, 95.0]  # of three persons, each with a recording: the last is the worst
 
 

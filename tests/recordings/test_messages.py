@@ -31,6 +31,7 @@ def test_each_schema_is_one(schema):
     jsonschema.Draft202012Validator.check_schema(schema)
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("run", [drive, drill, evacuation], ids=lambda run: run.__name__)
 def test_every_message_is_valid_by_its_schema(run):
     validators = {

@@ -30,6 +30,7 @@ const zstd = (data, size) => fzstd.decompress(data, new Uint8Array(Number(size))
 """
 
 
+@pytest.mark.system
 def test_another_implementation_counts_the_same_messages(folder, monkeypatch):
     node, packages = shutil.which("node"), Path(sys.prefix) / "node_modules"
     if node is None or not (packages / "@mcap" / "core").is_dir():

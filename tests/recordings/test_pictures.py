@@ -24,6 +24,8 @@ from dva_sim.recordings.pictures.stills import best_time, even_times, still, str
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Ending, simulate
 
+pytestmark = pytest.mark.system
+
 
 def run_of(name="drive-to-event", seed=1, **changes):
     return simulate(scenarios.build(scenarios.load(name), changes), seed, keep_traffic=True)

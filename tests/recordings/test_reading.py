@@ -197,6 +197,7 @@ def test_a_bare_map_comes_back_cell_by_cell(tmp_path):
     assert site.robot_bases == run.site.robot_bases
 
 
+@pytest.mark.system
 def test_a_picture_from_the_file_is_the_picture_from_the_run(opened, tmp_path):
     """Places are kept to a tenth of a millimetre: shades may differ, by a hair."""
     for name, run in (("file", opened["drill"].playback), ("run", drill())):
@@ -247,6 +248,7 @@ def test_a_file_cut_before_the_run_begins_says_so(folder, tmp_path):
         read_recording(tmp_path / "cut.mcap")
 
 
+@pytest.mark.system
 def test_a_damaged_file_ends_in_one_line(folder, opened, tmp_path):
     """Whatever byte is wrong, nothing is read that was not written."""
     whole, luck = (folder / "drive.mcap").read_bytes(), random.Random(1)

@@ -25,6 +25,7 @@ def bag(folder, tmp_path_factory):
     return found
 
 
+@pytest.mark.system
 def test_everybody_has_a_pose_and_a_velocity(bag):
     names = "robot_1", "robot_2", "guard_1", "guard_2"
     topics = {f"/{name}/{what}" for name in names for what in ("pose", "velocity")}

@@ -41,6 +41,7 @@ def recorded(path, seconds=16.0, also=lambda _: None):
     return path
 
 
+@pytest.mark.system
 def test_a_recording_of_an_honest_run_holds_every_rule(folder):
     code, rules, lines = checked(folder / "drive.mcap")
     assert (code, rules) == (0, dict.fromkeys(RULES, "held"))

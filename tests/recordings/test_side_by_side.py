@@ -12,6 +12,8 @@ from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.pictures import Wanted
 
+pytestmark = pytest.mark.system
+
 SHORT = ["horizon_s=12", "link.delay_s=0.1"]
 
 

@@ -108,6 +108,7 @@ def kept(tmp_path_factory):
     return study, out
 
 
+@pytest.mark.system
 def test_a_recording_is_of_the_run_it_is_named_after(kept):
     _, out = kept
     files = recordings(out)

@@ -34,6 +34,7 @@ def numbers_of(name):
     return model.measures(), {key for key, value in row.items() if not isinstance(value, str)}
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(
     "names",
     [

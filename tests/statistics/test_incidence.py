@@ -42,6 +42,7 @@ def test_with_one_cause_it_is_one_less_kaplan_and_meier_of_scipy():
     assert found.causes["done"].mean == pytest.approx(float(exact))
 
 
+@pytest.mark.system
 def test_censored_runs_bias_nothing_and_the_intervals_hold():
     """Two constant hazards, 0.012/s and 0.004/s: by 120 s, 3/4 and 1/4 of 1 - exp(-1.92)."""
     rng = np.random.default_rng(3)

@@ -11,6 +11,8 @@ from helpers.processes.command_line import call
 from helpers.studies.report_text import blank_pictures
 from helpers.wording import unnamed
 
+pytestmark = pytest.mark.system
+
 MAPS = TESTS / "data"
 TRACES = ROOT / "experiments" / "traces"
 STUDY = """\
@@ -106,7 +108,6 @@ def test_another_study_is_not_written_into_the_same_folder(ran):
     assert "holds another study" in other.stderr
 
 
-@pytest.mark.system
 def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_path):
     """All others call it within this process: see `command_line`."""
     words = [sys.executable, "-m", "dva_sim.cli", "run", "req-rep-vs-pubsub"]

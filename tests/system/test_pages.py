@@ -1,10 +1,13 @@
 """What the pages show as code does what they say."""
 
+import pytest
 from helpers.paths import ROOT
 
 from dva_sim.agents.operator.strategies import load_strategy
 from dva_sim.testing.operators import check_operator
 from dva_sim.testing.promises import tried
+
+pytestmark = pytest.mark.system
 
 PAGES = ROOT
 

@@ -25,6 +25,8 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.simulation.models import Tables
 
+pytestmark = pytest.mark.system
+
 HOME = ROOT
 PAGE = (HOME / "README.md").read_text(encoding="utf-8")
 

@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import pytest
 from helpers.processes.command_line import call
 from helpers.studies.report_text import blank_pictures
 from helpers.wording import unnamed
+
+pytestmark = pytest.mark.system
 
 STUDY = """\
 question: Does the nearest come sooner?

@@ -26,6 +26,8 @@ from dva_sim.simulation.full.safety_checks import broken_by_moving
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.worlds.lidar import Lidar
 
+pytestmark = pytest.mark.system
+
 ROBOT = id_of("robot", 1)
 QUIET = {"events": [{"kind": "fire", "at_s": 500}], "horizon_s": 600}
 

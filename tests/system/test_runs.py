@@ -13,6 +13,8 @@ from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, measures, simulate
 from dva_sim.simulation.full.loop_delay import STAGES
 
+pytestmark = pytest.mark.system
+
 NEAR = [{"kind": "fire", "room": "Main corridor", "at_s": 10, "reported": True}]
 
 

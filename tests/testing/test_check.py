@@ -21,6 +21,8 @@ from dva_sim.testing import file_kinds
 from dva_sim.validation.network.emulator import cell, self_check
 from dva_sim.validation.network.emulator.self_check import LinkFinding
 
+pytestmark = pytest.mark.system
+
 SAMPLES = ROOT / "protocol" / "samples"
 GOOD = SAMPLES / "valid" / "set-teleop.xml"
 FLOOD = "events: [{{kind: flood, hazard: {{{}}}}}]\n"

@@ -146,6 +146,7 @@ def test_a_colour_of_the_palette_is_known_however_it_is_written():
     assert not is_of_palette("#00ff00")
 
 
+@pytest.mark.system
 def test_what_is_drawn_is_written_beside_the_worked_example(capsys, monkeypatch):
     for name in SHAPES.keys() - FEW if LONGER == 1 else ():
         monkeypatch.delitem(SHAPES, name)

@@ -29,6 +29,7 @@ def test_every_kind_has_plugins_and_a_function_that_tries_it(kind):
     assert "2 " in trial.ways(testing.Outcome((), (), 2, 0.001))
 
 
+@pytest.mark.system
 def test_what_keeps_its_promises_is_tried_by_its_name_or_its_class(fewer):
     assert testing.check_policy("min_eta", count=1).tries == 1
     assert testing.check_policy(MinEta, count=2).tries == 2

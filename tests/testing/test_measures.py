@@ -50,6 +50,7 @@ def test_a_measure_that_keeps_its_promises_is_told_nothing():
     assert (outcome.broken, outcome.warnings, outcome.tries) == ((), (), 6)
 
 
+@pytest.mark.system
 def test_the_shipped_example_keeps_its_promises():
     name = "nearest_person.py:NearestPerson"
     assert tried(check_measure, name, slow=60.0).broken == ()

@@ -134,6 +134,7 @@ def test_a_slow_decision_is_a_warning(monkeypatch):
     assert not unnamed(warning, "slow", "1 s", "situation 9 ", "0.5 s")
 
 
+@pytest.mark.system
 def test_policies_are_checked_by_name_and_by_file(fewer, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     bad = "from dva_sim.core.dispatch import Policy\nclass Bad(Policy):\n"

@@ -33,6 +33,7 @@ SMALLEST = {
 }
 
 
+@pytest.mark.system
 @few
 @given(blocks)
 @example(SMALLEST)
@@ -159,6 +160,7 @@ def test_more_robots_do_not_move_a_wall():
     assert np.array_equal(few_.walls, many.walls)
 
 
+@pytest.mark.system
 def test_a_block_of_120_by_60_metres_is_planned_from_end_to_end():
     site = load_site("office-block", {"width_m": 120, "depth_m": 60})
     planner = Planner(site, 0.30)

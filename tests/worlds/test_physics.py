@@ -216,6 +216,7 @@ print([(b.x.hex(), b.y.hex(), b.body.angle.hex(), b.contacts, b.impulse.hex()) f
 """
 
 
+@pytest.mark.system
 def test_two_processes_give_the_same_trajectories_to_the_bit():
     here, elsewhere = told_here_and_elsewhere(DRIVE)
     assert here == elsewhere

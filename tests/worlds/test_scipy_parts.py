@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 HEAVY = ("numpy.f2py.f2py2e", "numpy.testing._private", "scipy.special", "scipy.linalg")
 
 
@@ -16,6 +18,7 @@ def test_what_is_not_used_is_not_loaded():
     assert told_by(f"print(sys.modules.keys() & set({HEAVY}))") == "set()"
 
 
+@pytest.mark.system
 def test_a_package_gives_all_its_names_afterwards():
     found = told_by(
         "import numpy\n"

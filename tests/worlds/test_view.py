@@ -62,6 +62,7 @@ def test_every_room_has_its_name_when_labels_are_wanted():
     assert [text.get_text() for text in bare.texts] == ["10 m"]
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("width", [60, pytest.param(120, marks=pytest.mark.soak)])
 def test_no_name_leaves_its_room_however_small_it_is_drawn(width):
     site = load_site("office-block", {"width_m": width, "depth_m": 30})
@@ -107,6 +108,7 @@ def test_a_bare_map_shows_its_known_free_floor(tmp_path):
     assert ax.get_xlim() == pytest.approx((1.0 - 0.8, 7.0 + 0.8))
 
 
+@pytest.mark.system
 def test_names_too_small_to_read_are_left_out_if_that_is_wanted():
     site = load_site("campus")
     _, ax = draw(site, least=6.0)

@@ -12,7 +12,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -29,7 +29,7 @@ from dva_sim.kernel.units import unit_of
 from dva_sim.simulation.models import MODELS
 
 if TYPE_CHECKING:
-    from duckdb import DuckDBPyRelation
+    from duckdb import DuckDBPyConnection, DuckDBPyRelation
 
 
 Told = Mapping[str, Mapping[str, Mapping[str, Any]]]
@@ -391,9 +391,9 @@ class Results:
         file = str(self.path_of(name))
         values = [file] if part is None else [file, part]
         try:
-            with duckdb.connect(config={"threads": 1}) as connection:
+            with _database().cursor() as cursor:
                 query = f"SELECT {columns} FROM read_parquet(?) {rows}"
-                found = connection.execute(query, values).fetchnumpy()
+                found = cursor.execute(query, values).fetchnumpy()
         except duckdb.Error as error:
             raise ConfigError(f"cannot be read: {str(error).splitlines()[0]}", file) from None
         return Frame({key: without_mask(column) for key, column in found.items()})
@@ -418,6 +418,14 @@ class Results:
                 f"{self._offers}, tables {', '.join(self.tables) or 'none'}",
             )
         )
+
+
+@cache
+def _database() -> DuckDBPyConnection:
+    """Reads all tables of a process: to open one takes longer than to read a table."""
+    import duckdb
+
+    return duckdb.connect(config={"threads": 1, "enable_external_file_cache": False})
 
 
 def quoted(name: str) -> str:

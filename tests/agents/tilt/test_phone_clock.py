@@ -65,6 +65,7 @@ def test_who_begins_to_count_anew_is_believed_and_what_is_a_little_old_is_not():
     assert clock.times_of([0.6], 2.1) == [pytest.approx(2.1)]
 
 
+@pytest.mark.system
 @given(st.lists(st.tuples(st.floats(0, 1e10), st.floats(0, 10.0)), min_size=1, max_size=50))
 def test_times_never_run_back_and_are_never_in_the_future(steps):
     clock, now, last = PhoneClock(), 0.0, float("-inf")

@@ -75,6 +75,7 @@ def best_by_trying(eta, robots, operators):
     return best[0], -best[1]
 
 
+@pytest.mark.system
 @search(150)
 @given(st.data())
 def test_it_is_the_best_of_all_ways_with_so_many_operators(data):
@@ -92,6 +93,7 @@ def test_it_is_the_best_of_all_ways_with_so_many_operators(data):
         assert found == pytest.approx(best_by_trying(eta, robots, operators))
 
 
+@pytest.mark.system
 @search(300)
 @given(eta_tables, st.integers(0, 6), st.sampled_from([0.0, 1.0]))
 def test_it_is_never_worse_than_one_after_the_other(eta, operators, ageing):

@@ -1,6 +1,7 @@
 """The most urgent first, and taking somebody away for it."""
 
 import numpy as np
+import pytest
 from helpers.dva.dispatch_situations import INF, act, look, pairs, situation
 
 from dva_sim.core.dispatch import Preemptive, PriorityEta
@@ -80,5 +81,6 @@ def most_redirections(seed):
     return max(redirected)
 
 
+@pytest.mark.system
 def test_between_two_arrivals_nobody_is_redirected_more_often_than_one_over_the_margin():
     assert 2 <= max(most_redirections(seed) for seed in range(8)) <= 1 / 0.25

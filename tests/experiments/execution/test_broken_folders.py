@@ -21,6 +21,8 @@ from dva_sim.experiments.results.results import JOURNAL, Results
 from dva_sim.experiments.results.tables import write_tables
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 
+pytestmark = pytest.mark.system
+
 
 def never(job: object) -> kit.Tables:
     raise AssertionError("run again")
@@ -101,7 +103,6 @@ def test_what_a_killed_runner_left_behind_is_removed(tmp_path, out):
     assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
 
 
-@pytest.mark.system
 def test_a_folder_that_cannot_be_written_is_told(tmp_path, out):
     """In a mount namespace, since nobody keeps root from writing otherwise."""
     words = ["unshare", "--map-root-user", "--mount"]

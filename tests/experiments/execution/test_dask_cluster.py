@@ -21,6 +21,8 @@ from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.execution.scheduling import limited
 from dva_sim.kernel.errors import ConfigError, DvaSimError, RunTooLong
 
+pytestmark = pytest.mark.system
+
 
 @pytest.fixture
 def dask(tmp_path: Path) -> Iterator[DaskCluster]:
@@ -30,7 +32,6 @@ def dask(tmp_path: Path) -> Iterator[DaskCluster]:
         yield started
 
 
-@pytest.mark.system
 def test_a_worker_killed_half_way_loses_and_doubles_nothing(tmp_path, dask, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study = kit.study_in(tmp_path)
@@ -54,7 +55,6 @@ def test_a_worker_killed_half_way_loses_and_doubles_nothing(tmp_path, dask, monk
     assert rows == kit.RUNS
 
 
-@pytest.mark.system
 def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
     tmp_path, dask, monkeypatch, capfd
 ):
@@ -82,7 +82,6 @@ def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
     assert kit.files(out) == plain
 
 
-@pytest.mark.system
 def test_a_cluster_nobody_works_or_answers_in_is_told(dask, monkeypatch):
     with dask_cluster.DaskCluster(dask.address) as place:
         place.look_after(is_idle=True)
@@ -97,7 +96,6 @@ def test_a_cluster_nobody_works_or_answers_in_is_told(dask, monkeypatch):
         dask.scheduler.send_signal(signal.SIGCONT)
 
 
-@pytest.mark.system
 def test_a_worker_with_another_profile_near_it_is_refused(tmp_path, dask):
     phones = tmp_path / "elsewhere" / "agents" / "phones"
     phones.mkdir(parents=True)
@@ -214,7 +212,6 @@ print(seen.count("call"))
 """
 
 
-@pytest.mark.system
 def test_after_a_limit_in_a_thread_a_profiler_still_gets_on():
     """In a process of its own: it would not come back, and nothing after it either."""
     done = patience.run([sys.executable, "-c", LOOKED_AT], capture_output=True, text=True)

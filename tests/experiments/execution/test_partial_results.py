@@ -18,6 +18,8 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.errors import ConfigError
 
+pytestmark = pytest.mark.system
+
 
 def measured(job: StudyJob) -> kit.Tables:
     """A run that leaves its measures and no track."""

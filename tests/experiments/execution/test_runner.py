@@ -115,6 +115,7 @@ def stopped(runner: subprocess.Popen[str], when: int, how: signal.Signals) -> st
     return runner.communicate(timeout=PATIENCE_S)[0]  # only returns when its workers are gone too
 
 
+@pytest.mark.system
 def test_a_runner_that_was_killed_goes_on_and_ends_with_the_same_bytes(tmp_path, started):
     """It is killed among its first runs, and goes on to stop among the repeats."""
     study, out = kit.write_study(tmp_path, kit.REPEATED), tmp_path / "killed"
@@ -190,6 +191,7 @@ def test_a_run_that_fails_is_named_and_the_others_go_on_and_it_is_tried_again(
     assert kit.files(run_study(study, out, jobs=1, episode=kit.cheap)) == plain
 
 
+@pytest.mark.system
 def test_a_run_that_kills_its_process_again_and_again_fails_and_the_others_go_on(tmp_path):
     out = run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=2, episode=kit.deadly)
     results = Results.load(out)
@@ -199,6 +201,7 @@ def test_a_run_that_kills_its_process_again_and_again_fails_and_the_others_go_on
     assert len(results.table("runs")["seed"]) == kit.RUNS - 1
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_run_that_stalls_ends_as_a_failure_at_its_limit(tmp_path, jobs):
     study = kit.study_in(tmp_path)
@@ -208,6 +211,7 @@ def test_a_run_that_stalls_ends_as_a_failure_at_its_limit(tmp_path, jobs):
     assert (failure["part"], failure["cell"], failure["person"]) == ("story", 2, 1)
 
 
+@pytest.mark.system
 def test_a_run_that_no_exception_reaches_is_ended_with_its_process(tmp_path, monkeypatch):
     monkeypatch.setattr(scheduling, "_LOOK_S", 0.2)
     study = kit.study_in(tmp_path)
@@ -217,6 +221,7 @@ def test_a_run_that_no_exception_reaches_is_ended_with_its_process(tmp_path, mon
     assert len(Results.load(out).table("runs")["seed"]) == kit.RUNS - 1
 
 
+@pytest.mark.system
 def test_a_worker_killed_once_changes_nothing(tmp_path, plain):
     mark = tmp_path / "mark"
     episode = functools.partial(kit.deadly_once, mark)

@@ -316,6 +316,7 @@ def test_who_does_not_drive_has_no_delay_budget(view):
     assert titles == ["REQ/REP", "latest-wins"] * 2
 
 
+@pytest.mark.system
 def test_names_of_six_links_stand_clear_of_each_other_beside_the_delay_budget(view):
     with styled():
         figure = DelayBudget().draw(of_links(view, 6), NOTHING_ELSE).figure

@@ -55,6 +55,7 @@ def mine(results, *names):
     return load_figures([f"mine.py:{name}" for name in names], results.parent)
 
 
+@pytest.mark.system
 def test_a_figure_of_a_user_comes_last_and_is_gone_where_nobody_names_it(results):
     assert "An empty frame." in words_of(results, figures=mine(results, "Mine"))
     page = (results / "report.html").read_text("utf-8").splitlines()
@@ -89,6 +90,7 @@ def test_one_that_cannot_be_used_is_refused_in_a_line(results, names, told):
         mine(results, *names)
 
 
+@pytest.mark.system
 def test_a_command_draws_those_that_it_names(results, monkeypatch):
     monkeypatch.chdir(results.parent)
     page = results / "report.html"

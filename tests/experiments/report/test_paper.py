@@ -50,6 +50,7 @@ def blocks():
     ]
 
 
+@pytest.mark.system
 def test_a_report_on_paper_has_the_same_bytes_whenever_it_is_set(tmp_path):
     for name in ("a.pdf", "b.pdf"):
         write_pdf(tmp_path / name, "What does it cost?", blocks())

@@ -12,6 +12,8 @@ from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
 
+pytestmark = pytest.mark.system
+
 FIGURES = [
     "answer",
     "distributions",

@@ -12,6 +12,8 @@ from dva_sim.experiments.analysis.shift_effects import pooled
 from dva_sim.experiments.report.report import write_report
 from dva_sim.simulation.shift import build, measures, simulate_timed
 
+pytestmark = pytest.mark.system
+
 POLICIES = ["random", "nearest_idle", "min_eta"]
 RATES = [1, 3]
 FACTS = {

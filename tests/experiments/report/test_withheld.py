@@ -48,6 +48,7 @@ def study(tmp_path):
     return tmp_path / "study.yaml"
 
 
+@pytest.mark.system
 def test_a_policy_that_always_fails_is_compared_with_nothing(study, tmp_path):
     out = tmp_path / "out"
     with blank_pictures():

@@ -43,6 +43,7 @@ def columns_of(model):
     return found
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("model", MODELS)
 def test_every_column_that_a_run_fills_is_in_the_dictionary(model):
     filled = columns_of(model)

@@ -196,6 +196,7 @@ def test_points_fill_each_range_evenly_on_its_scale_and_meet_every_level(tmp_pat
     assert np.bincount(attempts.astype(int)).tolist() == [0, 4, 4, 4, 4]
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("kind", ["latin_hypercube", "sobol", "saltelli"])
 def test_points_depend_on_the_seed_of_the_study_alone(tmp_path, kind):
     text = ONLY_PATTERN + SAMPLED.format(kind=kind)

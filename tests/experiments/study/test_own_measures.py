@@ -55,6 +55,7 @@ def test_a_study_measures_what_a_file_beside_it_says_in_every_process(tmp_path):
     assert (told["standing_s"].unit, told["standing_s"].meaning) == ("s", "time that robots stood")
 
 
+@pytest.mark.system
 def test_results_are_read_without_the_file_and_say_what_it_said(tmp_path):
     study = study_with(tmp_path)
     run_study(study, tmp_path / "out", jobs=1)

@@ -34,6 +34,7 @@ def test_a_study_stops_after_the_round_that_is_enough(tmp_path):
     assert set(runs["person"].tolist()) == set(range(3 + 2 * (how["rounds"] - 1)))
 
 
+@pytest.mark.system
 def test_an_interrupted_study_stops_after_the_same_round(tmp_path):
     study = kit.study_in(tmp_path, text=TEXT)
     plain = run_study(study, tmp_path / "plain", jobs=1, episode=steady)

@@ -19,6 +19,7 @@ TASKS = ROOT / "experiments" / "scenarios" / "tasks"
 DESIGN_ONLY = {"outcome", "cause", "network_depth"}
 
 
+@pytest.mark.system
 @pytest.mark.parametrize(
     "kind", ["fitts-tilt", "tracking", "corner", "slalom", "course", "excavator"]
 )

@@ -1,10 +1,12 @@
 """`pytest --cpu-by-room`: what the tests of each room cost, beside the last commit that was tested.
 
 CPU seconds of the tests and of the programs they start, in all processes that share them. The
-cache of pytest keeps the figures of each commit that was tested here; before there is one, those
-of `cpu_by_room.json` are shown, which `--write-cpu-by-room` writes.
+cache of pytest keeps the figures of each commit that was tested here, apart for each choice of
+tests; before there is one, those of `cpu_by_room.json` are shown, which `--write-cpu-by-room`
+writes.
 """
 
+import hashlib
 import json
 import os
 import subprocess
@@ -15,7 +17,6 @@ from typing import Any
 import pytest
 from helpers.paths import ROOT, TESTS
 
-KEY = "dva-sim/cpu-by-room"
 RECORD = Path(__file__).with_suffix(".json")
 REST = "collecting, and pytest"
 MOST_KEPT = 50
@@ -84,16 +85,24 @@ class Table(Meter):
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         figures = {room: round(cpu, 2) for room, cpu in self._rooms.items()}
-        known = self._config.cache.get(KEY, {}) if self._config.cache else {}
+        key, cache = f"dva-sim/cpu-by-room/{choice(self._config)}", self._config.cache
+        known = cache.get(key, {}) if cache else {}
         terminalreporter.section("CPU seconds by room")
         for line in table(figures, *before(known)):
             terminalreporter.write_line(line)
         if self._config.option.write_cpu_by_room:
             written = {"commit": " ".join(commits()[:1]), "cpu_s": figures}
             RECORD.write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
-        if self._config.cache and (here := commits()[:1]):
+        if cache and (here := commits()[:1]):
             kept = [each for each in known.items() if each[0] not in here]
-            self._config.cache.set(KEY, dict([*kept, (here[0], figures)][-MOST_KEPT:]))
+            cache.set(key, dict([*kept, (here[0], figures)][-MOST_KEPT:]))
+
+
+def choice(config: pytest.Config) -> str:
+    """Names which tests were chosen: figures of others say nothing about these."""
+    option = config.option
+    chosen = [option.markexpr, option.keyword, *sorted(config.args)]
+    return hashlib.sha256("\n".join(chosen).encode()).hexdigest()[:16]
 
 
 def room_of(nodeid: str) -> str:

@@ -10,7 +10,7 @@ import pytest
 MOST_SKIPPED = 40
 """On Linux, where all is installed; 17 of them without an emulated link, 4 without ../shared."""
 
-VERB = {"system": "make test-system", "browser": "make test-browser", "soak": "make test-long"}
+VERB = {"browser": "make test-browser", "soak": "make test-long", "system": "make test-system"}
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -88,6 +88,7 @@ def test_a_normal_law_with_a_correlation_time_forgets_exponentially():
         assert correlation == pytest.approx(step**lag, abs=4 * (spread / n) ** 0.5)
 
 
+@pytest.mark.system
 def test_correlation_leaves_the_law_of_each_delay_as_it_is():
     found = delays(GAMMA | {"correlation_s": 0.5}, every=5.0, count=1500)  # ten of them apart
     known = stats.gamma((0.06 / 0.03) ** 2, loc=0.04, scale=0.03**2 / 0.06)

@@ -44,6 +44,7 @@ def test_a_partition_between_operator_and_robot_leaves_the_rest_of_the_network_a
     assert down.lost == 0
 
 
+@pytest.mark.system
 def test_the_same_seed_gives_the_same_drive_over_bursts_and_slow_delays():
     link = {
         "delay_s": 0.05,

@@ -12,6 +12,8 @@ from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import build
 
+pytestmark = pytest.mark.system
+
 EVENTS = [
     {"kind": "fire", "at_s": 5, "reported": True, "hazard": {"growth": "slow"}},
     {"kind": "gas_leak", "at_s": 10, "reported": True},

@@ -125,6 +125,7 @@ def test_a_forged_revocation_stops_the_driver_who_drives_on_soon():
     assert run.recorder.violations == {}
 
 
+@pytest.mark.system
 @pytest.mark.invariant("S2", "S10")
 def test_no_flood_of_forgeries_keeps_the_dvas_own_grant_away():
     """Each of 50 connections forges two grants a second, to other holders, and as many orders."""

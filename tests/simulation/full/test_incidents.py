@@ -191,6 +191,7 @@ def test_an_event_that_only_a_robot_felt_is_about_what_is_farther_off():
     assert event_about(incident, [seen], site, {robot}) is None
 
 
+@pytest.mark.system
 @pytest.mark.parametrize("heeded", [(), ("gas",)])
 def test_a_leak_that_no_detector_notices_is_smelt_by_a_robot_on_its_round(heeded):
     changes: dict[str, Any] = {

@@ -69,6 +69,7 @@ def test_a_false_alarm_is_responded_to_and_settled_but_not_confirmed():
     assert row["settled_per_min"] == pytest.approx(60.0 / recording.duration)
 
 
+@pytest.mark.system
 def test_a_policy_that_raises_is_counted_and_told(tmp_path):
     """The default decides instead: without the count a study compared it with itself."""
     (tmp_path / "mine.py").write_text(

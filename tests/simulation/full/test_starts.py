@@ -52,6 +52,7 @@ def test_a_longer_way_begins_elsewhere_with_the_same_event_and_the_same_person()
     assert 18.0 / 2.2 < times[1] - times[0] < 18.0 / 0.6  # the same mobilisation, the same pace
 
 
+@pytest.mark.system
 def test_a_way_that_is_longer_than_any_on_the_site_is_refused_with_the_longest_there_is():
     with pytest.raises(ConfigError, match=r"500 m .*guard-1"):
         Run(drill(guard={"count": 1, "way_m": 500.0}, **GUARD_ALONE), 1)
@@ -82,6 +83,7 @@ def test_another_seed_has_other_places_for_robots_without_a_base_of_their_own():
     assert one.robot_bases[3:] != other.robot_bases[3:]
 
 
+@pytest.mark.system
 def test_more_robots_than_fit_are_refused_with_how_many_do():
     with pytest.raises(ConfigError, match="900") as refused:
         Run(drill(robot={"count": 900}), 1)
@@ -91,11 +93,13 @@ def test_more_robots_than_fit_are_refused_with_how_many_do():
     assert len(Run(drill(robot={"count": most}), 1).field.robots) == most
 
 
+@pytest.mark.system
 def test_more_bystanders_than_fit_are_refused_with_how_many_found_a_place():
     with pytest.raises(ConfigError, match=r" \d+ bystanders"):
         Run(drill(bystander={"count": 1000}, **GUARD_ALONE, guard={"count": 1}), 1)
 
 
+@pytest.mark.system
 def test_who_finds_no_place_so_far_from_the_event_is_told_with_how_many_did():
     with pytest.raises(ConfigError, match=r"robot-\d+; \d+ of the team"):
         Run(drill(robot={"count": 60, "way_m": 9.0}), 1)

@@ -354,6 +354,7 @@ print(recording.counters, [dict(u.spent) for u in recording.units])
 """
 
 
+@pytest.mark.system
 def test_the_same_seed_gives_the_same_bytes_in_two_processes():
     scenario = MIXED | {"dispatch": {"policy": "random"}}
     here, elsewhere = told_here_and_elsewhere(PROGRAM.format(scenario=scenario))
@@ -409,6 +410,7 @@ def test_who_knows_the_future_needs_no_more_time_in_sum_than_who_does_not():
 # --- the shipped shift -----------------------------------------------------------------------
 
 
+@pytest.mark.system
 def test_the_shipped_shift_loses_no_event_and_breaks_no_rule():
     document = load_yaml("experiments/scenarios/patrol-shift.yaml")
     recording = simulate_timed(build(document, {"horizon_s": 3600}), 1)

@@ -46,6 +46,7 @@ def test_a_run_has_every_measure_that_a_study_may_ask_for():
     assert all(math.isfinite(value) for value in tables["runs"][0].values())
 
 
+@pytest.mark.system
 def test_the_same_seed_and_person_give_the_same_run_and_others_do_not():
     scenario = build(shipped(), SHORT)
     other = model_of(shipped()).played_by(scenario, 5)

@@ -12,6 +12,8 @@ from dva_sim.experiments.report.report import write_report
 from dva_sim.kernel.measure import names_of
 from dva_sim.simulation.transport.measures import RUN_COLUMNS
 
+pytestmark = pytest.mark.system
+
 TRANSPORTS, CROWDS, PERSONS = ["udp", "tcp"], ["0", "8"], 6
 STUDY = {
     "question": "Which transport?",

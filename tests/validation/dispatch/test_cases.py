@@ -37,6 +37,7 @@ def load(tmp_path, **changes):
     return load_cases(str(path))
 
 
+@pytest.mark.system
 def test_the_shipped_cases_are_known_exactly():
     cases = load_cases()
     assert len(cases) > 30

@@ -343,6 +343,7 @@ def test_a_load_beyond_the_servers_is_refused():
             formula()
 
 
+@pytest.mark.system
 @pytest.mark.skipif(not TARGETS.is_file(), reason="the published numbers are not here")
 def test_the_formulas_give_the_published_numbers():
     targets = json.loads(TARGETS.read_text())

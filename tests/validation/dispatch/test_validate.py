@@ -11,6 +11,8 @@ from dva_sim.validation.dispatch.cases import load_cases
 from dva_sim.validation.dispatch.checks import check_cases
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
 
+pytestmark = pytest.mark.system
+
 FILE = """
 cases:
   queue:

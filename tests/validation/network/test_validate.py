@@ -11,6 +11,8 @@ from dva_sim.validation.network.comparison import NetworkSetting, compare
 from dva_sim.validation.network.reference import load_plan, load_runs
 from dva_sim.validation.network.verdicts import grouped
 
+pytestmark = pytest.mark.system
+
 LABELS = (
     *("req10_d100_j0_l0_r0_p5_T2500", "pub50_d0_j0_l0_r64_p5", "pub10_d50_j0_l5_r0_p5"),
     *("req10_d50_j0_l5_r0_p5_T2500", "req10_d100_j20_l5_r0_p5_T2500"),

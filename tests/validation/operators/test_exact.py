@@ -9,6 +9,8 @@ from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.validation.operators import exact
 from dva_sim.validation.operators.exact import EXACT
 
+pytestmark = pytest.mark.system
+
 LINES = [line for line in lines_of(load_targets(), load_split()) if line.kind == "exact"]
 QUICK = [check for check in EXACT if check != "S16b"]
 

@@ -16,6 +16,8 @@ from dva_sim.validation.operators.experiments import (
 )
 from dva_sim.validation.operators.verdicts import judge, outcome_of
 
+pytestmark = pytest.mark.system
+
 LINES = lines_of(load_targets(), load_split())
 
 
