@@ -100,6 +100,7 @@ def site_of(site: Site) -> Line:
             {
                 "name": room.name,
                 "polygon_m": _rounded(room.polygon),
+                "holes_m": [_rounded(hole) for hole in room.holes],
                 "floor": floor_tint(room, tints),
                 "outdoor": room.outdoor,
             }

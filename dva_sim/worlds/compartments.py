@@ -48,15 +48,19 @@ def of_rooms(
         ways: Doors and exits: ends x1, y1, x2, y2 [m], height [m], kind.
     """
     indoor = [room for room in rooms if not room.outdoor]
-    compartments = [Compartment(r.name, _area(r.polygon), r.ceiling, r.polygon) for r in indoor]
+    compartments = [Compartment(r.name, _area(r), r.ceiling, r.polygon) for r in indoor]
     lookup = Lookup(rooms)
     doors = [opening for way in ways for opening in _passage(lookup, *way)]
     borders = _borders(indoor, walls, [ends for ends, _, _ in ways])
     return FloorPartition(tuple(compartments), (*doors, *borders), _labels(grid, indoor))
 
 
-def _area(polygon: Floats) -> float:
-    x, y = polygon.T
+def _area(room: Room) -> float:
+    return _enclosed(room.polygon) - sum(map(_enclosed, room.holes))
+
+
+def _enclosed(ring: Floats) -> float:
+    x, y = ring.T
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
@@ -79,14 +83,14 @@ def _borders(
     rooms: Sequence[Room], walls: Floats, doors: Sequence[Sequence[float]]
 ) -> Iterator[Opening]:
     """Straight pieces of border between two rooms without a wall or a door."""
-    areas = [shapely.Polygon(room.polygon) for room in rooms]
+    areas = [room.area for room in rooms]
     lines = np.vstack([walls, np.reshape(doors, (-1, 4))]).reshape(-1, 2, 2)
     barriers = [shapely.LineString(line).buffer(NEAR) for line in lines]
     near = shapely.STRtree(barriers)
     wide = [area.buffer(NEAR, join_style="mitre") for area in areas]
     first, second = shapely.STRtree(areas).query(wide, predicate="intersects")
     for a, b in sorted((int(a), int(b)) for a, b in zip(first, second, strict=True) if a < b):
-        shared = areas[a].exterior & wide[b]
+        shared = areas[a].boundary & wide[b]
         closed: Any = shapely.union_all(near.geometries[near.query(shared)])
         for ends in _straight(shared - closed).tolist():
             x1, y1, x2, y2 = _up_to(closed, ends)
@@ -122,8 +126,7 @@ def _labels(grid: OccupancyGrid, rooms: Sequence[Room]) -> Labels:
     labels = np.full(grid.cells.shape, NOWHERE, np.int16)
     for number, room in reversed(list(enumerate(rooms))):
         window = grid.window(room.polygon)
-        border = np.hstack([room.polygon, np.roll(room.polygon, -1, axis=0)])
-        labels[window][cells_inside(grid, border, window)] = number
+        labels[window][cells_inside(grid, segments(room.area), window)] = number
     return labels
 
 

@@ -57,6 +57,16 @@ class GeoFrame:
         meridian = normal * (1 - _E2) / (1 - _E2 * sin**2)
         return math.degrees(1 / (normal * cos)), math.degrees(1 / meridian)
 
+    def distance(self, latitude: float, longitude: float) -> float:
+        """How far a geographic position [deg] lies from the origin, straight through the earth [m].
+
+        The plane does not tell: to it the other side of the earth is as near as this one.
+        """
+        sin_0, cos_0, _ = self._origin
+        phi, along = math.radians(latitude), math.radians(longitude - self.longitude)
+        cosine = sin_0 * math.sin(phi) + cos_0 * math.cos(phi) * math.cos(along)
+        return _A * math.sqrt(max(0.0, 2 - 2 * cosine))
+
     def to_xy(self, latitude: float, longitude: float) -> tuple[float, float]:
         """Plane coordinates [m] of a geographic position [deg]."""
         sin_0, cos_0, normal_0 = self._origin

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections import defaultdict
+import re
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,14 +19,15 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from shapely.errors import GEOSException
 from shapely.geometry import mapping, shape
 
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.suggestions import unknown
-from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.kernel.suggestions import listed, unknown
+from dva_sim.kernel.yaml_files import read_text
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.maps import segments
+from dva_sim.worlds.maps import segments, side
 from dva_sim.worlds.site_parts import (
     CEILING,
     DOOR_HEIGHT,
@@ -46,6 +48,8 @@ from dva_sim.worlds.site_parts import (
 Points = NDArray[np.float64]
 Fail = Callable[[str], ConfigError]
 
+FARTHEST = 10e3  # from the origin, where a plane still is as good as the earth [m]
+IN_PARTS = frozenset({"wall", "zone", "wifi"})  # may be drawn as several shapes in one feature
 DIGITS = 9  # of a coordinate [deg]: a tenth of a millimetre
 
 
@@ -177,57 +181,124 @@ def read_features(path: Path, frame: GeoFrame) -> Iterator[Feature]:
     """The features of a GeoJSON file, in its order.
 
     Raises:
-        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind, no room.
+        ConfigError: not GeoJSON, an unknown kind, a shape that does not suit its kind, a position
+            that is no longitude and latitude or far from the origin, no room.
     """
+    text = read_text(path)
+    collection = _collection(path, text)
+    crs = _crs(collection)
     kinds = set()
-    for index, data in enumerate(_features(path)):
-        fail = partial(_error, path, index)
-        try:
-            feature = _feature(data, frame, fail)
-        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-            raise fail(f"is not a GeoJSON feature: {error}") from error
-        kinds.add(feature.kind)
-        yield feature
+    for index, data in enumerate(collection["features"]):
+        fail = partial(_error, path, text, index)
+        for feature in _parts(data, frame, crs, fail):
+            kinds.add(feature.kind)
+            yield feature
     if "room" not in kinds:
         raise ConfigError("the plan has no feature of kind 'room'", path)
 
 
-def _features(path: Path) -> list[Any]:
+def _collection(path: Path, text: str) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(text)
     except json.JSONDecodeError as error:
         raise ConfigError(f"is not JSON: {error.msg}", path, error.lineno, error.colno) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError("cannot be read", path) from error
     except RecursionError:
         raise ConfigError("is nested too deeply", path) from None
     except ValueError as error:
         raise ConfigError(f"has a value that cannot be read: {error}", path) from error
-    features = data.get("features") if isinstance(data, dict) else None
-    if not isinstance(features, list):
+    if not isinstance(data, dict) or not isinstance(data.get("features"), list):
         raise ConfigError("should be a GeoJSON FeatureCollection with 'features'", path, 1, 1)
-    return features
+    return data
 
 
-def _error(path: Path, index: int, problem: str) -> ConfigError:
-    """The mistake in a feature; only now is the file parsed again, for its line and column."""
-    return load_yaml(path).error(f"feature {index + 1}: {problem}", ("features", index))
+def _crs(collection: Mapping[str, Any]) -> str:
+    """The coordinate reference system that a file names, as before RFC 7946; empty if none."""
+    try:
+        return str(collection["crs"]["properties"]["name"])
+    except (KeyError, TypeError):
+        return ""
 
 
-def _feature(feature: Any, frame: GeoFrame, fail: Fail) -> Feature:
-    properties, geometry = feature["properties"], feature["geometry"]
+def _error(path: Path, text: str, index: int, problem: str) -> ConfigError:
+    """The mistake in a feature; only now is its line and column looked for."""
+    at = _place(text, index)
+    line, column = text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)
+    return ConfigError(f"feature {index + 1}: {problem}", path, line, column)
+
+
+def _place(text: str, index: int) -> int:
+    """Where a feature begins in the text of its file."""
+    features = re.compile(r'"features"\s*:\s*\[').search(text)
+    at = features.end() if features else 0
+    decoder, gap = json.JSONDecoder(), re.compile(r"[\s,]*")
+    for _ in range(index):
+        at = decoder.raw_decode(text, gap.match(text, at).end())[1]  # type: ignore[union-attr]
+    return gap.match(text, at).end()  # type: ignore[union-attr]
+
+
+def _parts(data: Any, frame: GeoFrame, crs: str, fail: Fail) -> Iterator[Feature]:
+    """A feature of the file; where its kind needs no name of its own, its parts one by one."""
+    if not isinstance(data, dict):
+        raise fail("should be a GeoJSON Feature, an object")
+    properties, geometry = data.get("properties"), data.get("geometry")
+    if not isinstance(properties, dict | None):
+        raise fail("its 'properties' should be an object")
+    properties = properties or {}
     kind = properties.get("kind")
-    if kind not in KINDS:
+    if kind is None:
+        raise fail(f"has no property 'kind'; kinds: {listed(KINDS, len(KINDS))}")
+    if not isinstance(kind, str) or kind not in KINDS:
         raise fail(unknown("kind", kind, KINDS))
-    if geometry["type"] not in KINDS[kind].shapes:
-        allowed = " or ".join(KINDS[kind].shapes)
-        raise fail(f"a {kind} is drawn as {allowed}, not {geometry['type']}")
-    drawn: Any = shapely.transform(shape(geometry), lambda points: _to_xy(points, frame))
-    if not np.isfinite(shapely.get_coordinates(drawn)).all() or drawn.is_empty:
+    if not isinstance(geometry, dict) or "type" not in geometry:
+        raise fail(f"this {kind} has no geometry")
+    shapes = KINDS[kind].shapes
+    drawn_as = str(geometry["type"])
+    if drawn_as not in shapes and drawn_as.removeprefix("Multi") not in shapes:
+        raise fail(f"a {kind} is drawn as {' or '.join(shapes)}, not {drawn_as}")
+    drawn = _in_metres(geometry, frame, crs, fail)
+    parts = [drawn] if drawn_as in shapes else list(shapely.get_parts(drawn))
+    if len(parts) > 1 and kind not in IN_PARTS:
+        raise fail(f"this {kind} has {len(parts)} parts; draw each as a feature of its own")
+    for part in parts:
+        if part.geom_type == "Polygon" and not part.is_valid:
+            reason = shapely.is_valid_reason(part).partition("[")[0].lower()
+            raise fail(f"the outline of this {kind} crosses or touches itself ({reason})")
+        yield Feature(kind, part, properties, fail)
+
+
+def _in_metres(geometry: dict[str, Any], frame: GeoFrame, crs: str, fail: Fail) -> Any:
+    """A geometry in the plane of the site, once its positions are known to lie there."""
+    try:
+        drawn: Any = shape(geometry)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, GEOSException):
+        raise fail(f"its coordinates make no {geometry['type']}") from None
+    positions = shapely.get_coordinates(drawn).tolist()
+    if not positions or not np.isfinite(positions).all():
         raise fail("has no usable coordinates")
-    if geometry["type"] == "Polygon" and not drawn.is_valid:
-        raise fail(f"the outline of this {kind} crosses itself")
-    return Feature(kind, drawn, properties, fail)
+    for longitude, latitude in positions:
+        if abs(longitude) > 180 or abs(latitude) > 90:
+            told = f"position {longitude:g}, {latitude:g} is no longitude and latitude in degrees"
+            raise fail(told + _of_system(crs))
+        if frame.distance(latitude, longitude) > FARTHEST:
+            raise fail(_far(longitude, latitude, frame) + _of_system(crs))
+    return shapely.transform(drawn, lambda points: _to_xy(points, frame))
+
+
+def _of_system(crs: str) -> str:
+    """What to do about a file in another coordinate reference system."""
+    if not crs or re.search(r"CRS84|4326", crs):
+        return ""
+    return f"; its crs is {crs!r}: save it in EPSG:4326 (WGS 84)"
+
+
+def _far(longitude: float, latitude: float, frame: GeoFrame) -> str:
+    """A position that lies far from the origin, and what may be the cause."""
+    away = frame.distance(latitude, longitude) / 1e3
+    origin = f"{frame.latitude:g}, {frame.longitude:g}"
+    told = f"position {longitude:g}, {latitude:g} lies {away:,.0f} km from the site's origin"
+    if abs(longitude) <= 90 and frame.distance(longitude, latitude) <= FARTHEST:
+        return f"{told}: longitude comes first, then latitude"
+    return f"{told} (latitude, longitude {origin}); at most {FARTHEST / 1e3:g} km"
 
 
 def _to_xy(points: Points, frame: GeoFrame) -> Points:
@@ -264,6 +335,8 @@ def _to_degrees(points: Points, frame: GeoFrame) -> Points:
 DOOR_REACH = 0.15  # a door opens walls this near to its line [m]
 SILL = 0.5  # floor on both sides of a door, in case the rooms drawn do not meet [m]
 LEAST_EXIT = 0.5  # [m]
+LEAST_HOLE = 1e-4  # a smaller one comes from lines that do not quite meet [m^2]
+NEAR_RIM = 1e-3  # of a hole [m]
 NOTHING = 2  # further out than rooms (0) and ground outdoors (1)
 GROUND = ("room", "path", "yard")  # where two overlap, the first of these counts
 
@@ -299,14 +372,17 @@ def make_plan(features: Iterable[Feature], ceiling: float = CEILING) -> tuple[Fl
         solids=solids,
         door_heights=tuple(door.drawn.height_m for door in kinds["door"]),
         exits=exits,
-        zones=tuple(Zone(n, _corners(f), f.drawn.use) for f, n in _numbered(kinds, "zone")),
+        zones=tuple(
+            Zone(n, _corners(f), f.drawn.use, holes=_holes(f)) for f, n in _numbered(kinds, "zone")
+        ),
         cameras=tuple(_camera(*numbered) for numbered in _numbered(kinds, "camera")),
         base_stations=tuple(
             BaseStation(f.shape.x, f.shape.y, f.drawn.radio, n)
             for f, n in _numbered(kinds, "base_station")
         ),
         wifi=tuple(
-            RadioCoverage(n, _corners(f), f.drawn.link) for f, n in _numbered(kinds, "wifi")
+            RadioCoverage(n, _corners(f), f.drawn.link, holes=_holes(f))
+            for f, n in _numbered(kinds, "wifi")
         ),
     )
     return plan, floor
@@ -322,6 +398,10 @@ def _corners(feature: Feature) -> Points:
     return shapely.get_coordinates(feature.shape.exterior)[:-1]
 
 
+def _holes(feature: Feature) -> tuple[Points, ...]:
+    return tuple(shapely.get_coordinates(hole)[:-1] for hole in feature.shape.interiors)
+
+
 def _rooms(kinds: dict[str, list[Feature]], ceiling: float) -> tuple[Room, ...]:
     """Rooms need names of their own; paths and yards may go without."""
     rooms: list[Room] = []
@@ -333,7 +413,8 @@ def _rooms(kinds: dict[str, list[Feature]], ceiling: float) -> tuple[Room, ...]:
                 raise feature.fail(f"a {kind} needs a name of its own, not {name!r}")
             height = getattr(drawn, "ceiling_m", None) or ceiling
             outdoor, paved = kind != "room", kind != "yard"
-            rooms.append(Room(name, _corners(feature), height, outdoor, paved))
+            holes = _holes(feature)
+            rooms.append(Room(name, _corners(feature), height, outdoor, paved, holes=holes))
     return tuple(rooms)
 
 
@@ -392,7 +473,9 @@ def _open_walls(
     """
     walls = [feature.shape for feature in kinds["wall"]]
     solids = [wall for wall in walls if wall.geom_type == "Polygon"]
-    drawn = shapely.union_all([wall for wall in walls if wall.geom_type != "Polygon"])
+    ground = [room.area for room in rooms]
+    lines = [wall for wall in walls if wall.geom_type != "Polygon"]
+    drawn = shapely.union_all([*lines, *_rims(rooms, shapely.union_all(ground + solids))])
     doors = [feature.shape for feature in kinds["door"]] + [
         feature.shape
         for feature, way in zip(kinds["exit"], exits, strict=True)
@@ -400,10 +483,42 @@ def _open_walls(
     ]
     doorways = [door.buffer(DOOR_REACH, cap_style="flat") for door in doors]
     opened = shapely.difference(drawn, shapely.union_all(doorways))
-    ground = [shapely.Polygon(room.polygon) for room in rooms]
     sills = [door.buffer(SILL, cap_style="flat") for door in doors]
     return (
-        np.vstack([segments(shapely.line_merge(opened)), *map(segments, solids)]),
-        tuple(shapely.get_coordinates(solid.exterior) for solid in solids),
+        np.vstack([segments(shapely.line_merge(opened)), *map(_sides, solids)]),
+        tuple(
+            shapely.get_coordinates(piece.exterior)
+            for solid in solids
+            for piece in _without_holes(solid)
+        ),
         shapely.difference(shapely.union_all(ground + sills), shapely.union_all(solids)),
     )
+
+
+def _rims(rooms: tuple[Room, ...], drawn: Any) -> Iterator[Any]:
+    """The rims of holes in the floor, where nothing else is drawn in them: nobody drives in."""
+    for hole in (hole for room in rooms for hole in room.holes):
+        bare: Any = shapely.difference(shapely.Polygon(hole), drawn)
+        if bare.area > LEAST_HOLE:
+            yield shapely.intersection(shapely.LinearRing(hole), bare.buffer(NEAR_RIM))
+
+
+def _sides(solid: Any) -> Points:
+    """The sides `(n, 4)` [m] of a solid, cut where its pieces without holes are."""
+    sides = np.vstack([segments(piece) for piece in _without_holes(solid)])
+    known = [side(each[:2], each[2:]) for each in sides]
+    times = Counter(known)  # two pieces share a cut, which is no side of the solid
+    return sides[[times[each] == 1 for each in known]] if solid.interiors else sides
+
+
+def _without_holes(area: Any) -> Iterator[Any]:
+    """An area cut into pieces that have none."""
+    if not area.interiors:
+        yield area
+        return
+    (xmin, ymin, xmax, ymax), x = area.bounds, area.interiors[0].centroid.x
+    for low, high in ((xmin, x), (x, xmax)):
+        side = shapely.intersection(area, shapely.box(low, ymin, high, ymax))
+        for piece in shapely.get_parts(side):
+            if piece.geom_type == "Polygon":
+                yield from _without_holes(piece)

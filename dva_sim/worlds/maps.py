@@ -152,6 +152,11 @@ def segments(geometry: Any) -> NDArray[np.float64]:
     return np.hstack([points[:-1][joined], points[1:][joined]])
 
 
+def side(a: NDArray[np.float64], b: NDArray[np.float64]) -> frozenset[tuple[float, ...]]:
+    """A segment in either direction, to the millimetre."""
+    return frozenset(tuple(np.round(end, 3).tolist()) for end in (a, b))
+
+
 def _runs(
     marks: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

@@ -28,7 +28,7 @@ from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.geojson import Feature, make_plan, read_features
-from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise
+from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise, side
 from dva_sim.worlds.office_block import OfficeBlock, office_block
 from dva_sim.worlds.site_parts import (
     CEILING,
@@ -96,8 +96,8 @@ class Site(FloorPlan):
     @cached_property
     def wall_lines(self) -> Floats:
         """The walls `(n, 4)` [m] without the sides of solids."""
-        sides = Counter(_side(a, b) for solid in self.solids for a, b in itertools.pairwise(solid))
-        walls = [_side(wall[:2], wall[2:]) for wall in self.walls]
+        sides = Counter(side(a, b) for solid in self.solids for a, b in itertools.pairwise(solid))
+        walls = [side(wall[:2], wall[2:]) for wall in self.walls]
         drawn = Counter(walls)
         keep = np.array([drawn[wall] > sides[wall] for wall in walls], dtype=bool)
         return np.asarray(self.walls[keep])
@@ -202,20 +202,16 @@ class Site(FloorPlan):
 
     def ground_of(self, room: Room) -> Any:
         """The shapely area of a room; of ground outdoors what nothing else is drawn over."""
-        area: Any = shapely.Polygon(room.polygon)
+        area: Any = room.area
         if not room.outdoor:
             return area
         over = self.rooms[: self.rooms.index(room)]
-        return area - shapely.union_all([shapely.Polygon(other.polygon) for other in over])
-
-
-def _side(a: Floats, b: Floats) -> frozenset[tuple[float, ...]]:
-    """A segment in either direction, to the millimetre."""
-    return frozenset(tuple(np.round(end, 3).tolist()) for end in (a, b))
+        return area - shapely.union_all([other.area for other in over])
 
 
 # A bare map does not say where on earth it is: the campus in Monte de Caparica.
 DEFAULT_FRAME = GeoFrame(38.6612, -9.2058)
+MOST_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
 DESKS = 2  # operator desks on a bare map
 BASE_SPACING = 1.5  # between places that are not drawn [m]
 PASSED_BY = 0.5  # radius that must fit at them on a plan: more than the doors have, mostly [m]
@@ -439,6 +435,7 @@ def _load_site(path: Path, options: str) -> Site:
     frame = GeoFrame(config.origin.latitude, config.origin.longitude)
     features = _features(config, document, frame, json.loads(options))
     plan, floor = make_plan(features, config.ceiling_m)
+    _check_size(floor, config, document)
     site = Site(
         **vars(plan),
         name=config.name,
@@ -453,6 +450,19 @@ def _load_site(path: Path, options: str) -> Site:
             told = f"{feature.kind} needs {radius:g} m of free floor around it: it is in a wall"
             raise feature.fail(told)
     return site
+
+
+def _check_size(floor: Any, config: SiteFile, document: Document) -> None:
+    """Refuse a plan whose grid would take gigabytes."""
+    xmin, ymin, xmax, ymax = floor.bounds
+    width, depth, cell = xmax - xmin, ymax - ymin, config.resolution_m
+    cells = width * depth / cell**2
+    if cells > MOST_CELLS:
+        raise document.error(
+            f"the plan is {width:,.0f} by {depth:,.0f} m: {cells / 1e6:,.0f} million cells of "
+            f"{cell:g} m, at most {MOST_CELLS / 1e6:g} million; draw less or give larger cells",
+            ("resolution_m",),
+        )
 
 
 def _features(

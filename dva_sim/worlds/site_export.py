@@ -63,10 +63,10 @@ def features_of(site: Site) -> Iterator[Feature]:
         x1, y1, x2, y2 = way.ends
         yield Feature("exit", shapely.LineString([(x1, y1), (x2, y2)]), {"name": way.name})
     for zone in site.zones:
-        area = shapely.Polygon(zone.polygon)
+        area = zone.area
         yield Feature("zone", area, {"name": zone.name, "use": zone.use})
     for cover in site.wifi:
-        area = shapely.Polygon(cover.polygon)
+        area = cover.area
         yield Feature("wifi", area, {"name": cover.name, **cover.quality._asdict()})
     yield from _points(site)
 
@@ -74,7 +74,7 @@ def features_of(site: Site) -> Iterator[Feature]:
 def _ground(room: Room, ceiling: float) -> Feature:
     kind = "room" if not room.outdoor else "path" if room.paved else "yard"
     height = {} if room.outdoor or room.ceiling == ceiling else {"ceiling_m": room.ceiling}
-    return Feature(kind, shapely.Polygon(room.polygon), {"name": room.name, **height})
+    return Feature(kind, room.area, {"name": room.name, **height})
 
 
 def _floor(site: Site) -> Iterator[Feature]:

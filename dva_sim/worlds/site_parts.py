@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,24 +21,39 @@ DOOR_HEIGHT = 2.1  # of a door that does not say [m]
 
 @dataclass(frozen=True, eq=False)
 class NamedArea:
-    """A named part of the plane: its corners `(k, 2)` [m]."""
+    """A named part of the plane.
+
+    Attributes:
+        name: Its name.
+        polygon: Corners `(k, 2)` of its outline [m].
+        holes: Corners `(k, 2)` of each hole in it [m].
+    """
 
     name: str
     polygon: Points
+    holes: tuple[Points, ...] = field(default=(), kw_only=True)
 
     def contains(self, x: float, y: float) -> bool:
         """Whether a point [m] lies inside: a ray from it crosses the border an odd time."""
         odd = False
-        px, py = self._corners[-1]
-        for qx, qy in self._corners:
-            if (py > y) != (qy > y) and px + (y - py) * (qx - px) / (qy - py) > x:
-                odd = not odd
-            px, py = qx, qy
+        for corners in self._rings:
+            px, py = corners[-1]
+            for qx, qy in corners:
+                if (py > y) != (qy > y) and px + (y - py) * (qx - px) / (qy - py) > x:
+                    odd = not odd
+                px, py = qx, qy
         return odd
 
     @cached_property
-    def _corners(self) -> list[tuple[float, float]]:
-        return [(float(x), float(y)) for x, y in self.polygon]
+    def _rings(self) -> list[list[tuple[float, float]]]:
+        return [[(float(x), float(y)) for x, y in ring] for ring in (self.polygon, *self.holes)]
+
+    @cached_property
+    def area(self) -> Any:
+        """The same as a shapely polygon."""
+        import shapely  # late: start-up
+
+        return shapely.Polygon(self.polygon, self.holes)
 
     @cached_property
     def box(self) -> tuple[float, float, float, float]:

@@ -14,11 +14,11 @@ import numpy as np
 import shapely
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch, Polygon
+from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
@@ -128,8 +128,8 @@ def _draw_rooms(ax: Axes, site: Site) -> None:
     tints: dict[str, str] = {}
     rooms = sorted(site.rooms, key=lambda room: (not room.outdoor, room.paved))
     colours = [floor_tint(room, tints) for room in rooms]
-    polygons = [room.polygon for room in rooms]
-    ax.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors="none", zorder=1))
+    outlines = [_outline(room.area) for room in rooms]
+    ax.add_collection(PathCollection(outlines, facecolors=colours, edgecolors="none", zorder=1))
     solids = PolyCollection(list(site.solids), facecolors=SOLID, edgecolors=SOLID_EDGE, zorder=2)
     solids.set_linewidth(0.5)
     ax.add_collection(solids)
@@ -204,8 +204,8 @@ def _draw_exit(ax: Axes, way: Exit) -> None:
 
 
 # --- zones -----------------------------------------------------------------------------
-def _hatch(ax: Axes, polygon: Floats, colour: str, hatch: str | None, **style: Any) -> None:
-    patch = Polygon(polygon, fill=False, hatch=hatch, edgecolor=colour, **style)
+def _hatch(ax: Axes, area: Any, colour: str, hatch: str | None, **style: Any) -> None:
+    patch = PathPatch(_outline(area), fill=False, hatch=hatch, edgecolor=colour, **style)
     patch.set_hatch_linewidth(0.45)
     ax.add_patch(patch)
 
@@ -213,15 +213,15 @@ def _hatch(ax: Axes, polygon: Floats, colour: str, hatch: str | None, **style: A
 def _draw_zones(ax: Axes, site: Site) -> None:
     for zone in site.zones:
         colour, hatch = ZONES[zone.use]
-        _hatch(ax, zone.polygon, colour, hatch, lw=0, alpha=0.35, zorder=1.4)
-        _hatch(ax, zone.polygon, colour, None, lw=0.8, ls=(0, (4, 2)), alpha=0.8, zorder=3.1)
+        _hatch(ax, zone.area, colour, hatch, lw=0, alpha=0.35, zorder=1.4)
+        _hatch(ax, zone.area, colour, None, lw=0.8, ls=(0, (4, 2)), alpha=0.8, zorder=3.1)
 
 
 def _draw_coverage(ax: Axes, site: Site) -> None:
     """Each coverage where no later one is drawn over it."""
     above: Any = shapely.Polygon()
     for area in reversed(site.wifi):
-        polygon = shapely.Polygon(area.polygon)
+        polygon = area.area
         if area.grade in COVERAGE:
             colour, alpha = COVERAGE[area.grade]
             _fill(ax, polygon - above, facecolor=colour, alpha=alpha, lw=0, zorder=1.6)
@@ -230,10 +230,15 @@ def _draw_coverage(ax: Axes, site: Site) -> None:
 
 def _fill(ax: Axes, area: Any, **style: Any) -> None:
     """A shapely area, holes and all."""
-    rings = shapely.get_rings(shapely.get_parts(area))
-    if len(rings):
-        paths = (Outline(shapely.get_coordinates(ring), closed=True) for ring in rings)
-        ax.add_patch(PathPatch(Outline.make_compound_path(*paths), **style))
+    if not area.is_empty:
+        ax.add_patch(PathPatch(_outline(area), **style))
+
+
+def _outline(area: Any) -> Outline:
+    """The rings of a shapely area: outwards and holes turn opposite ways."""
+    oriented = shapely.get_parts(shapely.orient_polygons(area))
+    rings = (shapely.get_coordinates(ring) for ring in shapely.get_rings(oriented))
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
 
 LONG_SIDE, MOST_INCHES = 8.4, 18.0  # of the picture [in]; a page shows 840 pixels of it

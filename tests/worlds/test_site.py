@@ -94,8 +94,8 @@ def write_mistakes():
         "kind 'window' is unknown; known: wall, room": [*TWO_ROOMS, window],
         "a room needs a name of its own, not 'west'": [*TWO_ROOMS, twice],
         "a wall is drawn as LineString or MultiLineString or Polygon": [*TWO_ROOMS, point],
-        "crosses itself": [*TWO_ROOMS, feature("room", "Polygon", knot, name="knot")],
-        "is not a GeoJSON feature": [*TWO_ROOMS, {"type": "Feature"}],
+        "self-intersection": [*TWO_ROOMS, feature("room", "Polygon", knot, name="knot")],
+        "has no property 'kind'": [*TWO_ROOMS, {"type": "Feature"}],
     }
 
 

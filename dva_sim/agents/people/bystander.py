@@ -235,7 +235,7 @@ def _sides(room: Room) -> tuple[float, float]:
     """The shorter and the longer side of the smallest rectangle around a room [m]."""
     import shapely
 
-    corners = shapely.get_coordinates(shapely.oriented_envelope(shapely.Polygon(room.polygon)))
+    corners = shapely.get_coordinates(shapely.oriented_envelope(room.area))
     one, other = np.hypot(*np.diff(corners[:3], axis=0).T).tolist()
     return min(one, other), max(one, other)
 

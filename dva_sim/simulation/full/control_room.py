@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.control_room.dispatcher import ScriptedDispatcher
@@ -165,7 +164,7 @@ def _ground(stage: Stage) -> SiteKnowledge:
         WaitingPlace(f"post {number}", m.Position(*frame.to_latlon(post.x, post.y)))
         for number, post in enumerate(stage.site.guard_posts, 1)
     )
-    rooms = [shapely.Polygon(room.polygon) for room in stage.site.rooms]
+    rooms = [room.area for room in stage.site.rooms]
     if not stations or not rooms:
         return SiteKnowledge()
     starts = [Start(s.name, "guard", s.position, under_way=True) for s in stations]

@@ -200,7 +200,7 @@ def middle_of(site: Site, room: str) -> tuple[float, float]:
     Raises:
         ConfigError: there is no such room.
     """
-    outline = shapely.Polygon(site.room(room).polygon)
+    outline = site.room(room).area
     low_x, low_y, high_x, high_y = outline.bounds
     (low_row, low_column), (high_row, high_column) = (
         site.grid.to_cell(low_x, low_y),

@@ -321,7 +321,7 @@ def _passages_of(site: Site) -> tuple[Point, ...]:
 
     walls = shapely.MultiLineString(site.walls.reshape(-1, 2, 2).tolist()).buffer(WALL)
     doors = [((a + c) / 2, (b + d) / 2) for a, b, c, d in site.doors.tolist()]
-    borders = [shapely.Polygon(room.polygon).exterior for room in site.rooms]
+    borders = [room.area.boundary for room in site.rooms]
     for number, border in enumerate(borders):
         for other in borders[:number]:
             opening = shapely.line_merge(border.intersection(other.buffer(WALL)).difference(walls))

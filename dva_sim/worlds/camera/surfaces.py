@@ -313,6 +313,6 @@ def _room_numbers(
         high = np.ceil((room.polygon.max(axis=0) - origin) / cell - 0.5).astype(int)
         columns, rows = np.arange(low[0], high[0]), np.arange(low[1], high[1])
         x, y = np.meshgrid(origin[0] + (columns + 0.5) * cell, origin[1] + (rows + 0.5) * cell)
-        inside = shapely.contains_xy(shapely.Polygon(room.polygon), x, y)
+        inside = shapely.contains_xy(room.area, x, y)
         numbers[low[1] : high[1], low[0] : high[0]][inside] = number
     return numbers

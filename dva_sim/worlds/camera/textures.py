@@ -159,10 +159,15 @@ class Floors:
         image = Image.new("RGB", (columns, rows), DAYLIGHT if site.rooms else BARE_CEILING)
         draw = ImageDraw.Draw(image)
         for room in (room for room in site.rooms if not room.outdoor):
-            corners = (room.polygon - self._rooms.origin) / self._rooms.cell - 0.5
-            draw.polygon([tuple(c) for c in corners.tolist()], fill=CEILING)
+            self._fill(draw, room.polygon, CEILING)
             self._lamps_of(draw, room.polygon)
+            for hole in room.holes:
+                self._fill(draw, hole, DAYLIGHT)
         return np.asarray(image)
+
+    def _fill(self, draw: Any, polygon: NDArray[np.float64], colour: Any) -> None:
+        corners = (polygon - self._rooms.origin) / self._rooms.cell - 0.5
+        draw.polygon([tuple(c) for c in corners.tolist()], fill=colour)
 
     def _lamps_of(self, draw: Any, polygon: NDArray[np.float64]) -> None:
         (xmin, ymin), (xmax, ymax) = polygon.min(axis=0), polygon.max(axis=0)

@@ -8,7 +8,8 @@
  *   person?: boolean, wheel_radius_m?: number, corners_m?: number[][], steering?: string,
  *   sensors?: string[]}} Thing
  *
- * @typedef {{name: string, polygon_m: number[][], floor: string, outdoor: boolean}} Room
+ * @typedef {{name: string, polygon_m: number[][], holes_m: number[][][], floor: string,
+ *   outdoor: boolean}} Room
  * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
  *   cells: string, heading_rad?: number}} Raster
  * @typedef {{name: string, extent_m: number[], rooms: Room[], walls_m: number[][],

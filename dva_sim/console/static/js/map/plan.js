@@ -16,7 +16,10 @@ export class Plan {
     this.site = site;
     const rooms = [...site.rooms].sort((a, b) => Number(b.outdoor) - Number(a.outdoor));
     /** @type {Floor[]} */
-    this.floors = rooms.map((room) => ({ path: ring(room.polygon_m), colour: room.floor }));
+    this.floors = rooms.map((room) => ({
+      path: union([room.polygon_m, ...room.holes_m].map(ring)),
+      colour: room.floor,
+    }));
     this.solids = union(site.solids_m.map(ring));
     this.walls = lines(site.walls_m);
     this.doors = lines(site.doors_m);
@@ -36,7 +39,7 @@ export class Plan {
     const dark = colours.page === DARK.page;
     for (const floor of this.floors) {
       ctx.fillStyle = dark ? darker(floor.colour) : floor.colour;
-      ctx.fill(floor.path);
+      ctx.fill(floor.path, 'evenodd');
     }
     this.drawSolids(ctx, affine, colours);
     this.drawWalls(ctx, affine, colours);

@@ -44,7 +44,10 @@ export function thingsOf(kinds) {
  */
 export function roomAt(x, y) {
   const rooms = scene.peek()?.site.rooms ?? [];
-  const inside = rooms.filter((room) => contains(room.polygon_m, x, y));
+  const inside = rooms.filter(
+    (room) =>
+      contains(room.polygon_m, x, y) && !room.holes_m.some((hole) => contains(hole, x, y)),
+  );
   return (inside.find((room) => !room.outdoor) ?? inside[0])?.name ?? '';
 }
 
