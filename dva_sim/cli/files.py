@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from typer import Argument, Option
@@ -114,11 +114,16 @@ def phone_log(
         Path | None,
         Option("--part", metavar="OUT", help="Write an accelerometer part that measures so."),
     ] = None,
+    unit: Annotated[
+        Literal["m/s2", "g"] | None,
+        Option("--unit", help="Of the log of another app whose head does not say it."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Say how even and how noisy a phone's samples are, or replay them.
 
-    Files of motion are written by a console that keeps them, of phones whose person agrees.
+    FILE is written by a console that keeps the motion of phones whose person agrees, or exported
+    by a logger app: a table of time and acceleration with gravity along x, y and z.
 
     Examples:
         dva-sim phone-log motion-1.csv  # rate, jitter, gaps, noise at rest
@@ -128,11 +133,11 @@ def phone_log(
     from dva_sim.cli import phone_log  # late: start-up
 
     if part is not None:
-        phone_log.write_part(file, part)
+        phone_log.write_part(file, part, unit)
     elif commands:
         phone_log.tell_commands(file, rate)
     else:
-        phone_log.tell(file, as_json)
+        phone_log.tell(file, as_json, unit)
 
 
 def schema(

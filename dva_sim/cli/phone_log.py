@@ -8,17 +8,18 @@ from pathlib import Path
 
 from dva_sim.cli.verbosity import print_json
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.recordings.motion import read_motion, replayed
+from dva_sim.recordings.motion import NoMotionOfOursError, PhoneMotion, read_motion, replayed
 from dva_sim.recordings.motion_figures import MotionFigures, figures_of, part_of
+from dva_sim.recordings.sensor_log import Unit, read_sensor_log
 
 
-def tell(path: Path, as_json: bool) -> None:
+def tell(path: Path, as_json: bool, unit: Unit | None) -> None:
     """Print figures.
 
     Raises:
         ConfigError: it is no such file, or too short.
     """
-    found = figures_of(read_motion(path), path)
+    found = figures_of(_motion(path, unit), path)
     if as_json:
         print_json(found._asdict())
         return
@@ -26,16 +27,26 @@ def tell(path: Path, as_json: bool) -> None:
         print(line)
 
 
+def _motion(path: Path, unit: Unit | None) -> PhoneMotion:
+    """What a console has written, or the log of another app."""
+    try:
+        return read_motion(path)
+    except NoMotionOfOursError:
+        return PhoneMotion(read_sensor_log(path, unit))
+
+
 def lines(found: MotionFigures) -> list[str]:
     """The figures in words."""
-    return [
+    told = [
         f"{found.samples} samples in {found.duration_s:.1f} s: {found.rate_hz:.1f} a second, "
         f"jitter {100.0 * found.jitter:.1f} %",
         f"gaps: {found.gaps}, the longest interval {1000.0 * found.longest_gap_s:.0f} ms",
         f"noise at rest {found.noise_mg:.2f} mg, steps of {found.resolution_mg:.3f} mg, "
         f"largest {found.largest_g:.2f} g",
-        f"{found.late_ms:.0f} ms from a sample to when it came",
     ]
+    if found.late_ms is not None:
+        told.append(f"{found.late_ms:.0f} ms from a sample to when it came")
+    return told
 
 
 def tell_commands(path: Path, rate_hz: float) -> None:
@@ -44,18 +55,24 @@ def tell_commands(path: Path, rate_hz: float) -> None:
     Raises:
         ConfigError: it is no such file, or one of its apps cannot be made.
     """
+    try:
+        motion = read_motion(path)
+    except NoMotionOfOursError:
+        raise ConfigError(
+            "has no app that makes commands: only a console's own files of motion have", path
+        ) from None
     print("t_s,speed_mps,turn_rate_radps,sample_age_s")
-    for now, command in replayed(read_motion(path), rate_hz=rate_hz):
+    for now, command in replayed(motion, rate_hz=rate_hz):
         print(f"{now:.6f},{command.speed!r},{command.turn_rate!r},{command.sample_age:.6f}")
 
 
-def write_part(path: Path, out: Path) -> None:
+def write_part(path: Path, out: Path, unit: Unit | None) -> None:
     """Write an accelerometer part of what a file tells.
 
     Raises:
         ConfigError: it is no such file, or `out` exists or cannot be written.
     """
-    part = part_of(figures_of(read_motion(path), path))
+    part = part_of(figures_of(_motion(path, unit), path))
     text = "".join(f"{key}: {_yaml(value)}\n" for key, value in part.items())
     try:
         with out.open("x", encoding="utf-8") as file:

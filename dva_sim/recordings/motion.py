@@ -32,6 +32,10 @@ APP: Final = "# app "
 MOST_BYTES: Final = 64_000_000  # of a file: about two hours at 60 samples a second
 
 
+class NoMotionOfOursError(ConfigError):
+    """A file is none that a console has written."""
+
+
 class MotionSample(NamedTuple):
     """One sample.
 
@@ -135,13 +139,14 @@ def read_motion(path: Path) -> PhoneMotion:
     """What is in a file of motion.
 
     Raises:
-        ConfigError: it is none, or damaged: file and line.
+        NoMotionOfOursError: it is none.
+        ConfigError: it is damaged: file and line.
     """
     motion = PhoneMotion()
     try:
         with path.open(encoding="utf-8") as file:
             if file.readline().rstrip("\n") != FIRST_LINE:
-                raise ConfigError("is no motion of a phone", path, 1, 1)
+                raise NoMotionOfOursError("is no motion of a phone", path, 1, 1)
             for number, line in enumerate(file, 2):
                 _take(motion, line.rstrip("\n"), path, number)
     except UnicodeDecodeError:

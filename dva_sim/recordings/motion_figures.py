@@ -27,7 +27,7 @@ class MotionFigures(NamedTuple):
         jitter: Standard deviation of the intervals without gaps, as a share of their median.
         gaps: Intervals longer than three medians.
         longest_gap_s: The longest interval [s].
-        late_ms: Median time from a sample to when it came [ms].
+        late_ms: Median time from a sample to when it came [ms]; None if the file does not say.
         noise_mg: White noise of a sample at rest, mean of the axes, in thousandths of gravity: by
             the differences of neighbours, so that slow motion does not count.
         resolution_mg: Smallest step between two samples, likewise.
@@ -40,7 +40,7 @@ class MotionFigures(NamedTuple):
     jitter: float
     gaps: int
     longest_gap_s: float
-    late_ms: float
+    late_ms: float | None
     noise_mg: float
     resolution_mg: float
     largest_g: float
@@ -65,11 +65,16 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
         jitter=pstdev(even) / usual,
         gaps=len(steps) - len(even),
         longest_gap_s=max(steps),
-        late_ms=1000.0 * median(sample.came - sample.at for sample in samples),
+        late_ms=_late_ms(samples),
         noise_mg=1000.0 * min(map(_noise, _stretches(samples, usual))) / GRAVITY,
         resolution_mg=1000.0 * _resolution(samples) / GRAVITY,
         largest_g=max(abs(part) for sample in samples for part in sample.xyz) / GRAVITY,
     )
+
+
+def _late_ms(samples: list[MotionSample]) -> float | None:
+    late = [sample.came - sample.at for sample in samples if not math.isnan(sample.came)]
+    return 1000.0 * median(late) if late else None
 
 
 def _stretches(samples: list[MotionSample], step: float) -> list[list[MotionSample]]:

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import base64
 import json
-import struct
 from bisect import bisect_right
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, nan
 from pathlib import Path
-from typing import IO, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pydantic
@@ -26,8 +25,14 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Applied, DriveLog, Moment, Recorder, Sent, Shown, TrackPoint
 from dva_sim.protocol.messages import Position
 from dva_sim.recordings import channels, messages, writing
-from dva_sim.recordings.messages import XML
-from dva_sim.recordings.writing import ABOUT, DIGEST, FORMAT, RUN, SCENARIO, SITE, TABLES, digest
+from dva_sim.recordings.raw_records import DamagedError, RawRecords, is_camera
+from dva_sim.recordings.writing import (
+    FORMAT,
+    RUN,
+    SCENARIO,
+    SITE,
+    TABLES,
+)
 from dva_sim.simulation.full import Ending, Playback
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.simulation.full.observation_json import of_plain
@@ -133,10 +138,6 @@ class RecordedSurroundings(Surroundings):
         return Raster(values, extent, QUANTITIES[what].unit)
 
 
-LARGEST = 2**31  # of one record [B]; what claims to be larger is damaged
-CUT = "is damaged, or was cut short before anything of the run"
-
-
 @dataclass(frozen=True)
 class Opened:
     """A recording that has been read.
@@ -150,6 +151,7 @@ class Opened:
         traces: The lines of what was decided, by who decides.
         audit: The rows of the audit log.
         terms: Limits that the safety rules hold the run to; None: the file has no facts.
+        left_out: How many messages of each topic the file lacks, which was filtered.
     """
 
     playback: Playback
@@ -159,6 +161,7 @@ class Opened:
     traces: dict[str, list[str]] = field(default_factory=dict)
     audit: list[dict[str, Any]] = field(default_factory=list)
     terms: SafetyTerms | None = None
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def is_whole(self) -> bool:
@@ -172,13 +175,13 @@ def read_recording(path: Path) -> Opened:
     Raises:
         ConfigError: no such file, not a recording, a damaged one, or one of a later version.
     """
-    raw = _Raw()
+    raw = RawRecords()
     try:
         with path.open("rb") as file:
             raw.read(file)
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", path) from None
-    except _Damaged as error:
+    except DamagedError as error:
         raise ConfigError(str(error), path) from None
     try:
         return _opened(raw)
@@ -190,102 +193,8 @@ def read_recording(path: Path) -> Opened:
 _BROKEN = KeyError, TypeError, ValueError, AttributeError, IndexError
 
 
-class _Exactly:
-    """A file that gives as many bytes as are asked for, or says that it ends early."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-
-    def read(self, length: int) -> bytes:
-        """The next bytes."""
-        from mcap.exceptions import EndOfFile
-
-        data = self._file.read(length)
-        if len(data) < length:
-            raise EndOfFile
-        return data
-
-
-class _Damaged(Exception):
-    """What is in the file is not what was written."""
-
-
-@dataclass
-class _Raw:
-    """What a file holds, sorted a little.
-
-    Attributes:
-        about: Its metadata, if they are ours.
-        files: What is attached, by name.
-        said: Content of the messages, with their time [s], by topic.
-        ends: Source and destination of the channels of XML, by topic.
-        order: Facts and messages in the order of the file: time [s], topic, content.
-        time: Of the last message [s].
-        is_cut: Whether the end of the file is missing.
-    """
-
-    about: dict[str, str] | None = None
-    files: dict[str, bytes] = field(default_factory=dict)
-    said: dict[str, list[tuple[float, Any]]] = field(default_factory=lambda: defaultdict(list))
-    ends: dict[str, dict[str, str]] = field(default_factory=dict)
-    order: list[tuple[float, str, Any]] = field(default_factory=list)
-    time: float = 0.0
-    is_cut: bool = False
-
-    def read(self, file: IO[bytes]) -> None:
-        """Read records up to the end of the file, expected or not.
-
-        Raises:
-            _Damaged: something else than an early end.
-        """
-        from mcap.exceptions import EndOfFile, InvalidMagic, McapError
-        from mcap.records import Channel
-        from mcap.stream_reader import StreamReader
-        from zstandard import ZstdError
-
-        channels: dict[int, Channel] = {}
-        source: Any = _Exactly(file)
-        reader = StreamReader(source, validate_crcs=True, record_size_limit=LARGEST)
-        try:
-            for record in reader.records:
-                self._take(record, channels)
-        except EndOfFile:
-            self.is_cut = True
-        except InvalidMagic:
-            where = "end" if self.files else "begin"
-            raise _Damaged(f"is not a recording: it does not {where} as MCAP does") from None
-        except (McapError, ZstdError, ValueError, KeyError, struct.error, MemoryError) as error:
-            raise _Damaged(f"is damaged: {' '.join(str(error).split())[:200]}") from None
-        if self.about is None or digest(self.files) != self.about.get(DIGEST):
-            raise _Damaged(CUT if self.is_cut else "is damaged: something is missing or changed")
-
-    def _take(self, record: Any, opened: dict[int, Any]) -> None:
-        from mcap.records import Attachment, Channel, Message, Metadata
-
-        if isinstance(record, Message):
-            channel = opened[record.channel_id]
-            is_xml = channel.message_encoding == XML
-            self.time = record.log_time / messages.NS
-            content = record.data if is_xml else json.loads(record.data)
-            self.said[channel.topic].append((self.time, content))
-            if is_xml or channel.topic.startswith(channels.OBSERVED) or _is_camera(channel.topic):
-                self.order.append((self.time, channel.topic, content))
-        elif isinstance(record, Channel):
-            opened[record.id] = record
-            if record.metadata:
-                self.ends[record.topic] = dict(record.metadata)
-        elif isinstance(record, Attachment):
-            self.files[record.name] = record.data
-        elif isinstance(record, Metadata) and record.name == ABOUT:
-            self.about = dict(record.metadata)
-
-
-def _is_camera(topic: str) -> bool:
-    return topic.endswith(f"/{channels.CAMERA}")
-
-
 # --- from what was said to what can be shown -------------------------------------------
-def _opened(raw: _Raw) -> Opened:
+def _opened(raw: RawRecords) -> Opened:
     run = json.loads(raw.files[RUN])
     if run["format"] > FORMAT:
         raise ValueError(f"its form {run['format']} is later than {FORMAT}")
@@ -321,16 +230,25 @@ def _opened(raw: _Raw) -> Opened:
     if writing.HELD_TO in run:
         terms = terms_of(scenario, run[writing.HELD_TO])
         playback.recorder.facts = list(_facts(raw, run))
-    return Opened(playback, raw.about or {}, tables, run["duration_s"], traces, audit, terms)
+    return Opened(
+        playback,
+        raw.about or {},
+        tables,
+        run["duration_s"],
+        traces,
+        audit,
+        terms,
+        Counter(raw.written) - raw.found,
+    )
 
 
-def _facts(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Any]:
+def _facts(raw: RawRecords, run: Mapping[str, Any]) -> Iterator[Any]:
     """Yield the facts that safety rules are judged by, with messages and pictures in between."""
     ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
     for time, topic, content in raw.order:
         if topic.startswith(channels.OBSERVED):
             yield of_plain(topic.removeprefix(channels.OBSERVED), time, content)
-        elif _is_camera(topic):
+        elif is_camera(topic):
             yield Sent(time, ids[topic.split("/")[1]], "", 0, content)
         else:
             ends = raw.ends[topic]["source"], raw.ends[topic]["destination"]
@@ -374,7 +292,7 @@ def _event(entry: Mapping[str, Any]) -> Event:
 
 
 def _surroundings(
-    raw: _Raw, site: Site, incidents: list[RunHazard], contained: dict[int, float]
+    raw: RawRecords, site: Site, incidents: list[RunHazard], contained: dict[int, float]
 ) -> Surroundings:
     """The fields of the hazards: solved again, but with a hazard that is not ours as recorded."""
     real = [number for number, incident in enumerate(incidents) if not incident.false_alarm]
@@ -392,7 +310,7 @@ def _surroundings(
     return surroundings
 
 
-def _recorder(raw: _Raw, run: Mapping[str, Any]) -> Recorder:
+def _recorder(raw: RawRecords, run: Mapping[str, Any]) -> Recorder:
     recorder = Recorder(keep_traffic=True)
     recorder.timeline = [
         Moment(time, log["name"], log["message"], log["kind"])
@@ -443,7 +361,7 @@ def _left_out(before: TrackPoint, until: float, period: float) -> Iterator[Track
     return (before._replace(time=before.time + (n + 1) * period) for n in range(missing))
 
 
-def _traffic(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Sent]:
+def _traffic(raw: RawRecords, run: Mapping[str, Any]) -> Iterator[Sent]:
     ids = {name: device for device, name in channels.names_of(run["labels"]).items()}
     for topic, said in raw.said.items():
         if topic in raw.ends:
@@ -455,7 +373,7 @@ def _traffic(raw: _Raw, run: Mapping[str, Any]) -> Iterator[Sent]:
                 yield Sent(time, source, ids[frame["to"]], frame["size_bytes"], frame)
 
 
-def _drives(raw: _Raw, run: Mapping[str, Any]) -> list[DriveLog]:
+def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
     drives = [
         DriveLog(**{key.removesuffix("_s"): entry[key] for key in writing.DRIVE})
         for entry in run["drives"]

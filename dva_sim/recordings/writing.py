@@ -93,6 +93,7 @@ def _map_files(site: Site) -> dict[str, bytes]:
 
 
 FORMAT = 1  # of what is attached; a reader refuses a later one
+COUNTS = "dva-sim messages"  # metadata of how many each topic has, by which filtering is found
 ABOUT, DIGEST = "dva-sim", "digest"  # name of the metadata, and of one entry of it
 RUN, SCENARIO, TABLES, SITE = "run.json", "scenario.json", "tables.json", "site/"
 DESCRIBED = ("title", "shows", "colour", "mark")  # of a hazard whose class a reader does not load
@@ -263,7 +264,7 @@ def _add_messages(
 ) -> None:
     """All messages in order of time; schemas and channels are opened when first used."""
     ids = {name: device for device, name in channels.names_of(playback.labels).items()}
-    counts: Counter[int] = Counter()
+    counts: Counter[str] = Counter()
 
     @cache
     def schema_of(name: str) -> int:
@@ -289,8 +290,9 @@ def _add_messages(
         every.insert(0, _packed(told))
     for time, topic, schema, data in sorted(every, key=lambda entry: entry[0]):
         channel = channel_of(topic, schema)
-        counts[channel] += 1
-        writer.add_message(channel, time, data, time, counts[channel])
+        counts[topic] += 1
+        writer.add_message(channel, time, data, time, counts[topic])
+    writer.add_metadata(COUNTS, {topic: str(count) for topic, count in sorted(counts.items())})
 
 
 def _packed(message: ChannelMessage) -> tuple[int, str, str, bytes]:

@@ -11,16 +11,24 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+import numpy as np
+
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import listed
 from dva_sim.protocol.mistakes import Problem, check_message
 
 if TYPE_CHECKING:  # late: start-up
+    from dva_sim.network.link.recorded import DelayLog
     from dva_sim.recordings.reading import Opened
     from dva_sim.simulation.full.verdicts import Verdict
 
 UNFINISHED: Final = "the run was interrupted or is still running; it was checked as far as it goes"
 CUT: Final = "its last line is cut off, as of a program that was killed; all others were checked"
 
+
+OPPORTUNITIES: Final = (".up", ".down")  # the endings of Mahimahi's traces
+OPPORTUNITY_BYTES: Final = 1500  # what each lets through
+LONG_GAP_S: Final = 60.0  # a trace without opportunities for longer is doubted
 
 Found = tuple[list[Problem], list[str], str]  # problems, doubts, and what was looked at
 
@@ -45,6 +53,9 @@ def check_recording(path: Path) -> tuple[list[Problem], list[str], str, list[Ver
     for number, (sent, data) in enumerate(said, 1):
         where = f"message {number}, at {sent.time:.1f} s, from {sent.source}"
         problems += [Problem(1, 1, f"{where}: {found.text}") for found in check_message(data)]
+    if opened.left_out:
+        lacking = listed((f"{topic} {n}" for topic, n in sorted(opened.left_out.items())), 4)
+        problems.append(Problem(1, 1, f"was filtered: messages are missing, by topic: {lacking}"))
     note = f"{len(said)} messages"
     for who, lines in opened.traces.items():
         replayed = _replayed([line.encode() for line in lines], path)
@@ -97,6 +108,38 @@ def check_audit_log(path: Path) -> Found:
     )
     rows = "1 row" if found.rows == 1 else f"{found.rows} rows"
     return problems, list(found.doubts), f"{rows}, the last one with the hash {found.head}"
+
+
+def check_recorded_link(path: Path) -> Found:
+    """What is wrong with a recorded link: packet opportunities, a log of delays, or bare delays."""
+    from dva_sim.network.link import recorded  # late: start-up
+
+    file = str(path)
+    try:
+        if recorded.columns_of(file) > 1:
+            return [], [], _of_delay_log(recorded.read_delay_log(file))
+        if path.suffix not in OPPORTUNITIES and not recorded.is_trace(file):
+            return [], [], f"{len(recorded.read_delays(file))} delays"
+        times = recorded.read_trace(file)
+    except ConfigError as error:
+        return [Problem(error.line or 1, error.column or 1, error.problem)], [], ""
+    gap, lasts = recorded.longest_gap_s(times), float(times[-1])
+    rate = len(times) * OPPORTUNITY_BYTES * 8 / lasts
+    doubts = []
+    if gap > LONG_GAP_S:
+        doubts.append(
+            f"carries nothing for {gap:,.0f} s on end, and nothing in runs that fit there"
+        )
+    return (
+        [],
+        doubts,
+        f"{len(times)} packet opportunities in {lasts:,.6g} s, {rate / 1e3:,.4g} kbit/s",
+    )
+
+
+def _of_delay_log(log: DelayLog) -> str:
+    lost, lasts = float(np.isnan(log.delays).mean()), log.times[-1] - log.times[0]
+    return f"{len(log.times)} probes in {lasts:,.6g} s, {lost:.1%} of them lost"
 
 
 class _Replayed(NamedTuple):

@@ -31,7 +31,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
+from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml, read_text
 from dva_sim.protocol.mistakes import Problem
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario, model_of
@@ -43,9 +43,11 @@ from dva_sim.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.validation.network.reference import PlanConfig, load_plan
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.geojson import make_plan, read_features
-from dva_sim.worlds.maps import RosMap
+from dva_sim.worlds.maps import RosMap, doubts_of_map
 from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
 
+PROBE: Final = "drive-to-event"  # the scenario that a map is tried with
+PROBES: Final = 6  # its runs
 _COUNTS: Final = {
     "robots of the scenario": ("robot", "count"),
     "guards of the scenario": ("guard", "count"),
@@ -222,10 +224,28 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
     """What does not go together in a valid study or scenario."""
     if kind.model is Study:
         return contradictions_in(cell_grid.cells(load_study(document.file)))
+    if kind.model is RosMap:
+        return [*doubts_of_map(document.file), *_without_a_place(document)]
     if kind.load is not _rehearse:
         return []
     model = model_of(document)
     return model.contradictions(model.build(document, {}))
+
+
+def _without_a_place(document: Document) -> Iterator[str]:
+    """Say of a map in how many runs no event finds a place."""
+    scenario = scenarios.load(PROBE)
+    model, problems = model_of(scenario), list[str]()
+    for seed in range(1, PROBES + 1):
+        try:
+            model.rehearse(model.build(scenario, {"site.map": str(document.file.resolve())}), seed)
+        except ConfigError as error:
+            problems.append(error.problem)
+    if problems:
+        yield (
+            f"{len(problems)} of {PROBES} runs that were tried cannot begin: {problems[0]}; "
+            "it needs more open floor"
+        )
 
 
 def check_plan(path: Path) -> list[Problem]:
@@ -312,12 +332,12 @@ def _load_phone(document: Document) -> None:
 def _frame_of(path: Path) -> GeoFrame:
     """A plane where the plan is, so that it can be judged without its site."""
     try:
-        position: Any = json.loads(path.read_text(encoding="utf-8"))
-        position = position["features"][0]["geometry"]["coordinates"]
+        features = json.loads(read_text(path))["features"]
+        position: Any = next(f["geometry"]["coordinates"] for f in features if f.get("geometry"))
         while isinstance(position[0], list):
             position = position[0]
         longitude, latitude = float(position[0]), float(position[1])
-    except (LookupError, TypeError, ValueError):
+    except (LookupError, TypeError, ValueError, AttributeError, StopIteration):
         return DEFAULT_FRAME  # what is wrong with it, its reader says with the place
     return GeoFrame(latitude, longitude) if abs(latitude) < 89 else DEFAULT_FRAME
 

@@ -33,11 +33,22 @@ _SUFFIXES: Final = {
     ".part": "recording",
     ".jsonl": "trace",
     ".sqlite": "audit log",
+    ".up": "recorded link",
+    ".down": "recorded link",
 }
 _UNKNOWN: Final = (
     "cannot be recognised; should be a message (.xml), a plan (.geojson), a recording (.mcap), "
-    "a trace of decisions (.jsonl), an audit log (.sqlite), or a study, scenario, site, ROS map or "
-    "agent profile (.yaml)"
+    "a trace of decisions (.jsonl), an audit log (.sqlite), a recorded link (.up, .down, or a log "
+    "of delays), or a study, scenario, site, ROS map or agent profile (.yaml)"
+)
+
+
+_RECORDED: Final = (
+    b"\x89MCAP",
+    *(b"\x28\xb5\x2f\xfd", b"\x1f\x8b", b"\x04\x22\x4d\x18"),  # compressed: zstd, gzip, lz4
+)
+_OF_LINK: Final = re.compile(
+    rb"(\xef\xbb\xbf|#[^\n]*\n|\s)*(\d[\d.]*[\s,;]*(\d[\d.]*|-|\*|lost|nan)?\r?\n|PING )"
 )
 
 
@@ -89,7 +100,11 @@ def _by_content(head: bytes) -> str | None:
         return "message"
     if head.startswith(b"SQLite format 3\0"):
         return "audit log"
-    return "plan" if text.startswith(b"{") and b'"FeatureCollection"' in text else None
+    if head.startswith(_RECORDED):
+        return "recording"
+    if text.startswith(b"{") and b'"FeatureCollection"' in text:
+        return "plan"
+    return "recorded link" if _OF_LINK.match(text) else None
 
 
 def _read(path: Path, limit: int) -> bytes:
@@ -129,6 +144,7 @@ _EVIDENCE: Final = {
     "recording": "check_recording",
     "trace": "check_trace",
     "audit log": "check_audit_log",
+    "recorded link": "check_recorded_link",
 }  # how each is judged
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
+from dva_sim.kernel.suggestions import guess
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.geo import Pose
 
@@ -21,6 +24,9 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, 255
 
 # What map_saver writes for "never seen" in a trinary map.
 UNKNOWN_SHADE = 205
+NEAR_SHADE = 10  # shades this near may have been that one
+JPEG_BLUR = 12.0  # by how much the shades of a JPEG may be off: a half step to white
+USUAL_CELLS = 0.005, 1.0  # of a map [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,11 +174,13 @@ def _runs(
 
 
 class RosMap(Config):
-    """The YAML file of a ROS map, as map_server reads it.
+    """The YAML file of a ROS map, as map_server reads it; keys of other tools are left alone.
 
     References:
         http://wiki.ros.org/map_server, section "Map format".
     """
+
+    model_config = ConfigDict(extra="ignore")
 
     image: str
     resolution: Annotated[float, Field(gt=0)]
@@ -204,18 +212,63 @@ def load_ros_map(path: str | Path) -> OccupancyGrid:
     """
     document = load_yaml(path)
     config = validate(RosMap, document.data, document.error)
-    shades = _read_shades(document, config)
-    cells = np.ascontiguousarray(_classify(shades, config)[::-1])
+    shades, blur = _read_shades(document, config)
+    cells = np.ascontiguousarray(_classify(shades, blur, config)[::-1])
     return OccupancyGrid(config.resolution, Pose(*config.origin), cells)
 
 
-def _read_shades(document: Document, config: RosMap) -> NDArray[np.float64]:
-    """Brightness of each pixel, 0 to 255, shape `(rows, columns)`; NaN where transparent."""
+@lru_cache(maxsize=16)
+def doubts_of_map(path: str | Path) -> tuple[str, ...]:
+    """What in a valid map is hardly meant so, each in a sentence without its full stop.
+
+    Raises:
+        ConfigError: see `load_ros_map`.
+    """
+    document = load_yaml(resources.find(str(path), "worlds"))
+    config = validate(RosMap, document.data, document.error)
+    doubts = []
+    for key in document.data.keys() - RosMap.model_fields.keys():
+        meant = guess(key, RosMap.model_fields)
+        doubts.append(
+            f"key {key!r} is left alone" + (f"; did you mean {meant!r}?" if meant else "")
+        )
+    yaw = config.origin[2]
+    if abs(yaw) > math.tau:
+        doubts.append(
+            f"the yaw of its origin, {yaw:g} rad, is {abs(yaw) / math.tau:.1f} turns; "
+            f"{yaw:g} degrees would be {math.radians(yaw):.4f}"
+        )
+    if not USUAL_CELLS[0] <= config.resolution <= USUAL_CELLS[1]:
+        doubts.append(f"a cell of {config.resolution:g} m is unusual for a map of robots")
+    shades, blur = _read_shades(document, config)
+    if blur > 1:
+        doubts.append(
+            f"{config.image!r} is a JPEG, whose shades are blurred: those within {blur:g} of "
+            f"{UNKNOWN_SHADE} count as never seen; save it as PGM or PNG"
+        )
+    near = (np.abs(shades - UNKNOWN_SHADE) <= NEAR_SHADE) & (shades != UNKNOWN_SHADE)
+    free = near & (_classify(shades, blur, config) == FREE)
+    if share := float(free.mean()):
+        doubts.append(
+            f"{share:.1%} of its cells have a shade near {UNKNOWN_SHADE}, which map_saver writes "
+            f"for cells never seen, and count as free (free_thresh {config.free_thresh:g})"
+        )
+    return tuple(sorted(doubts))
+
+
+def _read_shades(document: Document, config: RosMap) -> tuple[NDArray[np.float64], float]:
+    """Brightness of each pixel, 0 to 255, shape `(rows, columns)`, and by how much it may be off.
+
+    NaN where it is transparent.
+    """
     from PIL import Image
 
     file = document.file.parent / config.image
     try:
         with Image.open(file) as opened:
+            blur = JPEG_BLUR if opened.format == "JPEG" else 0.0
+            if opened.format == "PPM" and _most_shades(file) != 255:
+                blur = 1.0  # shades are scaled, and rounded
             colours = "RGBA" if "transparency" in opened.info else "RGB"
             image = opened.convert(colours) if opened.mode == "P" else opened
             scale = 1 / 257 if image.mode.startswith("I") else 255 if image.mode == "1" else 1
@@ -227,14 +280,21 @@ def _read_shades(document: Document, config: RosMap) -> NDArray[np.float64]:
         problem = f"image {config.image!r} cannot be read: {error}"
         raise document.error(problem, ("image",)) from error
     if pixels.ndim == 2:
-        return pixels
+        return pixels, blur
     if bands[-1] != "A" or config.mode == "trinary":
         # map_server averages all bands of a trinary map, opacity among them.
-        return np.asarray(pixels.mean(axis=2))
-    return np.where(pixels[..., -1] > 0, pixels[..., :-1].mean(axis=2), np.nan)
+        return np.asarray(pixels.mean(axis=2)), blur
+    return np.where(pixels[..., -1] > 0, pixels[..., :-1].mean(axis=2), np.nan), blur
 
 
-def _classify(shades: NDArray[np.float64], config: RosMap) -> NDArray[np.uint8]:
+def _most_shades(file: Path) -> int:
+    """The greatest shade that the head of a PGM file names."""
+    with file.open("rb") as opened:
+        head = re.sub(rb"#[^\n]*", b"", opened.read(1024)).split(maxsplit=4)
+    return int(head[3]) if head[0] in (b"P2", b"P3", b"P5", b"P6") else 255
+
+
+def _classify(shades: NDArray[np.float64], blur: float, config: RosMap) -> NDArray[np.uint8]:
     """Occupancy of each pixel; comparisons with NaN are false, so transparent is unknown."""
     if config.mode == "raw":
         percent = np.round(shades)
@@ -246,7 +306,7 @@ def _classify(shades: NDArray[np.float64], config: RosMap) -> NDArray[np.uint8]:
     cells[occupancy > config.occupied_thresh] = OCCUPIED
     cells[occupancy < config.free_thresh] = FREE
     if config.mode == "trinary" and not config.negate:
-        cells[shades == UNKNOWN_SHADE] = UNKNOWN
+        cells[np.abs(shades - UNKNOWN_SHADE) <= blur] = UNKNOWN
     return cells
 
 

@@ -142,7 +142,6 @@ def test_a_rectangle_has_an_outline_of_four_segments():
     [
         ({"resolution": None}, "missing key 'resolution'"),
         ({"resolution": -1}, "map.yaml:2:1: resolution"),
-        ({"occupied_tresh": 0.6}, "did you mean 'occupied_thresh'"),
         ({"image": "gone.pgm"}, "map.yaml:1:1: image 'gone.pgm' not found"),
         ({"image": "map.yaml"}, "cannot be read"),
         ({"free_thresh": 0.9}, "free_thresh 0.9 is above occupied_thresh 0.65"),

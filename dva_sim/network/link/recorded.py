@@ -62,6 +62,24 @@ def read_trace(path: str) -> Floats:
     return np.array(times, dtype=np.float64) / 1000.0
 
 
+def columns_of(path: str) -> int:
+    """How many words the first line of a recorded link has that is no remark; 0 without any."""
+    lines = (text for _, text in _lines(path, "recorded link") if text[0] != "#")
+    return len(re.split(r"[\s,;]+", next(lines, "").strip()))
+
+
+def is_trace(path: str) -> bool:
+    """Whether a file of one column holds ascending whole milliseconds, as a trace does."""
+    texts = [text for _, text in _lines(path, "recorded link")]
+    times = [int(text) for text in texts if text.isdigit()]
+    return len(times) == len(texts) > 0 and times == sorted(times)
+
+
+def longest_gap_s(times: Floats) -> float:
+    """For how long a trace carries nothing at most, over and over [s]."""
+    return float(np.max(np.diff(times, prepend=0.0)))
+
+
 @cache
 def read_delays(path: str) -> tuple[float, ...]:
     """Delays [s] of a file with one a line [ms].
@@ -183,7 +201,7 @@ def _found(path: str) -> Path:
 def _lines(path: str, what: str) -> Iterator[tuple[int, str]]:
     """Number and text of each line that is not empty."""
     try:
-        lines = _found(path).read_text(encoding="ascii").split("\n")
+        lines = _found(path).read_text(encoding="utf-8-sig").split("\n")
     except (OSError, ValueError) as error:  # such as text that is none, or a name that is none
         reason = error.strerror if isinstance(error, OSError) else "is not text"
         raise ConfigError(f"{what} cannot be read: {reason}", path) from error

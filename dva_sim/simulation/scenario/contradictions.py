@@ -8,10 +8,12 @@ Each is one sentence that names the keys and says what would go together.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from dva_sim.agents.robot.command_queue import mean_of
 from dva_sim.agents.robot.controller import LEASE_S
+from dva_sim.network.link.recorded import longest_gap_s, read_trace
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
     pattern_of,
@@ -20,6 +22,7 @@ from dva_sim.simulation.scenario.scenario import (
     site_of,
 )
 from dva_sim.worlds.hazards import find_hazard
+from dva_sim.worlds.maps import doubts_of_map
 
 TRIPS_OF_A_START = 4  # round trips: three until a new connection stands, one for the request
 USUAL_S = 9.0  # time-out, where the link leaves time for an answer
@@ -83,7 +86,18 @@ def contradictions(scenario: Scenario, *, live: bool = False) -> list[str]:
         live: Whether it is run over real sockets, where the modelled link plays no part.
     """
     link = _of_modelled_link(scenario) if live else _of_link(scenario)
-    return [*link, *_of_watchdog(scenario, live), *_of_team(scenario), *_of_time(scenario)]
+    others = (
+        _of_map(scenario),
+        _of_watchdog(scenario, live),
+        _of_team(scenario),
+        _of_time(scenario),
+    )
+    return [*link, *itertools.chain(*others)]
+
+
+def _of_map(scenario: Scenario) -> Iterator[str]:
+    if scenario.site.map is not None:
+        yield from (f"site.map: {doubt}" for doubt in doubts_of_map(scenario.site.map))
 
 
 def _of_modelled_link(scenario: Scenario) -> Iterator[str]:
@@ -127,6 +141,15 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
         for key in _OVER_TRACE:
             if key in scenario.link.model_fields_set:
                 yield f"link.{key} has no effect where link.trace_up or trace_down gives the rate"
+    for key, file in (
+        ("trace_up", scenario.link.trace_up),
+        ("trace_down", scenario.link.trace_down),
+    ):
+        if file is not None and (gap := longest_gap_s(read_trace(file))) > scenario.horizon_s:
+            yield (
+                f"link.{key} {file!r} carries nothing for {gap:,.0f} s on end, longer than a run "
+                f"(horizon_s {scenario.horizon_s:g}): runs that begin there carry nothing at all"
+            )
 
 
 def _of_computer(scenario: Scenario) -> Iterator[str]:

@@ -1,0 +1,157 @@
+"""Logs of an accelerometer as common logger apps export them: time and three axes, with a head.
+
+Separators, decimal commas and the order of columns are told from the file; units by its head, by
+what is asked for, or by gravity, which every phone at rest measures.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from typing import Final, Literal, NamedTuple
+
+from dva_sim.agents.tilt.accelerometer import GRAVITY
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import listed
+from dva_sim.kernel.yaml_files import read_text
+from dva_sim.recordings.motion import MotionSample
+
+Unit = Literal["m/s2", "g"]
+
+NEEDED: Final = "needs columns of a time and of the axes x, y and z, acceleration with gravity"
+_TIMES: Final = re.compile(r"seconds_elapsed|elapsed|time|timestamp|t", re.IGNORECASE)
+_AXIS: Final = re.compile(r"(?:.*(?:acc\w*|gf|force)[\W_]*|a)?([xyz])(?:[\W_].*)?", re.IGNORECASE)
+_WITHOUT_GRAVITY: Final = re.compile(r"linear|without g|user", re.IGNORECASE)
+_IN_MPS2: Final = re.compile(r"m\s*/\s*s|mps2|ms-2|m s-2", re.IGNORECASE)
+_IN_G: Final = re.compile(r"\(g\)|\[g\]|_g\b|gf|g-force", re.IGNORECASE)
+_TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_STEPS: Final = (
+    0.5e-3,
+    0.5,
+)  # between two samples of a phone [s]: a factor of 1000, so one unit fits
+_AROUND_GRAVITY: Final = 0.15  # by how much the median may differ from it, as a share
+
+
+class _Columns(NamedTuple):
+    """Where time and axes stand, and what the head says of them."""
+
+    time: int
+    axes: tuple[int, int, int]
+    names: Sequence[str]
+
+
+def read_sensor_log(path: Path, unit: Unit | None = None) -> list[MotionSample]:
+    """The samples of a log; their times begin at zero.
+
+    Args:
+        path: The file.
+        unit: Of the axes; None: as the head says, or else as gravity does.
+
+    Raises:
+        ConfigError: no such log: which columns it needs and has; or a line that is damaged.
+    """
+    lines = read_text(path).split("\n")
+    delimiter = max(";\t,", key=lambda sign: lines[0].count(sign))
+    rows = [(n, row) for n, row in enumerate(csv.reader(lines, delimiter=delimiter), 1) if row]
+    if not rows:
+        raise ConfigError(f"is empty; a log of an accelerometer {NEEDED}", path)
+    columns = _columns_of(rows[0][1], path)
+    if not columns.names:
+        rows.insert(0, (0, []))
+    found = [(number, _numbers(row, columns, path, number)) for number, row in rows[1:]]
+    times = [numbers[0] for _, numbers in found]
+    second = _second_of(times, columns, path)
+    metre = _metre_of([numbers[1:] for _, numbers in found], columns, unit, path)
+    samples = list[MotionSample]()
+    for number, (time, x, y, z) in found:
+        told = (time - times[0]) * second
+        if samples and told < samples[-1].told:
+            raise ConfigError("its time goes back", path, number, 1)
+        xyz = (x * metre, y * metre, z * metre)
+        samples.append(MotionSample(told, math.nan, math.nan, xyz, 0))
+    return samples
+
+
+def _columns_of(head: Sequence[str], path: Path) -> _Columns:
+    """Where what is needed stands; a file without a head has time, x, y, z."""
+    names = [name.strip() for name in head]
+    if all(_is_number(name) for name in names) and len(names) == 4:
+        return _Columns(0, (1, 2, 3), ())
+    plain = [re.sub(r"[\[(].*", "", name).strip() for name in names]
+    times = [n for n, name in enumerate(plain) if _TIMES.fullmatch(re.sub(r"[\W_]*m?s$", "", name))]
+    times += [n for n, name in enumerate(plain) if _TIMES.fullmatch(name) and n not in times]
+    elapsed = [n for n in times if "elapsed" in plain[n].lower()]
+    axes: dict[str, int] = {}
+    for n, name in enumerate(names):
+        match = _AXIS.fullmatch(name)
+        if match and n not in times:
+            axes.setdefault(match[1].lower(), n)
+    if not times or len(axes) < 3:
+        raise ConfigError(f"is no motion of a phone: {NEEDED}; it has: {listed(names)}", path, 1, 1)
+    if any(_WITHOUT_GRAVITY.search(names[n]) for n in axes.values()):
+        raise ConfigError("is acceleration without gravity; log it with gravity", path, 1, 1)
+    return _Columns((elapsed or times)[0], (axes["x"], axes["y"], axes["z"]), names)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(
+    row: Sequence[str], columns: _Columns, path: Path, number: int
+) -> tuple[float, float, float, float]:
+    try:
+        time, x, y, z = (
+            float(row[n].strip().replace(",", ".")) for n in (columns.time, *columns.axes)
+        )
+    except (ValueError, IndexError):
+        raise ConfigError(
+            f"should be a time and x, y, z, not {row!r:.60}", path, number, 1
+        ) from None
+    if not all(map(math.isfinite, (time, x, y, z))):
+        raise ConfigError("has a number that is none", path, number, 1)
+    return time, x, y, z
+
+
+def _second_of(times: Sequence[float], columns: _Columns, path: Path) -> float:
+    """How many seconds one unit of the time is: by the head, else by the samples' distance."""
+    head = columns.names[columns.time] if columns.names else ""
+    named = re.search(r"[\[(_ ]\s*(s|ms|us|µs|ns)\s*[\])]?$", head)
+    if named:
+        return _TIME_UNITS[named[1]]
+    steps = [b - a for a, b in itertools.pairwise(times) if b > a]
+    usual = median(steps) if steps else 0.0
+    fitting = [s for s in (1.0, 1e-3, 1e-6, 1e-9) if _STEPS[0] <= usual * s < _STEPS[1]]
+    if not fitting:
+        told = f"its times are {usual:g} apart, in no unit a phone's: name it, as in time (ms)"
+        raise ConfigError(told, path, 1, 1)
+    return fitting[0]
+
+
+def _metre_of(
+    axes: Sequence[Sequence[float]], columns: _Columns, unit: Unit | None, path: Path
+) -> float:
+    """How many m/s^2 one unit of the axes is."""
+    head = " ".join(columns.names[n] for n in columns.axes) if columns.names else ""
+    if unit is None and _IN_MPS2.search(head):
+        unit = "m/s2"
+    if unit is None and _IN_G.search(head):
+        unit = "g"
+    if unit is None:
+        usual = median(math.hypot(*xyz) for xyz in axes) if axes else 0.0
+        units: dict[Unit, float] = {"m/s2": GRAVITY, "g": 1.0}
+        near = (u for u, one in units.items() if abs(usual / one - 1) < _AROUND_GRAVITY)
+        unit = next(near, None)
+        if unit is None:
+            told = f"acceleration is {usual:.3g} in the median, gravity neither in g nor in m/s^2"
+            raise ConfigError(f"{told}: give --unit", path)
+    return GRAVITY if unit == "g" else 1.0

@@ -1,0 +1,102 @@
+"""Accelerometer logs as logger apps export them."""
+
+import json
+
+import numpy as np
+import pytest
+from helpers.processes.command_line import call
+from helpers.wording import unnamed
+
+from dva_sim.agents.tilt.accelerometer import GRAVITY
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.recordings.sensor_log import read_sensor_log
+
+RATE, LASTS = 100.0, 100
+XYZ = (-0.1, 0.3, 9.78)  # [m/s^2]
+
+
+def rows(time=1.0, start=0.0, axes=1.0, order=(0, 1, 2), sign="."):
+    """Lines of numbers: a time in some unit, and the axes in some other."""
+    for n in range(LASTS):
+        values = [start + n / RATE * time, *(XYZ[axis] * axes for axis in order)]
+        yield [f"{value:.9g}".replace(".", sign) for value in values]
+
+
+def log_of(folder, head, lines, delimiter=","):
+    text = "\n".join(delimiter.join(words) for words in ([head] if head else []) + list(lines))
+    (folder / "log.csv").write_text(text + "\n", encoding="utf-8")
+    return folder / "log.csv"
+
+
+LOGS = {
+    "plain": (["t", "x", "y", "z"], list(rows()), ","),
+    "no head": ([], list(rows()), ","),
+    "semicolons and decimal commas": (["t", "x", "y", "z"], list(rows(sign=",")), ";"),
+    "tabs": (["Time", "X", "Y", "Z"], list(rows()), "\t"),
+    "in g": (["t", "x", "y", "z"], list(rows(axes=1 / GRAVITY)), ","),
+    "g by its head": (["time (s)", "gFx", "gFy", "gFz"], list(rows(axes=1 / GRAVITY)), ","),
+    "units in the head": (
+        [f'"{name}"' for name in ("Time (s)", *(f"Acceleration {a} (m/s^2)" for a in "xyz"))],
+        list(rows()),
+        ",",
+    ),
+    "milliseconds": (["timestamp", "accX", "accY", "accZ"], list(rows(time=1e3)), ","),
+    "epoch in milliseconds": (["time_ms", "ax", "ay", "az"], list(rows(1e3, 1.7e12)), ","),
+    "two times and other order": (
+        ["time", "seconds_elapsed", "z", "y", "x"],
+        [[f"{1_700_000_000_000_000_000 + 10_000_000 * n}", *row]
+         for n, row in enumerate(rows(order=(2, 1, 0)))],
+        ",",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", LOGS)
+def test_a_log_is_read_in_seconds_and_metres(tmp_path, kind):
+    head, lines, delimiter = LOGS[kind]
+    samples = read_sensor_log(log_of(tmp_path, head, lines, delimiter))
+    assert len(samples) == LASTS
+    assert samples[0].told == 0.0
+    if kind != "epoch in milliseconds":  # of which nine digits are seconds
+        steps = np.diff([sample.told for sample in samples])
+        assert steps == pytest.approx(1 / RATE, rel=1e-6)
+    assert samples[-1].xyz == pytest.approx(XYZ, rel=1e-6)
+
+
+def test_a_unit_that_nothing_tells_is_asked_for_and_taken(tmp_path):
+    file = log_of(tmp_path, ["t", "x", "y", "z"], rows(axes=0.5))
+    with pytest.raises(ConfigError) as error:
+        read_sensor_log(file)
+    assert unnamed(str(error.value), "--unit", "4.89") == []
+    assert read_sensor_log(file, "g")[0].xyz[2] == pytest.approx(XYZ[2] / 2 * GRAVITY)
+    assert read_sensor_log(file, "m/s2")[0].xyz[2] == pytest.approx(XYZ[2] / 2)
+
+
+@pytest.mark.parametrize(
+    ("head", "lines", "names"),
+    [
+        (["t", "x", "y"], [["0", "1", "2"]], ["time", "x, y and z", "t, x, y"]),
+        (["a", "b", "c", "d"], [["0", "1", "2", "3"]], ["a, b, c, d"]),
+        (["time", *(f"Linear Acceleration {a}" for a in "xyz")], list(rows()), ["gravity"]),
+        (["t", "x", "y", "z"], [*rows(), ["0.99", "q", "0", "0"]], ["102", "'q'"]),
+        (["t", "x", "y", "z"], [*rows(), ["0.2", "0", "0", "9.8"]], ["102", "time"]),
+        (["t", "x", "y", "z"], [*rows(), ["nan", "0", "0", "9.8"]], ["102"]),
+        (["t", "x", "y", "z"], list(rows(time=1e15)), ["time (ms)"]),
+    ],
+)
+def test_what_a_log_lacks_is_told_at_its_line(tmp_path, head, lines, names):
+    with pytest.raises(ConfigError) as error:
+        read_sensor_log(log_of(tmp_path, head, lines))
+    assert unnamed(str(error.value), "log.csv", *names) == []
+
+
+def test_the_command_tells_a_log_and_makes_a_part_of_it_but_no_commands(tmp_path):
+    file = log_of(tmp_path, ["t", "x", "y", "z"], rows(axes=1 / GRAVITY))
+    told = json.loads(call("phone-log", file, "--json").stdout)
+    assert told["rate_hz"] == pytest.approx(RATE)
+    assert told["late_ms"] is None
+    assert call("phone-log", file, "--part", tmp_path / "part.yaml", "--unit", "g").returncode == 0
+    assert call("check", tmp_path / "part.yaml").returncode == 0
+    refused = call("phone-log", file, "--commands")
+    assert refused.returncode == 2
+    assert unnamed(refused.stderr, "log.csv", "app") == []
