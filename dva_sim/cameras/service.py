@@ -16,7 +16,7 @@ from dva_sim.cameras.children import END_WITHIN, Child
 from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
-from dva_sim.serving.server import listen
+from dva_sim.serving.listening import listen
 
 MODULE = "dva_sim.cameras"
 FLUSH = 0.02  # from one try to write what waits to the next [s]

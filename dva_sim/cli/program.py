@@ -33,7 +33,7 @@ def in_a_line(error: Any) -> str:
     if kind == "MissingParameter":
         return f"{path} needs {name_of(error.param)}: {_help(error.param)}; {more}"
     if kind == "BadParameter" and error.param is not None:
-        return f"{name_of(error.param)} {error.message}"
+        return f"{name_of(error.param)} {_plain(error.message)}"
     if kind == "BadOptionUsage":
         takes = "a" if "requires" in error.message else "no"
         return f"{error.option_name} takes {takes} value"
@@ -42,6 +42,21 @@ def in_a_line(error: Any) -> str:
     problem = str(error.format_message()).rstrip(".")
     told = f"{path}: {problem[:1].lower()}{problem[1:]}"
     return told if told.endswith("?") else f"{told}; {more}"
+
+
+_BOUNDS = {
+    "less than or equal to": "at most",
+    "greater than or equal to": "at least",
+    "less than": "below",
+    "greater than": "above",
+}
+
+
+def _plain(message: str) -> str:
+    """What the parser's library says of a number, in our words."""
+    for theirs, ours in _BOUNDS.items():
+        message = message.replace(f"Input should be {theirs}", f"should be {ours}")
+    return message
 
 
 def _help(param: Any) -> str:

@@ -161,7 +161,8 @@ def live(
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
     from dva_sim.cli import exposure, live_screen  # late: start-up
-    from dva_sim.live.options import LiveOptions, is_address  # late: start-up
+    from dva_sim.live.options import LiveOptions  # late: start-up
+    from dva_sim.network.addresses import problem_of  # late: start-up
 
     changes = tuple(set_ or ())
     options = LiveOptions(
@@ -169,7 +170,7 @@ def live(
         overwrite=overwrite,
         camera_port=camera_port,
     )
-    at = dva if dva is not None and is_address(dva) and only in (None, "dva") else None
+    at = dva if dva is not None and not problem_of(dva) and only in (None, "dva") else None
     listens = [] if at is None else [at.rpartition(":")[0]]
     if only != "dva" or (dva is None and port):
         listens.append(host)

@@ -50,7 +50,7 @@ def check_target(path: Path) -> None:
         ConfigError: its name does not say what it is, or its folder is not there.
     """
     if path.suffix.lower() != SUFFIX:
-        raise ConfigError(f"audit log should end in {SUFFIX}, not {path.name!r}")
+        raise ConfigError(f"--audit: audit log should end in {SUFFIX}, not {path.name!r}")
     if not path.parent.is_dir():
         raise ConfigError(f"folder {str(path.parent)!r} for the audit log does not exist")
     if path.is_dir():

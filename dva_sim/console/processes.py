@@ -20,6 +20,7 @@ from typing import Any, Protocol
 from dva_sim.cameras.children import END_WITHIN, Child
 from dva_sim.console.options import PageOptions
 from dva_sim.network.realtime import PacedClock
+from dva_sim.serving.listening import listen
 
 WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pictures"
 # What else is printed: an address for each of those who may do less than everything.
@@ -96,6 +97,7 @@ class ConsoleProcesses:
             report: A study's report that pages may show.
 
         Raises:
+            ConfigError: a port is taken, or the host is not this machine.
             ChildFailed: the web process could not begin.
         """
         web = self._start_web(report, audit)
@@ -128,6 +130,9 @@ class ConsoleProcesses:
 
     def _start_web(self, report: Path | None, audit: Path | None) -> Child:
         options = self._options
+        listen(options.host, options.port).close()  # else the web process alone would say so
+        if options.phones:
+            listen(options.phones_host, options.phones_port, "--phones-port").close()
         ours, self._to_web = socket.socketpair()
         words = ["--host", options.host, "--port", str(options.port)]
         words += ["--pictures-fd", str(ours.fileno())]

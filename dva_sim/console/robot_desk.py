@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -11,22 +10,10 @@ from dva_sim.console.answers import Answers
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.robot_world import RobotWorld
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.addresses import check_address
 
 Line = dict[str, Any]
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
-_ADDRESS = re.compile(r"[^:\s]{1,64}:([0-9]{1,5})")
-
-
-def check_address(dva: str, where: str = "") -> None:
-    """Whether it is the address of a DVA.
-
-    Raises:
-        ConfigError: it is not.
-    """
-    found = _ADDRESS.fullmatch(dva)
-    if found is None or not 0 < int(found[1]) < 65_535:
-        raise ConfigError(f"{where}{dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
 
 
 class RobotDesk:

@@ -11,12 +11,13 @@ from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.refusal import Refused
-from dva_sim.console.robot_desk import RobotDesk, check_address
+from dva_sim.console.robot_desk import RobotDesk
 from dva_sim.console.robot_world import RobotWorld
 from dva_sim.console.web.addresses import own_address
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.process import ending_when_asked
+from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
 from dva_sim.simulation.full.verdicts import (
     BOOK_UNKNOWN,

@@ -13,6 +13,7 @@ from dva_sim.kernel.suggestions import guess, hint
 _PACKAGE = Path(__file__).parent.parent
 REGISTRATION = ".registration.yaml"  # ending of a file that belongs to the study beside it
 _RESULTS = "manifest.json"  # of a results folder
+_TEXTS: Final = (".yaml", ".yml", ".csv", ".xsd")  # files that a name may mean
 
 
 class FolderKind(NamedTuple):
@@ -103,12 +104,28 @@ def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
         if is_there(name, where):
             use = f"; try: {other.command} {name}" if other.command and is_asked else ""
             return f"{name!r} is a {other.word}, not a {kind}{use}"
+    if path.suffix or len(path.parts) > 1:
+        return f"there is no file {name!r}{_meant(path, kind, known)}"
     for where, other in others.items() if not guess(name, known) else ():
         near = guess(name, available(where))
         if near is not None and other.command:
             use = f" Try: {other.command} {near}" if is_asked else ""
             return f"{kind} {name!r} not found; did you mean the {other.word} {near!r}?{use}"
     return f"{kind} {name!r} not found; {hint(path.stem, known, 'available')}"
+
+
+def _meant(path: Path, kind: str, known: list[str]) -> str:
+    """Which file beside a path that is not there, or which name, was meant; empty if none."""
+    try:
+        beside = sorted(each.name for each in path.parent.iterdir() if each.suffix in _TEXTS)
+    except OSError:
+        folder = next(f for f in path.parents if f == Path() or _is_there(f.is_dir))
+        return f": no folder {str(folder / path.relative_to(folder).parts[0])!r}"
+    stems = {Path(each).stem: each for each in reversed(beside)}
+    near = path.stem if path.stem in stems else guess(path.stem, stems)
+    if near is not None:
+        return f"; did you mean {str(path.parent / stems[near])!r}?"
+    return f"; did you mean the {kind} {path.stem!r}?" if path.stem in known else ""
 
 
 def refuse_to_replace(

@@ -15,6 +15,7 @@ from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_words import in_words
 
 KeyPath = tuple[str | int, ...]
 MOST_VALUES = 20_000  # in one file
@@ -70,9 +71,7 @@ def load_yaml(path: str | Path) -> Document:
     try:
         data, places = _read(text)
     except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        problem = (error.problem or "is not valid YAML").split("\n")[0]
-        line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
+        problem, (line, column) = in_words(error)
         raise ConfigError(problem, path, line, column) from error
     except YAMLError as error:
         raise ConfigError(f"is not valid YAML: {str(error).splitlines()[0]}", path) from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,8 @@ from typing import Any
 from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
+from dva_sim.live.open_files import check_room_for
+from dva_sim.network.addresses import check_address
 from dva_sim.recordings.writing import SUFFIX, check_both, try_to_write
 from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
@@ -79,8 +80,8 @@ class LiveOptions:
             raise ConfigError(f"--port {self.port} should be from 1 to 64999")
         if self.duration is not None and not 0 < self.duration < math.inf:
             raise ConfigError(f"--for {self.duration:g} should be a number of seconds above 0")
-        if self.dva is not None and not is_address(self.dva):
-            raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
+        if self.dva is not None:
+            check_address(self.dva, "--dva ")
         scenario = self._built()
         if scenario.operator.strategy == "oracle":
             raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
@@ -102,8 +103,10 @@ class LiveOptions:
         Raises:
             ConfigError: see `read`; or the site has no place for the team, or what is recorded
                 cannot be put where it is wanted.
+            DvaSimError: this process may open too few files for the team.
         """
         scenario, document = self.read(), load(self.scenario)
+        check_room_for(scenario.robot.count + scenario.guard.count + scenario.operator.count)
 
         def make(changes: Mapping[str, Any]) -> None:
             rehearse(build(document, changes), self.seed)
@@ -123,8 +126,8 @@ class LiveOptions:
             return
         if not record.is_dir() and (record.suffix or record.exists()):
             raise ConfigError(
-                f"recording should end in {SUFFIX}, not {record.name!r}; a folder for traces has "
-                "no dot in its name, or is there"
+                f"--record: recording should end in {SUFFIX}, not {record.name!r}; a folder for "
+                "traces has no dot in its name, or is there"
             )
         try:
             record.mkdir(parents=True, exist_ok=True)
@@ -144,9 +147,3 @@ class LiveOptions:
 def trace_of(label: str) -> str:
     """The file for the trace of a robot, or the DVA, in the folder for traces."""
     return f"{label}.trace.jsonl"
-
-
-def is_address(text: str) -> bool:
-    """Whether it is a host and a port; the next port must be one, too."""
-    found = re.fullmatch(r"[^:\s]+:([0-9]{1,5})", text)
-    return found is not None and 0 < int(found[1]) < 65_535

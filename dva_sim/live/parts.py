@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import resource
 import secrets
 import statistics
 import time
@@ -20,12 +19,13 @@ from dva_sim.agents.robot.decision_log import DecisionLog
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.service import CameraService
 from dva_sim.core.events import Event
-from dva_sim.core.registry import MAX_DEVICES, DeviceEntry
+from dva_sim.core.registry import DeviceEntry
 from dva_sim.core.sessions import Permissions
 from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
+from dva_sim.live.open_files import devices_that_fit
 from dva_sim.live.options import PARTS, LiveOptions, trace_of
 from dva_sim.live.recording import LiveRecorder, TraceFile, TraceLines, event_facts
 from dva_sim.network.messaging import Transport
@@ -40,7 +40,6 @@ from dva_sim.simulation.scenario import Scenario
 
 SESSION_EPOCH = 1_735_689_600  # 2025-01-01, UTC [s]
 SESSIONS_PER_SECOND = 4  # enough room in 32 bits for 34 years
-FILES_PER_DEVICE, FILES_APART = 16, 200  # open at the DVA
 MOST_ROWS = 200  # of the table; more are read by nobody
 RATE_OVER = 5.0  # rates are of so many last seconds [s]
 
@@ -107,7 +106,7 @@ class DvaPart:
         if options.state is not None:
             memory = Store(options.state)
         self._agent = add_dva(stage, permissions, memory, keep_events=False)
-        self._agent.desk.registry.most = _devices_that_fit()
+        self._agent.desk.registry.most = devices_that_fit()
         trace = _trace_of("dva", stage, options)
         if trace is not None:
             self._agent.desk = traced(self._agent.desk, trace, stage, memory)
@@ -175,14 +174,6 @@ class DvaPart:
     def finish(self) -> None:
         """See `LivePart`: nobody drives any longer by our permission."""
         self._agent.close()
-
-
-def _devices_that_fit() -> int:
-    """How many devices one process can listen to: each takes some open files."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    usable = soft if hard == resource.RLIM_INFINITY else hard
-    return max(1, min(MAX_DEVICES, (usable - FILES_APART) // FILES_PER_DEVICE))
 
 
 @dataclass(frozen=True)

@@ -311,7 +311,10 @@ class SocketNetwork:
                 if port or error.errno != zmq.EADDRINUSE:
                     self._discard(router, publisher)
                     ports = f", ports {port} and {port + 1}" if port else ""
-                    raise NetworkError(f"cannot listen on {host}{ports}: {error}") from None
+                    told = f"cannot listen on {host}{ports}: {error.strerror}"
+                    if error.errno == zmq.EADDRINUSE:
+                        told += "; give another --port, or --port 0 for any that is free"
+                    raise NetworkError(told) from None
             else:
                 break
         else:

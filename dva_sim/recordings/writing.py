@@ -119,7 +119,7 @@ def check_target(path: Path, overwrite: bool = False, **way: str) -> None:
             written.
     """
     if path.suffix.lower() != SUFFIX:
-        raise ConfigError(f"recording should end in {SUFFIX}, not {path.name!r}")
+        raise ConfigError(f"--record: recording should end in {SUFFIX}, not {path.name!r}")
     if not path.parent.is_dir():
         raise ConfigError(f"folder {str(path.parent)!r} for the recording does not exist")
     if path.is_dir():

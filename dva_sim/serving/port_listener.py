@@ -26,7 +26,6 @@ from dva_sim.serving.port_connections import (
     PortConnections,
 )
 
-WAITING: Final = 1024  # connections that are not accepted yet
 AT_ONCE: Final = 32  # connections accepted before the loop serves others again
 SERVED_AT_ONCE: Final = 32  # connections that have said their first word, likewise
 HANDSHAKES_AT_ONCE: Final = 4  # the same with TLS, where each costs a millisecond or two

@@ -11,41 +11,10 @@ from typing import Any
 import uvicorn
 from starlette.types import ASGIApp
 
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.serving.complaints import limit_complaints
 from dva_sim.serving.connection import HttpProtocol
 from dva_sim.serving.port_connections import PortConnection, PortConnections
-from dva_sim.serving.port_listener import WAITING, PortListener
-
-SEND_BYTES = 64 * 1024  # in the kernel for each connection: what waits there is old
-SILENT_MS = 20_000  # a connection that takes or answers nothing for so long is cut [ms]
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """A listening socket, so that its port is known before anything is served.
-
-    Raises:
-        ConfigError: the address is not of this machine, or taken.
-    """
-    try:
-        found = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_STREAM)
-        family, kind, protocol, _, address = found[0]
-        with contextlib.ExitStack() as on_failure:
-            sock = on_failure.enter_context(socket.socket(family, kind, protocol))
-            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            sock.bind(address)
-            on_failure.pop_all()
-    except OSError as error:
-        raise ConfigError(f"cannot listen on {host} port {port}: {error.strerror}") from error
-    # Connections inherit these.
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, SILENT_MS)
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    sock.listen(WAITING)
-    sock.setblocking(False)
-    return sock
+from dva_sim.serving.port_listener import PortListener
 
 
 class Server(uvicorn.Server):

@@ -9,6 +9,7 @@ import itertools
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -211,6 +212,7 @@ class Site(FloorPlan):
 
 # A bare map does not say where on earth it is: the campus in Monte de Caparica.
 DEFAULT_FRAME = GeoFrame(38.6612, -9.2058)
+PLANS = (".geojson", ".json")
 MOST_CELLS = 40e6  # of a grid: planning on it takes some gigabytes
 DESKS = 2  # operator desks on a bare map
 BASE_SPACING = 1.5  # between places that are not drawn [m]
@@ -427,6 +429,8 @@ def load_site(name_or_path: str | Path, options: Mapping[str, Any] | None = None
 
 @lru_cache(maxsize=16)
 def _load_site(path: Path, options: str) -> Site:
+    if path.suffix in PLANS:
+        raise ConfigError(f"is a plan; {_site_of_plan(path)}", path)
     document = load_yaml(path)
     if "image" in document.data and "plan" not in document.data:
         problem = "is a bare ROS map; give it as site.map, not as site.name"
@@ -450,6 +454,15 @@ def _load_site(path: Path, options: str) -> Site:
             told = f"{feature.kind} needs {radius:g} m of free floor around it: it is in a wall"
             raise feature.fail(told)
     return site
+
+
+def _site_of_plan(path: Path) -> str:
+    """Which site has a plan, or how one is written."""
+    for file in sorted(path.parent.glob("*.yaml")):
+        with suppress(ConfigError):
+            if load_yaml(file).data.get("plan") == path.name:
+                return f"give its site: {file}"
+    return f"give a site: a YAML file with name, origin and 'plan: {path.name}'"
 
 
 def _check_size(floor: Any, config: SiteFile, document: Document) -> None:

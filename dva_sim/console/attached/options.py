@@ -12,7 +12,7 @@ from dva_sim.console.audit_keeper import check_target
 from dva_sim.console.options import PageOptions
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.live.options import is_address
+from dva_sim.network.addresses import check_address
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.sockets import split_address
 from dva_sim.simulation.full.stage import id_of, kind_of
@@ -57,8 +57,7 @@ class AttachOptions(PageOptions):
         Raises:
             ConfigError: the address is none, or no audit log can be kept where it is wanted.
         """
-        if not is_address(self.dva):
-            raise ConfigError(f"--dva {self.dva!r} should be HOST:PORT, as in 127.0.0.1:5600")
+        check_address(self.dva, "--dva ")
         if self.audit is not None:
             check_target(self.audit)
 

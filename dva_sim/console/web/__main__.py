@@ -21,8 +21,9 @@ from dva_sim.console.web.server import make_server
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.kernel.errors import DvaSimError
+from dva_sim.serving.listening import listen
 from dva_sim.serving.port_listener import fitting_places
-from dva_sim.serving.server import listen, serve
+from dva_sim.serving.server import serve
 
 if TYPE_CHECKING:
     from dva_sim.console.web.phone_listener import PhoneListener

@@ -12,7 +12,7 @@ from dva_sim.console.web.addresses import address_of, own_address, own_hosts
 from dva_sim.console.web.certificate_files import certificates, data_folder
 from dva_sim.console.web.certificates import Hosts
 from dva_sim.console.web.phones import PhoneDoor
-from dva_sim.serving.server import listen
+from dva_sim.serving.listening import listen
 
 
 class PhoneListener(NamedTuple):
@@ -49,7 +49,7 @@ def listen_for_phones(
         ConfigError: the address is not of this machine, or taken.
         NoCertificate: none can be kept.
     """
-    sock = listen(host, port)
+    sock = listen(host, port, "--phones-port")
     try:
         port = sock.getsockname()[1]
         access = rules(host, port, (*names, *own_hosts(())), tokens, secure=True)

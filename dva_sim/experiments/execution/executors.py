@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from dva_sim.kernel.errors import ConfigError, RunsFailed
+from dva_sim.kernel.errors import ConfigError, DvaSimError, RunsFailed
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -123,7 +123,13 @@ class LocalProcesses(Workers):
         context = multiprocessing.get_context(_FAMILY)
         context.set_forkserver_preload([_FIRST, task.__module__])
         kind = ProcessPoolExecutor if task.__module__ == "__main__" else _WithoutScript
-        pool = self._pool = kind(min(width, self.width), context, initializer=_begin)
+        try:
+            pool = self._pool = kind(min(width, self.width), context, initializer=_begin)
+        except OSError as error:  # its locks lie there
+            raise DvaSimError(
+                f"processes cannot share locks: {error.strerror}; is /dev/shm there and writable? "
+                "--jobs 1 needs none"
+            ) from None
         with _ctrl_c_held_back(self._kill) as self._let_through:
             try:
                 yield pool

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from dva_sim.experiments.study import validation
+from dva_sim.experiments.study.cell_grid import cells
 from dva_sim.experiments.study.designs import all_factors, read_table
 from dva_sim.experiments.study.registration import settled
 from dva_sim.experiments.study.study import FOLDER, SIZES, Study, Version
@@ -337,8 +338,10 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
         # A claim that is made in the same breath is a mistake and no loss.
         _tell_first(study, (f for f in validation.of_claims(study) if not data.holds(f[1])))
         study = validation.kept_claims(study)
-    else:
-        _tell_first(study, validation.of_claims(study))
+    elif wrong := next(validation.of_claims(study), None):
+        # A claim may be right about a factor or level that is misspelt where it is declared.
+        cells(validation.kept_claims(study))
+        raise study.error(*wrong)
     _tell_first(study, validation.of_stop(study))
     return study
 

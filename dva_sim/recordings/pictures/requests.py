@@ -151,6 +151,6 @@ def _check_path(what: str, path: Path | None, endings: tuple[str, ...]) -> None:
         return
     if path.suffix.lower() not in endings:
         allowed = f"{', '.join(endings[:-1])} or {endings[-1]}"
-        raise ConfigError(f"{what} should end in {allowed}, not {path.name!r}")
+        raise ConfigError(f"--{what} {path.name!r} should end in {allowed}")
     if not path.parent.is_dir():
         raise ConfigError(f"folder {str(path.parent)!r} for the {what} does not exist")

@@ -1,0 +1,70 @@
+"""Mistakes in YAML in words for people who write configurations, at the line that is wrong."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final, NamedTuple
+
+Place = tuple[int | None, int | None]
+
+
+class Said(NamedTuple):
+    """What ruamel says, what we say, and whether the mistake is where what it reads began."""
+
+    theirs: str
+    ours: str
+    is_at_begin: bool = False
+
+
+_WORDS: Final = (
+    Said(r"mapping values are not allowed here",
+         "a second colon in a line, or a key that is indented otherwise than those beside it; "
+         "text with a colon needs quotes"),
+    Said(r"expected ',' or '([\]}])'", "a bracket is not closed: {0} is missing", True),
+    Said(r"found character '\\t'", "a tab; indent with spaces"),
+    Said(r"found character '(.)' that cannot start any token",
+         "a value cannot begin with {0}; put it in quotes"),
+    Said(r"found unexpected (?:end of stream|document separator)", "a quote is not closed", True),
+    Said(r"found duplicate key \"?(.*?)\"? with value", "key {0!r} stands twice"),
+    Said(r"found undefined alias '(.*)'", "*{0} stands for nothing; text with a * needs quotes"),
+    Said(r"could not find expected ':'", "a key without a colon and a value", True),
+    Said(r"found unknown escape character '(.)'",
+         "\\{0} means nothing within double quotes; use single ones"),
+    Said(r"expected <block end>, but found '(?:-|<block sequence start>)'",
+         "a list item that is indented otherwise than those beside it"),
+    Said(r"expected <block end>",
+         "indented otherwise than the lines beside it, or text behind a value"),
+    Said(r"but found another document", "a second document; give each a file of its own"),
+    Said(r"(?:block )?sequence entries are not allowed", "a list item begins on a line of its own"),
+    Said(r"expected (?:'<document start>'|<document start>)", "the file goes on behind its end"),
+    Said(r"found unhashable key", "a key is text or a number, not a list or a mapping"),
+)  # fmt: skip
+_THEIRS: Final = r"(found|expected|could|but|did|while) "  # what is not of our own constructor
+_SIGNS: Final = {
+    "'<stream end>'": "the end of the file",
+    "<block end>": "the end of a block",
+    "'<scalar>'": "a value",
+    "'?'": "?",
+}
+
+
+def in_words(error: Any) -> tuple[str, Place]:
+    """What is wrong, and where: line and column, from 1.
+
+    Args:
+        error: What ruamel raised, with its marks.
+    """
+    problem = str(error.problem or "").split("\n")[0]
+    for said in _WORDS:
+        if found := re.search(said.theirs, problem):
+            mark = error.context_mark if said.is_at_begin else None
+            return said.ours.format(*found.groups()), _place(mark or error.problem_mark)
+    for sign, word in _SIGNS.items():
+        problem = problem.replace(sign, word)
+    if not problem or re.match(_THEIRS, problem):
+        problem = f"is not valid YAML: {problem}".removesuffix(": ")
+    return problem, _place(error.problem_mark or error.context_mark)
+
+
+def _place(mark: Any) -> Place:
+    return (mark.line + 1, mark.column + 1) if mark else (None, None)

@@ -1,0 +1,37 @@
+"""How many devices a process can listen to: each takes some of the files that it may open."""
+
+from __future__ import annotations
+
+import resource
+from typing import Final
+
+from dva_sim.core.registry import MAX_DEVICES
+from dva_sim.kernel.errors import DvaSimError
+
+PER_DEVICE: Final = 16  # at the DVA
+APART: Final = 200  # for all else
+
+
+def devices_that_fit() -> int:
+    """How many there may be, with as many files as the system lets this process open."""
+    return max(1, min(MAX_DEVICES, (_usable() - APART) // PER_DEVICE))
+
+
+def check_room_for(devices: int) -> None:
+    """Refuse to begin where devices would be turned away one by one.
+
+    Raises:
+        DvaSimError: how many files may be open, and how many it takes.
+    """
+    usable, wanted = _usable(), APART + devices * PER_DEVICE
+    if usable < wanted:
+        raise DvaSimError(
+            f"a process may open {usable} files here, and {devices} devices take {wanted}; "
+            f"allow more first: ulimit -n {max(1024, wanted)}"
+        )
+
+
+def _usable() -> int:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return soft if hard == resource.RLIM_INFINITY else hard

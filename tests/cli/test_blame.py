@@ -1,0 +1,175 @@
+"""A mistake is blamed on the word that is wrong, and its hint leads there."""
+
+import errno
+import os
+import resource
+import socket
+from contextlib import closing
+
+import pytest
+from helpers.processes.command_line import call
+from helpers.wording import unnamed
+
+from dva_sim.experiments.execution import executors
+from dva_sim.experiments.study.cell_grid import cells
+from dva_sim.experiments.study.loading import load_study, write_study
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.live import open_files
+from dva_sim.network.addresses import problem_of
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes the template of a study with one text in place of another."""
+
+    def write(old, new):
+        path = write_study(str(tmp_path / "mine"))
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+        return path
+
+    return write
+
+
+PATTERNS = "pattern: [req-rep, latest-wins]"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line_of", "meant"),
+    [
+        (PATTERNS, "pattern: [req-repp, latest-wins]", "factors", "'req-rep'"),
+        (PATTERNS, "pattern: [req-rep, latest-win]", "factors", "'latest-wins'"),
+        (PATTERNS, "patern: [req-rep, latest-wins]", "factors", "'pattern'"),
+        ("link.delay_s: [0, 0.5]", "link.dely_s: [0, 0.5]", "factors", "'delay_s'"),
+        ("contrast: [req-rep", "contrast: [req-repp", "answer", "'req-rep'"),
+        ("factor: pattern", "factor: patern", "answer", "'pattern'"),
+        ("measure: drive_time_s", "measure: drive_times_s", "answer", "'drive_time_s'"),
+    ],
+)
+def test_a_misspelt_word_of_a_study_is_the_one_that_is_blamed(study, old, new, line_of, meant):
+    path = study(old, new)
+    with pytest.raises(ConfigError) as error:
+        cells(load_study(path))
+    assert unnamed(error.value.problem, meant) == []
+    block = next(n for n, text in enumerate(path.read_text().splitlines(), 1)
+                 if text.startswith(f"{line_of}:"))  # fmt: skip
+    assert block < error.value.line < block + 10
+
+
+@pytest.mark.parametrize("command", ["run", "episode", "check"])
+def test_a_file_that_is_not_there_is_told_as_a_file(tmp_path, command):
+    (tmp_path / "mine.yaml").write_text("question: what?\n")
+    told = call(command, "mine.yml", cwd=tmp_path)
+    assert told.returncode == 2
+    assert "mine.yml" in told.stderr
+    if command != "check":
+        assert unnamed(told.stderr, "no file", "'mine.yaml'") == []
+    assert "not found; available" not in told.stderr
+
+
+def test_a_plan_names_its_site(tmp_path):
+    (tmp_path / "plan.geojson").write_text("{}")
+    told = call("site", "show", "plan.geojson", cwd=tmp_path)
+    assert unnamed(told.stderr, "plan.geojson", "'plan: plan.geojson'") == []
+    (tmp_path / "hall.yaml").write_text("name: hall\nplan: plan.geojson\n")
+    told = call("site", "show", "plan.geojson", cwd=tmp_path)
+    assert unnamed(told.stderr, "plan.geojson", "hall.yaml") == []
+
+
+@pytest.mark.parametrize("words", [["console", "--no-open"], ["robot", "--no-open"]])
+def test_a_port_in_use_names_the_way_out(words):
+    with closing(socket.create_server(("127.0.0.1", 0))) as other:
+        port = str(other.getsockname()[1])
+        told = call(*words, "--port", port)
+    assert told.returncode == 2
+    assert unnamed(told.stderr, port, "--port 0") == []
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "names"),
+    [
+        ("a: 1\nb: [1, 2\n", 2, ["]"]),
+        ("a: {b: 1\nc: 2\n", 1, ["}"]),
+        ('a: 1\nb: "open\nc: 2\n', 2, ["quote"]),
+        ("a: 1\n b: 2\n", 2, ["colon"]),
+        ("a:\n\tb: 1\n", 2, ["tab", "spaces"]),
+        ("a: 1\na: 2\n", 2, ["'a'", "twice"]),
+        ("a: *x\n", 1, ["*x"]),
+        ("a: @x\n", 1, ["@", "quotes"]),
+        ("a: 1\nb\nc: 2\n", 2, ["colon"]),
+        ('a: "\\q"\n', 1, ["\\q", "single"]),
+        ("a:\n  - 1\n - 2\n", 3, ["indented"]),
+        ("a: 1\n---\nb: 1\n", 2, ["document"]),
+    ],
+)
+def test_a_mistake_in_yaml_is_told_at_the_line_that_is_wrong(tmp_path, text, line, names):
+    file = tmp_path / "x.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        load_yaml(file)
+    assert error.value.line == line
+    assert unnamed(error.value.problem, *names) == []
+    assert not any(word in error.value.problem for word in ("<", "token", "stream", "scalar"))
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("[::1]:5733", ["IPv6"]),
+        ("::1:5600", ["IPv6"]),
+        ("127.0.0.1:0", ["port 0", "1 to 65534"]),
+        ("127.0.0.1:99999", ["port 99999", "65534"]),
+        ("127.0.0.1:65535", ["port 65535", "65534"]),
+        ("localhost", ["no port"]),
+        (":5600", ["no host"]),
+        ("bad host:5600", ["no host"]),
+        ("host:1:2", ["two colons"]),
+        ("host:five", ["no number"]),
+    ],
+)
+def test_an_address_is_told_which_part_of_it_is_wrong(text, names):
+    assert unnamed(problem_of(text), *names) == []
+
+
+@pytest.mark.parametrize("text", ["127.0.0.1:5600", "localhost:1", "robot.lan:65534"])
+def test_an_address_of_a_host_and_a_port_is_one(text):
+    assert problem_of(text) == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["episode", "drive-to-event", "--still", "x.jpg2"], ["--still", "'x.jpg2'", ".png"]),
+        (["episode", "drive-to-event", "--record", "x.txt"], ["--record", "'x.txt'", ".mcap"]),
+        (["console", "--audit", "x.txt"], ["--audit", "'x.txt'", ".sqlite"]),
+        (["phone-log", "x.csv", "--rate", "1000"], ["--rate", "at most 100"]),
+    ],
+)
+def test_an_option_is_named_with_its_dashes(tmp_path, words, names):
+    told = call(*words, cwd=tmp_path)
+    assert told.returncode == 2
+    assert unnamed(told.stderr, *names) == []
+
+
+def test_too_few_open_files_are_told_with_how_many_it_takes(monkeypatch):
+    monkeypatch.setattr(open_files, "_usable", lambda: 64)
+    assert open_files.devices_that_fit() == 1
+    with pytest.raises(DvaSimError) as error:
+        open_files.check_room_for(6)
+    assert unnamed(str(error.value), "64 files", "6 devices", "ulimit -n") == []
+    monkeypatch.undo()
+    assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] > 0
+    open_files.check_room_for(1)
+
+
+def test_locks_that_cannot_be_shared_are_told_with_the_way_around(monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(executors, "_WithoutScript", refuse)
+    workers = executors.LocalProcesses(2)
+    with pytest.raises(DvaSimError) as error, workers.executor(2, load_study):
+        pass
+    assert unnamed(str(error.value), "/dev/shm", "--jobs 1") == []
