@@ -19,6 +19,7 @@ from benchmarks.message_cases import called, hop, published, stored
 Work = Callable[[], float]
 """Does it, and returns how many units it has done."""
 
+ADVISERS = ("min_eta", "batch_optimal")
 PATTERNS = ("req-rep", "pipelined", "pub-sub", "latest-wins")
 FAR = {"link.delay_s": 0.25}
 MAIN = "drive-to-event, latest-wins"
@@ -149,6 +150,29 @@ def pointing() -> Work:
     return lambda: len([dva_sim.episode("tasks/fitts-tilt", set={"trials": 3})])
 
 
+def decision(policy: str) -> Work:
+    """Who of 60 goes to which of 120 events, by one of the policies."""
+    import numpy as np
+    from helpers.dva.dispatch_situations import situation
+
+    from dva_sim.core.dispatch import load_policy
+
+    rng, chosen = np.random.default_rng(1), load_policy(policy)
+    seen = situation("gr" * 30, rng.uniform(5.0, 300.0, (120, 60)))
+    return lambda: len([chosen.advise(seen, rng)])
+
+
+def picture() -> Work:
+    """What a robot's camera shows of a corridor with people in it."""
+    from dva_sim.worlds.camera import Camera, Figure
+    from dva_sim.worlds.geo import Pose
+    from dva_sim.worlds.site import load_site
+
+    camera, pose = Camera(load_site("caparica")), Pose(35.0, 16.0, 2.5)
+    people = [Figure("guard", 33.4, 17.6), Figure("bystander", 32.0, 16.0)]
+    return lambda: len([camera.picture(pose, people)])
+
+
 def report() -> Work:
     """The main study's report, of 432 synthetic runs."""
     from helpers.studies import synthetic_results as synthetic
@@ -171,17 +195,16 @@ def report() -> Work:
 
 def circling(ours: bool) -> Work:
     """Ten robots that drive circles between the walls of caparica, here or in ir-sim."""
-    from benchmarks import test_world_speed as worlds
+    from benchmarks import circling
 
     from dva_sim.worlds.site import load_site
 
     site = load_site("caparica")
-    starts = worlds.circles(site, 10)
+    starts = circling.circles(site, 10)
     if ours:
-        advance, _ = worlds.ours(site, starts)
+        advance = circling.ours(site, starts)
     else:
-        folder = Path(tempfile.mkdtemp(prefix="ir-sim-"))
-        advance, _ = worlds.theirs(site, starts, "contact", folder)
+        advance = circling.theirs(site, starts, Path(tempfile.mkdtemp(prefix="ir-sim-")))
     return lambda: advance(1.0) or 1.0
 
 
@@ -203,6 +226,8 @@ CASES = {
     **{f"{robots} robots": Case(SECOND, partial(patrols, robots)) for robots in (10, 40, 200)},
     "a shift": Case(RUN, shift),
     "a task": Case(RUN, pointing),
+    **{f"a decision, {p}": Case("decision", partial(decision, p)) for p in ADVISERS},
+    "a picture": Case("picture", picture),
     "a message through the network": Case(MESSAGE, published),
     "a call at a later moment": Case(MESSAGE, called),
     "a Store's put and get": Case(MESSAGE, stored),

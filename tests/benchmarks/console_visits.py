@@ -17,6 +17,8 @@ from playwright.sync_api import Browser, Page
 
 REAL = ("-m", "dva_sim.cli", "console", "--no-open", "--port", "0")
 FAKE = (str(TESTS / "console" / "fake_world.py"),)
+TOLD = r"^Console: +(\S+)\n()"
+TOLD_TO_PHONES = r"^Console: +(\S+)\n.*^Phone: \S+token=(\S+)$.*trust this machine"
 TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 
 # What a page does is noted: keys, what it sends and is told, and which input a robot obeys when.
@@ -53,17 +55,17 @@ class Console(NamedTuple):
     Attributes:
         address: With the token for driving.
         process: The world's.
+        phones: The token of phones, if it has an address for them.
     """
 
     address: str
     process: subprocess.Popen[bytes]
+    phones: str
 
     @property
-    def place(self) -> tuple[str, str]:
-        """Host and port, and the token of who drives."""
-        found = re.fullmatch(r"http://(\S+)/\?token=(\S+)", self.address)
-        assert found is not None
-        return found[1], found[2]
+    def place(self) -> str:
+        """Host and port."""
+        return self.address.removeprefix("http://").partition("/")[0]
 
     def cpu_s(self) -> dict[str, float]:
         """CPU seconds of the world and of the processes beside it, so far."""
@@ -88,16 +90,16 @@ def _children(pid: int) -> list[int]:
 def console(folder: Path, *words: str, program: Sequence[str] = REAL) -> Iterator[Console]:
     """A console from its first word until it is not needed any more."""
     out = folder / "console.out"
-    environment = {**os.environ, "DVA_SIM_NO_BROWSER": "1"}
+    environment = {**os.environ, "DVA_SIM_NO_BROWSER": "1", "XDG_DATA_HOME": str(folder)}
     with out.open("wb") as file:
         command = [sys.executable, *program, *words]
         process = subprocess.Popen(command, stdout=file, stderr=file, env=environment)
     try:
-        wanted = re.compile(r"^Console: +(\S+)\n", re.MULTILINE)
+        wanted = re.compile(TOLD_TO_PHONES if "--phones" in words else TOLD, re.M | re.S)
         assert becomes(lambda: wanted.search(out.read_text()) or process.poll() is not None)
         found = wanted.search(out.read_text())
         assert found is not None, out.read_text()
-        yield Console(found[1], process)
+        yield Console(found[1], process, found[2])
     finally:
         process.terminate()
         process.wait(PATIENCE_S)

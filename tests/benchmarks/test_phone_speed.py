@@ -9,25 +9,23 @@ that sample to the robot's set point, with all that lies between.
 from __future__ import annotations
 
 import json
-import os
-import re
-import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.console_visits import Console, console
 from benchmarks.goals import goal
 from helpers.console.browser_phone import Hand
-from helpers.processes.patience import PATIENCE_S, becomes
-from playwright.sync_api import Page, Response, expect, sync_playwright
+from helpers.console.chromium import chromium
+from helpers.processes.patience import PATIENCE_S
+from playwright.sync_api import Page, Response, expect
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -35,7 +33,7 @@ STEPS, STEP_S, WARM_UP_S = 500, 0.1, 2.0
 HZ, BATCH_S = 60.0, 0.012  # as phones and the page have them
 DRIVEN, MANY, MANY_S = 2, 20, 15.0
 UPRIGHT, LEFT, RIGHT = (0.0, 6.9, 6.9), (1.2, 6.9, 6.8), (-1.2, 6.9, 6.8)  # [m/s^2]
-WORDS = ("--no-open", "--port", "0", "--phones", "--phones-host", "127.0.0.1")
+WORDS = ("--phones", "--phones-host", "127.0.0.1", "--phones-port", "0")
 CALIBRATION = {
     "reference_mps2": UPRIGHT,
     "speed_step_mps2": 0.35,
@@ -47,41 +45,6 @@ CALIBRATION = {
 }
 STARTS_WITHIN_S, REST_S = 15.0, 0.5
 DELAY_MS = 60.0  # hand to set point should take less, for 95 of 100
-
-
-class Console(NamedTuple):
-    """One that runs: host and port of its own address, the token of phones, its processes."""
-
-    place: str
-    token: str
-    processes: list[int]
-
-    def cpu_s(self) -> float:
-        """What all of them have computed so far."""
-        stats = (Path(f"/proc/{one}/stat").read_text() for one in self.processes)
-        ticks = (sum(map(int, stat.rpartition(")")[2].split()[11:13])) for stat in stats)
-        return sum(ticks) / os.sysconf("SC_CLK_TCK")
-
-
-@contextmanager
-def console(folder: Path, *words: str) -> Iterator[Console]:
-    """The real thing, with an address for phones."""
-    out = folder / "out"
-    environment = {**os.environ, "DVA_SIM_NO_BROWSER": "1", "XDG_DATA_HOME": str(folder)}
-    with out.open("wb") as file:
-        command = [sys.executable, "-m", "dva_sim.cli", "console", *words, *WORDS]
-        command += ["--phones-port", "0"]
-        process = subprocess.Popen(command, stdout=file, stderr=file, env=environment)
-    try:
-        told = re.compile(r"^Console: +http://(\S+)/\?.*^Phone: \S+token=(\S+)$", re.M | re.S)
-        assert becomes(lambda: "trust this machine" in out.read_text() or process.poll())
-        found = told.search(out.read_text())
-        assert found is not None, out.read_text()
-        beside = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
-        yield Console(found[1], found[2], [process.pid, *map(int, beside.split())])
-    finally:
-        process.terminate()
-        process.wait(PATIENCE_S)
 
 
 class Phone:
@@ -100,11 +63,11 @@ class Phone:
 
     def __init__(self, at: Console, label: str) -> None:
         options: dict[str, Any] = {"max_size": None, "compression": None}
-        options["additional_headers"] = {"Authorization": f"Bearer {at.token}"}
+        options["additional_headers"] = {"Authorization": f"Bearer {at.phones}"}
         self._state = connect(f"ws://{at.place}/ws/state", **options).__enter__()
-        self._client = json.loads(self._state.recv(PATIENCE_S))["client"]
+        key = json.loads(self._state.recv(PATIENCE_S))["key"]
         self.scene = self._until(self._state, lambda line: line.get("scene"))["scene"]
-        address = f"ws://{at.place}/ws/drive?client={self._client}"
+        address = f"ws://{at.place}/ws/drive?key={key}"
         self._drive = connect(address, **options).__enter__()
         self._reader = Thread(target=self._look, daemon=True)
         self._reader.start()
@@ -217,7 +180,7 @@ def swing(phone: Phone, steps: int) -> None:
 
 
 def test_from_the_hand_to_the_robots_set_point(tmp_path):
-    with console(tmp_path) as at:
+    with console(tmp_path, *WORDS) as at:
         phone = Phone(at, "my phone")
         phone.take(0)
         phone.start()
@@ -254,18 +217,18 @@ def in_threads(what: Callable[[Phone], object], phones: list[Phone]) -> None:
 @pytest.mark.parametrize("many", [2, MANY])
 def test_what_phones_cost_and_what_they_lose(tmp_path, many):
     """Two drive, as `hands-on` has two robots; what the others tell is shown on their screens."""
-    with console(tmp_path) as at:
+    with console(tmp_path, *WORDS) as at:
         phones = [Phone(at, f"phone {n}") for n in range(many)]
         for number, phone in enumerate(phones[:DRIVEN]):
             phone.take(number)
-        began, cpu = time.monotonic(), at.cpu_s()
+        began, cpu = time.monotonic(), sum(at.cpu_s().values())
         in_threads(lambda phone: swing(phone, round(MANY_S / STEP_S)), phones)
-        spent = (at.cpu_s() - cpu) / (time.monotonic() - began)
+        spent = (sum(at.cpu_s().values()) - cpu) / (time.monotonic() - began)
         told = [phone.line["phone"] for phone in phones]
         drives = sum(phone.is_driving for phone in phones)
-        cpu = at.cpu_s()
+        cpu = sum(at.cpu_s().values())
         time.sleep(MANY_S)  # they are there, and say nothing
-        idle = (at.cpu_s() - cpu) / MANY_S
+        idle = (sum(at.cpu_s().values()) - cpu) / MANY_S
         for phone in phones:
             phone.close()
     lost, came = (sum(one[key] for one in told) for key in ("samples_lost", "samples"))
@@ -295,12 +258,8 @@ CAMERA, WATCHED_S = "robot-1", 20.0
 @pytest.fixture
 def hand(tmp_path: Path) -> Iterator[tuple[Hand, list[int]]]:
     """A phone's page in the system's Chromium that drives, and what its files weigh [B]."""
-    path = shutil.which("chromium") or shutil.which("google-chrome")
-    if path is None:
-        pytest.skip("this needs Chromium")
     weights: list[int] = []
-    with console(tmp_path) as at, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+    with console(tmp_path, *WORDS) as at, chromium() as browser:
         context = browser.new_context(viewport={"width": 360, "height": 740}, has_touch=True)
 
         def weigh(answer: Response) -> None:
@@ -313,8 +272,7 @@ def hand(tmp_path: Path) -> Iterator[tuple[Hand, list[int]]]:
             return page
 
         visit = SimpleNamespace(context=context, tab=tab)
-        yield Hand(visit, f"http://{at.place}/phone?token={at.token}"), weights
-        browser.close()
+        yield Hand(visit, f"http://{at.place}/phone?token={at.phones}"), weights
 
 
 def test_what_the_browser_adds(hand):
