@@ -55,10 +55,7 @@ def test_readers_and_the_holder_take_turns_and_readers_are_bounded():
         inquiry.about_holder(RUI)
         asked.append(inquiry.next(1000.0 * (len(asked) + 1)))
         inquiry.answered(NOBODY)
-    assert [question is not None and question.level for question in asked] == [
-        None,
-        "sensors",
-    ] * 3
+    assert [question and question.level for question in asked] == [None, "sensors"] * 3
 
 
 def test_a_dva_of_1_4_is_asked_about_the_device_that_was_named_last():

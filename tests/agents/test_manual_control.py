@@ -4,6 +4,7 @@ import math
 
 import pytest
 from helpers.dva.permissions import confirmation, give
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import (
     LEASE_S,
@@ -76,7 +77,8 @@ def test_a_robot_that_somebody_holds_says_who_and_goes_into_no_hand(robot):
 
 @pytest.mark.invariant("S2")
 def test_only_a_robot_that_stands_is_taken_and_by_one_hand(robot):
-    assert robot.take_by_hand(HERE, 0.0, moving=True).text == "not at a standstill yet"
+    refused = robot.take_by_hand(HERE, 0.0, moving=True)
+    assert (refused.code, unnamed(refused.text, "standstill")) == (m.BUSY, [])
     assert robot.take_by_hand(HERE, 1.0, moving=False).code == m.OK
     assert robot.take_by_hand(HERE, 1.0, moving=True).code == m.OK
     assert robot.take_by_hand(THERE, 2.0, moving=False).code == m.BUSY

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.command_queue import ServiceLaw
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
@@ -44,27 +45,24 @@ def test_a_drive_beside_its_profile_is_found_from_anywhere(tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("keys", "said"),
+    ("keys", "names"),
     [
-        ({"max_speed_mps": 3.8}, "max_speed_mps should be at most 3.75 for a body of this size"),
-        ({"max_speed_mps": 1.3, "radius_m": 0.1}, "max_speed_mps should be at most 1.25"),
-        (
-            {"corners_m": [[0.2, 0.05], [-0.2, 0.05], [-0.2, -0.05], [0.2, -0.05]],
-             "max_speed_mps": 0.7},
-            "max_speed_mps should be at most 0.625",
-        ),
-        ({"corners_m": [[0.4, 0.1], [-0.2, 0.1], [-0.2, -0.1]]}, "radius_m should hold the corner"),
-        ({"corners_m": [[0.2, 0], [0, 0.2]]}, "corners_m should go counter-clockwise"),
-        ({"corners_m": [[0.2, 0.1], [0.2, -0.1], [-0.2, 0]]}, "corners_m should go counter-clockw"),
-        ({"corners_m": [[0.2, 0], [0.02, 0.02], [0, 0.2], [-0.2, -0.2]]}, "without dents"),
-        ({"corners_m": [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05], [0.2, 0.05]]}, "around 0, 0"),
-        ({"mass_kg": 0}, "mass_kg: should be above 0, not 0"),
-        ({"battery": {"efficiency": 2}}, "battery.efficiency: should be at most"),
-        ({"reverse": True}, "unknown key 'reverse'"),
+        ({"max_speed_mps": 3.8}, "max_speed_mps 3.75"),
+        ({"max_speed_mps": 1.3, "radius_m": 0.1}, "max_speed_mps 1.25"),
+        ({"corners_m": [[0.2, 0.05], [-0.2, 0.05], [-0.2, -0.05], [0.2, -0.05]],
+          "max_speed_mps": 0.7}, "max_speed_mps 0.625"),
+        ({"corners_m": [[0.4, 0.1], [-0.2, 0.1], [-0.2, -0.1]]}, "radius_m corner"),
+        ({"corners_m": [[0.2, 0], [0, 0.2]]}, "corners_m counter-clockwise"),
+        ({"corners_m": [[0.2, 0.1], [0.2, -0.1], [-0.2, 0]]}, "corners_m counter-clockwise"),
+        ({"corners_m": [[0.2, 0], [0.02, 0.02], [0, 0.2], [-0.2, -0.2]]}, "corners_m dents"),
+        ({"corners_m": [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05], [0.2, 0.05]]}, "corners_m around"),
+        ({"mass_kg": 0}, "mass_kg 0"),
+        ({"battery": {"efficiency": 2}}, "battery.efficiency most"),
+        ({"reverse": True}, "'reverse'"),
     ],
 )  # fmt: skip
-def test_a_profile_that_cannot_be_is_refused_in_one_line(keys, said):
+def test_a_profile_that_cannot_be_is_refused_in_one_line(keys, names):
     with pytest.raises(ConfigError) as caught:
         validate(RobotProfile, keys)
-    assert said in str(caught.value)
+    assert unnamed(caught.value, *names.split()) == []
     assert "\n" not in str(caught.value)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from helpers.wording import unnamed
 from helpers.worlds.robot_fleet import EMPTY, Fleet
 from pydantic import ValidationError
 
@@ -75,14 +76,8 @@ def test_a_lag_is_a_first_order_step_response():
 
 def test_between_its_samples_it_shows_the_last_one():
     made = sensor(lambda now: (now,), rate_hz=2.0, low=0.0)
-    assert readings(made, [0.0, 0.2, 0.45, 0.5, 0.9, 1.0]) == [
-        (0.0,),
-        (0.0,),
-        (0.0,),
-        (0.5,),
-        (0.5,),
-        (1.0,),
-    ]
+    shown = [value for (value,) in readings(made, [0.0, 0.2, 0.45, 0.5, 0.9, 1.0])]
+    assert shown == [0.0, 0.0, 0.0, 0.5, 0.5, 1.0]
 
 
 def test_the_noise_of_a_sample_hangs_neither_on_how_often_it_is_read_nor_on_other_sensors():
@@ -136,19 +131,20 @@ def test_faults_by_chance_come_after_their_mean_time_on_average():
 
 
 @pytest.mark.parametrize(
-    ("config", "told"),
+    ("config", "names"),
     [
-        ({"name": "radar"}, "sensor 'radar' is unknown; known: lidar, temperature"),
-        ({"name": "smoke", "rate_hz": 50}, "less than or equal to 20"),
-        ({"name": "smoke", "noise": -1}, "greater than or equal to 0"),
-        ({"name": "smoke", "faults": [{"kind": "lost"}]}, "either at_s or mean_time_s"),
-        ({"name": "smoke", "faults": [{"kind": "late", "at_s": 1}]}, "'lost' or 'stuck'"),
+        ({"name": "radar"}, "'radar' lidar temperature"),
+        ({"name": "smoke", "rate_hz": 50}, "rate_hz 20"),
+        ({"name": "smoke", "noise": -1}, "noise 0"),
+        ({"name": "smoke", "faults": [{"kind": "lost"}]}, "faults at_s mean_time_s"),
+        ({"name": "smoke", "faults": [{"kind": "late", "at_s": 1}]}, "'lost' 'stuck'"),
         ({"name": "smoke", "colour": 1}, "colour"),
     ],
 )
-def test_a_mistake_in_the_configuration_is_told(config, told):
-    with pytest.raises(ValidationError, match=told):
+def test_a_mistake_in_the_configuration_is_told(config, names):
+    with pytest.raises(ValidationError) as told:
         SensorConfig.model_validate(config)
+    assert unnamed(told.value, *names.split()) == []
 
 
 def test_two_sensors_of_one_name_are_one_too_many():
@@ -179,13 +175,15 @@ def test_each_kind_measures_what_it_is_called_by_where_the_robot_is():
     assert set(sources) == set(KINDS)
     assert sources["temperature"](1.0) == (20.0,)
     shown = {name: source(6.0) for name, source in sources.items()}
-    assert shown["temperature"] == (80.0,)
-    assert shown["heat_flux"] == (2.5,)
-    assert shown["smoke"] == (0.7,)
-    assert shown["gas"] == (0.01,)
-    assert shown["water"] == (0.2,)
-    assert shown["battery"] == (0.75,)
-    ranges = shown["lidar"]
+    ranges = shown.pop("lidar")
+    assert shown == {
+        "temperature": (80.0,),
+        "heat_flux": (2.5,),
+        "smoke": (0.7,),
+        "gas": (0.01,),
+        "water": (0.2,),
+        "battery": (0.75,),
+    }
     assert len(ranges) == 36
     assert ranges[0] == 8.0  # ahead the corridor goes on
     assert ranges[9] == pytest.approx(1.2, abs=0.001) or ranges[9] > 1.2  # a wall or a corridor

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.command_queue import ServiceLaw, mean_of, service_times
 from dva_sim.kernel.errors import ConfigError
@@ -44,23 +45,21 @@ def test_a_number_is_always_the_same():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "names"),
     [
-        ({"law": "gamma", "mean_s": 1}, "the gamma law needs cv"),
-        ({"law": "exponential", "mean_s": 1, "cv": 1}, "the exponential law has no cv of its own"),
-        ({"law": "normal", "mean_s": 1}, "robot.processing_s.law: should be constant, "),
-        ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: .* above 0"),
-        (
-            {"law": "constant", "mean_s": 1, "c": 1},
-            "unknown key 'robot.processing_s.c'",
-        ),
-        ("long", "robot.processing_s: should be a number"),
-        (-1, "robot.processing_s: should be at least 0"),
+        ({"law": "gamma", "mean_s": 1}, "gamma needs cv"),
+        ({"law": "exponential", "mean_s": 1, "cv": 1}, "exponential no cv"),
+        ({"law": "normal", "mean_s": 1}, "robot.processing_s.law: constant"),
+        ({"law": "constant", "mean_s": -1}, "robot.processing_s.mean_s: 0"),
+        ({"law": "constant", "mean_s": 1, "c": 1}, "'robot.processing_s.c'"),
+        ("long", "robot.processing_s: number"),
+        (-1, "robot.processing_s: 0"),
     ],
 )
-def test_a_law_that_cannot_be_is_refused(wrong, told):
-    with pytest.raises(ConfigError, match=told):
+def test_a_law_that_cannot_be_is_refused(wrong, names):
+    with pytest.raises(ConfigError) as told:
         scenarios.build({}, {"robot.processing_s": wrong})
+    assert unnamed(told.value, *names.split()) == []
 
 
 def test_robots_draw_their_own_times_the_same_for_the_same_seed():

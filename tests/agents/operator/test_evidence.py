@@ -8,20 +8,14 @@ seconds on average. Looked at every dt, both ends are overshot: a counts as a + 
 """
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from helpers.worlds.delayed_loops import normals
 
 from dva_sim.agents.operator.inspection import Evidence, clearness, worth
 
 SENSITIVITY, LOOK = 4.5, 1.5  # of the person in the middle of the population
-
-
-def normals(seed: int) -> Iterator[float]:
-    rng = np.random.default_rng(seed)
-    while True:
-        yield from rng.normal(size=1000).tolist()
 
 
 def mean_time(drift: float, level: float, step: float, variance: float = 1.0) -> float:

@@ -1,12 +1,12 @@
 """When a link counts as lost and when a person gives up, by whatever pattern commands travel."""
 
 import pytest
-from helpers.dva.scripted_dva import ROBOT, PretendedDva
+from helpers.dva.scripted_dva import EAST, ROBOT, PretendedDva, driving
 
 from dva_sim.agents.operator.drive import ATTEMPTS
 from dva_sim.agents.operator.supervision import BLIND_AFTER
+from dva_sim.kernel.recorder import DriveLog
 
-EAST = (30.0, 12.0)  # the end of the main corridor [m]
 ASKED = ("req-rep", "pipelined")
 BY_PLACES = """
 import math
@@ -29,19 +29,9 @@ PATTERNS = ("req-rep", "latest-wins")
 STRATEGIES = ("pursuit", "move_and_wait")
 
 
-def driving(pattern: str, **changes: object) -> PretendedDva:
-    dva = PretendedDva(robots=1, pattern=pattern, **changes)
-    dva.operator()
-    dva.order(1, EAST, robot=ROBOT)
-    dva.run_until(lambda: "departed" in dva.progress(1))
-    dva.run_for(5.0)
-    dva.run_until(lambda: abs(dva.field.robots[ROBOT].body.speed) > 0.1)
-    return dva
-
-
-def lost_after(dva: PretendedDva) -> tuple[str, float]:
+def lost_after(dva: PretendedDva, log: DriveLog) -> tuple[str, float]:
     """How the drive ends, and how long that takes [s]."""
-    now, (log,) = dva.now, dva.stage.recorder.drives
+    now = dva.now
     dva.run_until(lambda: log.ended is not None, limit=120.0)
     assert log.ended is not None
     dva.run_for(1.0)
@@ -51,9 +41,9 @@ def lost_after(dva: PretendedDva) -> tuple[str, float]:
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_a_robot_that_says_nothing_any_more_is_lost_after_20_s_without_a_picture(pattern):
-    dva = driving(pattern)
+    dva, log = driving(pattern)
     dva.field.robots[ROBOT].device.silent = True
-    outcome, took = lost_after(dva)
+    outcome, took = lost_after(dva, log)
     assert (outcome, BLIND_AFTER) == ("lost link", 20.0)
     assert took == pytest.approx(20.5, abs=0.8)
 
@@ -62,9 +52,9 @@ def test_a_robot_that_says_nothing_any_more_is_lost_after_20_s_without_a_picture
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_commands_that_do_not_arrive_are_a_lost_link_after_three_attempts(pattern, strategy):
     """The picture goes on; nobody moves any more, whatever is tried."""
-    dva = driving(pattern, **{"operator.strategy": strategy})
+    dva, log = driving(pattern, **{"operator.strategy": strategy})
     dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
-    outcome, took = lost_after(dva)
+    outcome, took = lost_after(dva, log)
     assert (outcome, ATTEMPTS) == ("lost link", 3)
     assert 12.0 < took < 45.0
     tried = dva.stage.recorder.counters["replans"]
@@ -72,9 +62,9 @@ def test_commands_that_do_not_arrive_are_a_lost_link_after_three_attempts(patter
 
 
 def test_the_story_says_what_an_operator_believes_of_the_link_and_not_that_it_is_so():
-    dva = driving("latest-wins")
+    dva, log = driving("latest-wins")
     dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
-    lost_after(dva)
+    lost_after(dva, log)
     told = [moment.what for moment in dva.stage.recorder.timeline]
     assert any("does not move" in what for what in told)
     assert not any("lost link" in what for what in told)
@@ -82,10 +72,9 @@ def test_the_story_says_what_an_operator_believes_of_the_link_and_not_that_it_is
 
 @pytest.mark.parametrize("pattern", ASKED)
 def test_the_app_alerts_after_three_sends_of_2_s_without_an_answer(pattern):
-    dva = driving(pattern, **{"command.timeout_s": 2.0})
+    dva, log = driving(pattern, **{"command.timeout_s": 2.0})
     dva.field.robots[ROBOT].inbox._put = lambda *_: None  # type: ignore[method-assign]
-    outcome, took = lost_after(dva)
-    (log,) = dva.stage.recorder.drives
+    outcome, took = lost_after(dva, log)
     assert outcome == "lost link"
     assert took == pytest.approx(6.0, abs=0.5)
     assert log.alerts >= 1
@@ -93,11 +82,11 @@ def test_the_app_alerts_after_three_sends_of_2_s_without_an_answer(pattern):
 
 def test_who_gets_no_nearer_gives_up_when_its_patience_ends():
     """A robot that turns and never drives: patience is of the person."""
-    dva = driving("latest-wins", **{"operator.traits": {"patience_s": 30.0}})
+    dva, log = driving("latest-wins", **{"operator.traits": {"patience_s": 30.0}})
     body = dva.field.robots[ROBOT].body
     drive = body.drive
     body.drive = lambda speed, turn, until: drive(0.0, 0.3, until)  # type: ignore[method-assign]
-    outcome, took = lost_after(dva)
+    outcome, took = lost_after(dva, log)
     assert outcome == "gave up"
     assert 15.0 < took < 60.0
 

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
-from helpers.wording import counted
+from helpers.wording import counted, unnamed
 from helpers.worlds.delayed_loops import CURSOR, ROBOT, drive, person, way
 
 from dva_sim.agents.observation import Observation
@@ -42,32 +42,24 @@ def test_all_ways_of_steering_have_names():
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "problem"),
+    ("name", "options", "names"),
     [
-        ("clever", {}, "operator 'clever' is unknown; known: adaptive, move_and_wait, oracle, "),
-        ("pursuit", {"gain": 2}, "operator 'pursuit' has no option 'gain'; it has none"),
-        ("predictor", {"gain": 2}, "has no option 'gain'; known: inner, quality"),
-        ("predictor", {"quality": 1.5}, "option 'quality' is 1.5; should be a number from 0 to 1"),
-        (
-            "predictor",
-            {"quality": math.nan},
-            "option 'quality' is nan; should be a number from 0 to 1",
-        ),
-        (
-            "predictor",
-            {"quality": "nan"},
-            "option 'quality' is 'nan'; should be a number from 0 to 1",
-        ),
-        ("predictor", {"inner": "oracle"}, "option 'inner' is 'oracle', which sees nothing"),
-        ("adaptive", {"closed": "oracle"}, "option 'closed' is 'oracle', which sees nothing"),
-        ("adaptive", {"closed": 5}, "option 'closed' is 5; should be the name of an operator"),
-        ("adaptive", {"closed": "nothing"}, "operator 'nothing' is unknown"),
+        ("clever", {}, "'clever' adaptive move_and_wait oracle"),
+        ("pursuit", {"gain": 2}, "'pursuit' 'gain' none"),
+        ("predictor", {"gain": 2}, "'gain' inner quality"),
+        ("predictor", {"quality": 1.5}, "'quality' 1.5; 0 1"),
+        ("predictor", {"quality": math.nan}, "'quality' nan; 0 1"),
+        ("predictor", {"quality": "nan"}, "'quality' 'nan'; 0 1"),
+        ("predictor", {"inner": "oracle"}, "'inner' 'oracle'"),
+        ("adaptive", {"closed": "oracle"}, "'closed' 'oracle'"),
+        ("adaptive", {"closed": 5}, "'closed' 5;"),
+        ("adaptive", {"closed": "nothing"}, "'nothing'"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(name, options, problem):
+def test_a_mistake_is_told_by_its_names(name, options, names):
     with pytest.raises(ConfigError) as told:
         load_strategy(name, options)(person(), ROBOT)
-    assert problem in str(told.value)
+    assert unnamed(told.value, *names.split()) == []
 
 
 def test_a_scenario_refuses_a_strategy_that_there_is_not():
@@ -199,8 +191,8 @@ def test_in_a_run_failures_are_counted_and_told_once_a_drive(tmp_path):
         1,
     )
     told = [moment.what for moment in run.recorder.timeline if "strategy fails" in moment.what]
-    line = "lets go, as its strategy fails: ZeroDivisionError: division by zero"
-    assert told == [line] * len(run.recorder.drives)
+    assert len(told) == len(run.recorder.drives) > 0
+    assert unnamed(told[0], "ZeroDivisionError: division by zero") == []
     assert counted(run.recorder.counters, "failed", "operator") > 100
 
 

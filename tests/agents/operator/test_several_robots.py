@@ -4,14 +4,13 @@ import math
 from itertools import pairwise
 
 import pytest
-from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+from helpers.dva.scripted_dva import EAST, OPERATOR, OTHER_ROBOT, ROBOT, WEST, PretendedDva
 
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.field_of_view import FieldOfView
 from dva_sim.protocol import messages as m
 
-EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of the main corridor [m]
 THIRD_ROBOT = ROBOT[:-1] + "3"
 
 
@@ -124,6 +123,8 @@ def test_a_revoked_permission_ends_one_mission_and_not_the_other():
     dva.say(OPERATOR, over)
     dva.run_for(3.0)
     assert modes(dva) == [Mode.IDLE, Mode.MISSION]
+    assert dva.field.robots[ROBOT].controller.mission_status.reason == "revoked"
+    assert dva.stage.recorder.drives[0].outcome == "gave up"
     assert list(operator.works) == [OTHER_ROBOT]
 
 

@@ -3,13 +3,11 @@
 import math
 
 import pytest
-from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+from helpers.dva.scripted_dva import EAST, OPERATOR, OTHER_ROBOT, ROBOT, WEST, PretendedDva
 
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.protocol import messages as m
-
-EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of the main corridor [m]
 
 
 @pytest.fixture
@@ -31,16 +29,8 @@ def mode(dva: PretendedDva, robot: str = ROBOT) -> Mode:
     return dva.field.robots[robot].controller.mode
 
 
-def start(dva: PretendedDva, event: int, place: tuple[float, float], robot: str = ROBOT) -> None:
-    """Order an inspection and wait until the robot goes."""
-    assert dva.order(event, place, robot=robot) == m.OK
-    dva.run_until(lambda: "departed" in dva.progress(event))
-    dva.run_for(5.0)
-    assert mode(dva, robot) is Mode.MISSION
-
-
 def test_a_fire_that_the_robot_shows_is_confirmed(dva, operator):
-    start(dva, 1, fire(dva))
+    dva.start(1, fire(dva))
     assert operator.activity == "watches robot-1"
     dva.run_until(lambda: "done" in dva.progress(1))
     assert dva.progress(1) == ["departed", "arrived", "confirmed", "done"]
@@ -53,7 +43,7 @@ def test_a_fire_that_the_robot_shows_is_confirmed(dva, operator):
 
 
 def test_it_takes_the_permission_for_missions_and_drives_nothing(dva, operator):
-    start(dva, 1, fire(dva))
+    dva.start(1, fire(dva))
     asked = [t.body for t in dva.told if isinstance(t.body, m.PermissionRequest)]
     assert [wish.level for wish in asked] == ["missions"]
     (log,) = dva.stage.recorder.drives
@@ -63,7 +53,7 @@ def test_it_takes_the_permission_for_missions_and_drives_nothing(dva, operator):
 
 
 def test_where_nothing_is_it_says_so_after_having_looked_around(dva, operator):
-    start(dva, 1, EAST)
+    dva.start(1, EAST)
     dva.run_until(lambda: "done" in dva.progress(1))
     assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
     looked = dva.when(1, "refuted") - dva.when(1, "arrived")
@@ -72,7 +62,7 @@ def test_where_nothing_is_it_says_so_after_having_looked_around(dva, operator):
 
 
 def test_a_recall_stops_the_robot_and_gives_it_back(dva, operator):
-    start(dva, 1, EAST)
+    dva.start(1, EAST)
     assert dva.say(OPERATOR, m.OrderProgress(1, "done")) == m.OK
     dva.run_for(3.0)
     robot = dva.field.robots[ROBOT]
@@ -84,7 +74,7 @@ def test_a_recall_stops_the_robot_and_gives_it_back(dva, operator):
 
 
 def test_a_newer_order_sends_the_same_robot_elsewhere(dva, operator):
-    start(dva, 1, EAST)
+    dva.start(1, EAST)
     assert dva.order(2, WEST, robot=ROBOT) == m.OK
     dva.run_until(lambda: "done" in dva.progress(2))
     assert dva.progress(1) == ["departed"]
@@ -93,7 +83,7 @@ def test_a_newer_order_sends_the_same_robot_elsewhere(dva, operator):
 
 
 def test_a_newer_order_for_another_robot_stops_the_first(dva, operator):
-    start(dva, 1, EAST)
+    dva.start(1, EAST)
     dva.order(2, WEST, robot=OTHER_ROBOT)
     dva.run_until(lambda: "departed" in dva.progress(2))
     assert mode(dva, ROBOT) is Mode.IDLE
@@ -102,7 +92,7 @@ def test_a_newer_order_for_another_robot_stops_the_first(dva, operator):
 
 
 def test_a_robot_that_gives_up_makes_its_operator_give_up(dva, operator):
-    start(dva, 1, EAST)
+    dva.start(1, EAST)
     dva.say(ROBOT, m.Emergency())
     dva.run_until(lambda: "failed" in dva.progress(1), limit=30.0)
     assert dva.progress(1) == ["departed", "failed"]
@@ -114,17 +104,6 @@ def test_a_place_without_a_way_is_given_up(dva, operator):
     dva.order(1, (200.0, 200.0), robot=ROBOT)
     dva.run_until(lambda: "failed" in dva.progress(1), limit=60.0)
     assert any("no way" in moment.what for moment in dva.stage.recorder.timeline)
-
-
-def test_a_revoked_permission_ends_the_mission(dva, operator):
-    start(dva, 1, EAST)
-    over = m.PermissionRevocation(ROBOT, OPERATOR, dva.sessions[ROBOT].session)
-    dva.say(ROBOT, over)
-    dva.say(OPERATOR, over)
-    dva.run_for(3.0)
-    assert mode(dva) is Mode.IDLE
-    assert dva.field.robots[ROBOT].controller.mission_status.reason == "revoked"
-    assert dva.stage.recorder.drives[0].outcome == "gave up"
 
 
 def test_the_same_person_judges_the_same_fire_under_each_control():

@@ -1,9 +1,7 @@
 """Being told no: by whatever pattern commands travel, the app finds out, and says so."""
 
-from typing import Any
-
 import pytest
-from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva
+from helpers.dva.scripted_dva import OPERATOR, OTHER_ROBOT, ROBOT, PretendedDva, driving
 from helpers.wording import counted
 
 from dva_sim.agents.operator.refusals import ENOUGH, LATE_FOR, PASSES, SAYS_LATE_FOR, Refusals
@@ -12,7 +10,6 @@ from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import id_of
 
-EAST = (30.0, 12.0)  # the end of the main corridor [m]
 EXAMPLE = "acknowledged_pub_sub.py:AcknowledgedPubSub"
 PATTERNS = ("req-rep", "latest-wins", EXAMPLE)
 ME, OTHER = id_of("operator", 1), id_of("operator", 2)
@@ -74,25 +71,11 @@ def test_word_of_a_holder_counts_once_the_robot_was_ours(refusals):
 
 
 def test_word_that_never_says_it_is_ours_counts_the_third_time(refusals):
-    assert [bool(refusals.held(ME, m.WRONG_MODE, float(n), n)) for n in range(3)] == [
-        False,
-        False,
-        True,
-    ]
+    said = [bool(refusals.held(ME, m.WRONG_MODE, float(n), n)) for n in range(3)]
+    assert said == [False, False, True]
 
 
 # --- a drive -----------------------------------------------------------------------------
-
-
-def driving(pattern: str, **changes: Any) -> tuple[PretendedDva, DriveLog]:
-    dva = PretendedDva(robots=1, pattern=pattern, **changes)
-    dva.operator()
-    dva.order(1, EAST, robot=ROBOT)
-    dva.run_until(lambda: "departed" in dva.progress(1))
-    dva.run_until(lambda: abs(dva.field.robots[ROBOT].body.speed) > 0.1)
-    (log,) = dva.stage.recorder.drives
-    assert log.ended is None
-    return dva, log
 
 
 def ends(dva: PretendedDva, log: DriveLog, within: float) -> None:

@@ -205,21 +205,6 @@ def test_a_large_gain_lets_more_noise_through():
     assert spread[4.0] == pytest.approx(4 * spread[1.0], rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("settings", "line"),
-    [
-        ({"filter": "mean"}, "filter 'mean' is unknown; known: "),
-        ({"mapping": "mean"}, "mapping 'mean' is unknown; known: "),
-        ({"accelerometer": "mean"}, "accelerometer 'mean' not found; available: adxl345, "),
-        ({"filter_options": {"size": 3}}, "filter 'median' has no option 'size'; known: window"),
-    ],
-)
-def test_a_chain_with_a_wrong_part_is_refused_in_a_line(settings, line):
-    with pytest.raises(ConfigError) as told:
-        phone(**settings)
-    assert str(told.value).startswith(line)
-
-
 @pytest.mark.parametrize("reference", [[0, 0, 5], [0, 0, -9.8]])
 def test_a_reference_that_is_no_pose_is_refused(reference):
     with pytest.raises(ConfigError, match="reference_mps2 should"):

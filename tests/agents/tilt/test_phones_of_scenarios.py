@@ -1,6 +1,7 @@
 """A scenario names the stages of its phones; what it names wrongly is told before anything runs."""
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
@@ -19,32 +20,31 @@ class Mine(Filter):
 
 
 @pytest.mark.parametrize(
-    ("changes", "line"),
+    ("key", "value", "names"),
     [
-        ({"phone.filter": "mean"}, "filter 'mean' is unknown; known: median, "),
-        ({"phone.mapping": "cubic"}, "mapping 'cubic' is unknown; known: absolute, "),
-        ({"phone.mapping_options.leak_s": 1}, "mapping 'absolute' has no option 'leak_s'; "),
-        ({"phone.accelerometer": "adxl"}, "accelerometer 'adxl' not found; did you mean 'adxl3"),
-        ({"phone.noise_mps2": 1}, "phone: unknown key 'noise_mps2'; "),
+        ("phone.filter", "mean", "filter 'mean' median"),
+        ("phone.mapping", "cubic", "mapping 'cubic' absolute"),
+        ("phone.accelerometer", "adxl", "accelerometer 'adxl' 'adxl345'?"),
+        ("phone.noise_mps2", 1, "phone 'noise_mps2'"),
     ],
 )
-def test_a_wrong_stage_is_refused_before_the_run(changes, line):
+def test_a_wrong_stage_is_refused_before_the_run(key, value, names):
     with pytest.raises(ConfigError) as told:
-        scenarios.build(scenarios.load("drive-to-event"), changes)
-    assert line in str(told.value)
+        scenarios.build(scenarios.load("drive-to-event"), {key: value})
+    assert unnamed(told.value, *names.split()) == []
 
 
 @pytest.mark.parametrize(
-    ("key", "told"),
+    ("key", "names"),
     [
-        ("phone.mapping_options.x", "mapping 'absolute' has no option 'x'; known: gain, "),
-        ("phone.filter_options.window", "filter 'median': option 'window' is 0; should be "),
-        ("operator.options.x", "operator 'adaptive' has no option 'x'; known: closed"),
-        ("dispatch.options.x", "policy 'min_eta' has no option 'x'; it has none"),
+        ("phone.mapping_options.x", "mapping 'absolute' 'x' gain"),
+        ("phone.filter_options.window", "filter 'median' 'window' 0;"),
+        ("operator.options.x", "operator 'adaptive' 'x' closed"),
+        ("dispatch.options.x", "policy 'min_eta' 'x'"),
     ],
 )
 def test_an_option_is_placed_where_it_stands_and_nowhere_if_it_came_as_a_change(
-    key, told, tmp_path
+    key, names, tmp_path
 ):
     part, options, name = key.split(".")
     file = tmp_path / "scenario.yaml"
@@ -53,10 +53,10 @@ def test_an_option_is_placed_where_it_stands_and_nowhere_if_it_came_as_a_change(
     plain.write_text(f"horizon_s: 20\n{part}: {{}}\n")
     with pytest.raises(ConfigError) as in_file:
         scenarios.build(load_yaml(file))
-    assert str(in_file.value).startswith(f"{file}:4:5: {told}")
     with pytest.raises(ConfigError) as changed:
         scenarios.build(load_yaml(plain), {key: 0})
-    assert str(changed.value).startswith(told)
+    assert str(in_file.value) == f"{file}:4:5: {changed.value}"
+    assert unnamed(changed.value, *names.split()) == []
 
 
 def test_a_filter_beside_its_scenario_drives_as_the_shipped_one_of_its_kind(tmp_path):
@@ -79,34 +79,22 @@ def test_a_robot_arrives_with_every_mapping(mapping):
 
 
 @pytest.mark.parametrize(
-    ("stage", "key", "body"),
-    [
-        (
-            "Filter",
-            "phone.filter",
-            "    def value(self): return 1 / 0\n    def add(self, s): pass\n",
-        ),
-        (
-            "Mapping",
-            "phone.mapping",
-            "    def command(self, level, turn, dt): return 1 / 0\n"
-            "    def tilt_for(self, wanted, shown, within): return wanted\n",
-        ),
-    ],
+    ("stage", "fails", "works"),
+    [("Filter", "value(self)", "add(self, s)"), ("Mapping", "command(*_)", "tilt_for(*_)")],
 )
 def test_a_stage_that_fails_is_told_at_once_and_counted_in_the_row_of_its_run(
-    stage, key, body, tmp_path
+    stage, fails, works, tmp_path
 ):
     file = tmp_path / "mine.py"
-    file.write_text(f"from dva_sim.agents.tilt import {stage}\nclass Mine({stage}):\n{body}")
-    run = simulate(
-        scenarios.build(scenarios.load("drive-to-event"), {key: f"{file}:Mine", "horizon_s": 60}), 1
+    file.write_text(
+        f"from dva_sim.agents.tilt import {stage}\nclass Mine({stage}):\n"
+        f"    def {fails}: return 1 / 0\n    def {works}: return 0.0, 0.0\n"
     )
+    own = {f"phone.{stage.lower()}": f"{file}:Mine", "horizon_s": 60}
+    run = simulate(scenarios.build(scenarios.load("drive-to-event"), own), 1)
     told = [moment for moment in run.recorder.timeline if "holds a phone" in moment.what]
-    line = "holds a phone that fails: ZeroDivisionError: division by zero"
-    assert [moment.what for moment in told] == [line] * sum(
-        d.started is not None for d in run.recorder.drives
-    )
+    assert len(told) == sum(d.started is not None for d in run.recorder.drives)
+    assert unnamed(told[0].what, "ZeroDivisionError: division by zero") == []
     begun = run.recorder.drives[0].started
     assert begun is not None
     assert begun <= told[0].time < begun + 3.0

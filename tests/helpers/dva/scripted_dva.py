@@ -14,7 +14,7 @@ from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import Recorder
+from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
 from dva_sim.network.virtual_network import VirtualNetwork
@@ -38,6 +38,7 @@ WALKER = Walker(
     usual_mobilisation=12.0,
 )
 POST = (1.4, 12.0)  # at the west end of the main corridor, which is straight [m]
+EAST, WEST = (30.0, 12.0), (4.0, 12.0)  # both ends of that corridor [m]
 SETTLED = 0.01  # after this, what somebody said in answer has arrived [s]
 
 Point = tuple[float, float]
@@ -159,6 +160,13 @@ class PretendedDva:
         body = m.Order(event, "fire", self.position(place), robot, task)
         return self.say(GUARD if robot is None else OPERATOR, body)
 
+    def start(self, event: int, place: Point, robot: str = ROBOT) -> None:
+        """Order a robot to an event, and wait until it goes."""
+        assert self.order(event, place, robot=robot) == m.OK
+        self.run_until(lambda: "departed" in self.progress(event))
+        self.run_for(5.0)
+        assert abs(self.field.robots[robot].body.speed) > 0.1
+
     def announce(self, event: int, place: Point, to: str = GUARD, within: float = 2.0) -> int:
         """Put an event of kind fire up for auction."""
         return self.say(to, m.TaskAnnouncement(event, "fire", self.position(place), 0.5, within))
@@ -214,3 +222,13 @@ class PretendedDva:
             self.sessions[body.device] = held
             self.device.ask(body.device, held, session=held.session)
         return m.Permission(body.device, body.level, held.session)
+
+
+def driving(pattern: str, **changes: object) -> tuple[PretendedDva, DriveLog]:
+    """A robot on its way to the east, driven by whom the log is of."""
+    dva = PretendedDva(robots=1, pattern=pattern, **changes)
+    dva.operator()
+    dva.start(1, EAST)
+    (log,) = dva.stage.recorder.drives
+    assert log.ended is None
+    return dva, log

@@ -1,7 +1,7 @@
 """Small closed loops for strategies: what is asked for happens exactly, a delay later."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -38,6 +38,13 @@ class At(NamedTuple):
 def person(**traits: float) -> Person:
     """The median person, with some traits otherwise."""
     return replace(median_person(Population()), **traits)
+
+
+def normals(seed: int) -> Iterator[float]:
+    """Standard normal numbers without end, which is what luck is to a person."""
+    rng = np.random.default_rng(seed)
+    while True:
+        yield from rng.normal(size=1000).tolist()
 
 
 def way(*corners: tuple[float, float]) -> Route:
