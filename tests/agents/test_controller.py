@@ -311,7 +311,7 @@ def test_a_session_told_again_renews_the_address_and_stops_nothing(driven):
 
 
 def test_starting_again_makes_older_orders_and_commands_old(driven):
-    driven.say(ANA, m.StartTeleOp(), number=60)
+    assert driven.say(ANA, m.StartTeleOp(), number=60).set_point is None
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), number=59).code == m.OUT_OF_ORDER
     assert driven.say(ANA, m.StopTeleOp(), number=58).code == m.OUT_OF_ORDER
     assert driven.robot.mode is Mode.TELEOPERATION
