@@ -3,6 +3,7 @@
 import io
 
 import pytest
+from helpers.wording import unnamed
 from rich.console import Console
 
 from dva_sim.cli import live_screen as live
@@ -48,71 +49,43 @@ def test_beyond_nine_seconds_of_round_trips_one_still_drives():
 
 
 @pytest.mark.parametrize(
-    ("changes", "key", "told"),
+    ("changes", "key", "names"),
     [
-        (
-            {"link__delay_s": 1.2, "request__timeout_s": 9.0},
-            "request.timeout_s 9",
-            "is below 9.65 s",
-        ),
+        ({"link__delay_s": 1.2, "request__timeout_s": 9.0}, "request.timeout_s 9", "9.65 s"),
         (
             {"link__delay_s": 0.5, "command__timeout_s": 0.5, "pattern": "req-rep"},
-            "command.timeout_s 0.5",
-            "unanswered",
+            *("command.timeout_s 0.5", "unanswered"),
         ),
         ({"link__delay_s": 3.0}, "robot.max_age_s 6", "refuses all"),
-        (
-            {"link__delay_s": 1.5, "pattern": "req-rep"},
-            "robot.watchdog_s 3",
-            "stops after each",
-        ),
+        ({"link__delay_s": 1.5, "pattern": "req-rep"}, "robot.watchdog_s 3", "stops"),
         ({"robot__watchdog_s": 0.1}, "robot.watchdog_s 0.1", "(command.rate_hz 10)"),
         (
             {"phone__profile": "dissertation", "robot__watchdog_s": 0.5},
-            "robot.watchdog_s 0.5",
-            "phone.max_delay_s 0.5",
+            *("robot.watchdog_s 0.5", "phone.max_delay_s 0.5"),
         ),
-        (
-            {"link__delay_s": 4.0, "robot__max_age_s": 60.0},
-            "a robot ends a drive that is 30 s",
-            "no drive will begin",
-        ),
-        ({"link__rate_bps": 64e3}, "the camera sends 960 kbit/s", "a link of 64 kbit/s"),
+        ({"link__delay_s": 4.0, "robot__max_age_s": 60.0}, "a robot ends a drive", "30 s"),
+        ({"link__rate_bps": 64e3}, "the camera sends 960 kbit/s", "64 kbit/s"),
         (
             {"link__rate_bps": 64e3, "link__trace_down": "cellular.down"},
-            "link.rate_bps has no effect",
-            "trace_down gives the rate",
+            *("link.rate_bps", "trace_down"),
         ),
-        ({"camera__encode_s": 0.2}, "camera.rate_hz 10 cannot be reached", "camera.encode_s 0.2"),
-        (
-            {"pattern": "pub-sub", "robot__processing_s": 0.2},
-            "robot.processing_s 0.2 is longer",
-            "they queue",
-        ),
-        (
-            {"site__name": "hall", "events": [{"kind": "gas_leak"}]},
-            "events.0.reported is false",
-            "no detector for a gas leak",
-        ),
+        ({"camera__encode_s": 0.2}, "camera.rate_hz 10", "camera.encode_s 0.2"),
+        ({"pattern": "pub-sub", "robot__processing_s": 0.2}, "robot.processing_s 0.2", "queue"),
+        ({"site__name": "hall", "events": [{"kind": "gas_leak"}]}, "events.0.reported", "gas leak"),
         ({"horizon_s": 5.0, "events": [{"kind": "fire", "at_s": 5}]}, "events.0.at_s 5", "not"),
-        (
-            {"link__outages": [{"from_s": 700, "for_s": 5}]},
-            "link.outages.0.from_s 700",
-            "will not happen",
-        ),
-        ({"dispatch__containment": True}, "dispatch.containment waits for a guard", "guard.count"),
+        ({"link__outages": [{"from_s": 700, "for_s": 5}]}, "link.outages.0.from_s 700", "not"),
+        ({"dispatch__containment": True}, "dispatch.containment", "guard.count"),
         ({"access": [{"holders": ["operator-2"]}]}, "access.0.holders names 'operator-2'", "not"),
         (
             {"transport": "datagrams", "zeromq__high_water_mark": 5, "pattern": "pub-sub"},
-            "zeromq.high_water_mark",
-            "has no ZeroMQ sockets",
+            *("zeromq.high_water_mark", "ZeroMQ sockets"),
         ),
     ],
 )
-def test_what_does_not_go_together_is_told_with_its_key(changes, key, told):
+def test_what_does_not_go_together_is_told_with_its_key(changes, key, names):
     (one,) = contradictions(built(**changes))
     assert one.startswith(key)
-    assert told in one
+    assert names in one
 
 
 @pytest.mark.parametrize("name", available("experiments/scenarios"))
@@ -122,16 +95,11 @@ def test_shipped_scenarios_do_not_contradict_themselves(name):
         assert contradictions(scenarios.build(document)) == []
 
 
-def test_in_a_live_run_the_modelled_link_plays_no_part_and_that_is_said():
-    (one,) = contradictions(built(link__delay_s=5.0), live=True)
-    assert one.startswith("link.delay_s: a live run")
-
-
 def test_a_study_tells_each_kind_once_with_the_number_of_configurations():
     study = load_study("req-rep-vs-pub-sub", ["link.delay_s=[0, 3, 4]"], version="quick")
     told = contradictions_in(cell_grid.cells(study))
     assert [one.split()[0] for one in told].count("robot.max_age_s") == 1
-    assert any("in 4 of 11 configurations" in one for one in told)
+    assert any(not unnamed(one, "4 of 11") for one in told)
 
 
 def test_an_episode_begins_with_the_warning():
@@ -139,7 +107,7 @@ def test_an_episode_begins_with_the_warning():
     pairs = ["link.delay_s=1.2", "request.timeout_s=9", "horizon_s=20"]
     stories.episode(EpisodeRequest("drive-to-event", 1, pairs), out)
     first = out.file.getvalue().splitlines()[0]
-    assert first.startswith("warning: request.timeout_s 9 is below 9.65 s")
+    assert first.startswith("warning: request.timeout_s 9 ")
 
 
 def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys):
@@ -147,14 +115,14 @@ def test_check_tells_it_of_a_file_that_is_valid(tmp_path, capsys):
     path.write_text("events: [{kind: fire, at_s: 90}]\nhorizon_s: 60\n")
     assert check([str(path)]) == 0
     first, second, *_ = capsys.readouterr().out.splitlines()
-    assert "warning: events.0.at_s 90 is not before horizon_s 60" in first
+    assert unnamed(first, "warning: events.0.at_s 90 ", "horizon_s 60") == []
     assert second.endswith("scenario: valid")
 
 
-def test_a_live_run_says_it_before_anything_starts():
+def test_a_live_run_says_before_anything_starts_that_the_modelled_link_plays_no_part():
     out = Console(file=io.StringIO(), width=200)
     live.warn(out, LiveOptions("drive-to-event", ("link.delay_s=0.5",)))
-    assert out.file.getvalue().startswith("warning: link.delay_s: a live run")
+    assert out.file.getvalue().startswith("warning: link.delay_s: ")
 
 
 def test_the_dva_heeds_no_sensor_that_no_robot_carries():

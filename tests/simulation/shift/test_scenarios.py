@@ -16,6 +16,8 @@ GOOD: dict[str, Any] = {
 AREA = {"area": {"width_m": 10, "height_m": 10}}
 SITE = {"site": {"name": "caparica"}}
 ROBOT = {"name": "robot", "kind": "robot"}
+DRIVEN = {"responders": [ROBOT], "operators": {"count": 1}}
+REPEATED = {"demand": [{"between": 1, "repeats": {"share": 0.5}}]}
 
 
 @pytest.mark.parametrize(
@@ -29,10 +31,7 @@ ROBOT = {"name": "robot", "kind": "robot"}
         ({"demand": [{"between": 1, "notice": "detectors"}]}, "'detectors' needs a site"),
         ({"demand": [{"between": {"law": "exponential"}}]}, "missing key"),
         ({"responders": [ROBOT]}, "robots need an operator"),
-        (
-            {"responders": [ROBOT | {"after": "recall"}], "operators": {"count": 1}},
-            "driven back by its operator",
-        ),
+        (DRIVEN | {"responders": [ROBOT | {"after": "recall"}]}, "driven back by its operator"),
         ({"responders": [{"name": "a"}, {"name": "a"}]}, "two responders 'a'"),
         ({"responders": [{"name": "a", "base": "hall"}]}, "place 'hall' is unknown"),
         ({"responders": [{"name": "a", "base": "post"}]}, "place 'post' is unknown"),
@@ -46,21 +45,8 @@ ROBOT = {"name": "robot", "kind": "robot"}
         ({"dispatch": {"policy": "min_eta", "options": {"a": 1}}}, "option"),
         ({"dispatch": {"preferences": {"here": ["guide"]}}}, "responder 'guide' is unknown"),
         ({"dispatch": {"contaiment": True}}, "did you mean 'containment'"),
-        (
-            {
-                "demand": [{"between": 1, "repeats": {"share": 0.5}}],
-                "dispatch": {"merge_distance_m": 0},
-            },
-            "repeats need dispatch.merge_distance_m",
-        ),
-        (
-            {
-                "responders": [ROBOT],
-                "operators": {"count": 1},
-                "dispatch": {"containment": True},
-            },
-            "containment needs guards",
-        ),
+        (REPEATED | {"dispatch": {"merge_distance_m": 0}}, "need dispatch.merge_distance_m"),
+        (DRIVEN | {"dispatch": {"containment": True}}, "containment needs guards"),
     ],
 )
 def test_a_mistake_is_told_in_one_line(wrong, told):
@@ -70,28 +56,20 @@ def test_a_mistake_is_told_in_one_line(wrong, told):
     assert "\n" not in str(problem.value)
 
 
-def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path):
+@pytest.mark.parametrize(
+    ("lines", "place", "names"),
+    [
+        ("demand:\n  - between: {law: exponential, mean_s: -3}\n", (4, 33), "above 0"),
+        ("demand: [{between: 3}]\ndispatch:\n  policy: fastest\n", (5, 3), "'fastest'"),
+    ],
+)
+def test_a_mistake_in_a_file_has_its_line_and_column(tmp_path, lines, place, names):
     file = tmp_path / "shift.yaml"
-    file.write_text(
-        "model: timed\nresponders: [{name: guard}]\ndemand:\n"
-        "  - between: {law: exponential, mean_s: -3}\n"
-    )
+    file.write_text(f"model: timed\nresponders: [{{name: guard}}]\n{lines}")
     with pytest.raises(ConfigError) as problem:
         build(load_yaml(file))
-    assert (problem.value.line, problem.value.column) == (4, 33)
-    assert "above 0" in str(problem.value)
-
-
-def test_a_wrong_policy_in_a_file_has_its_line(tmp_path):
-    file = tmp_path / "shift.yaml"
-    file.write_text(
-        "model: timed\nresponders: [{name: guard}]\ndemand: [{between: 3}]\n"
-        "dispatch:\n  policy: fastest\n"
-    )
-    with pytest.raises(ConfigError) as problem:
-        build(load_yaml(file))
-    assert problem.value.line == 5
-    assert "fastest" in str(problem.value)
+    assert (problem.value.line, problem.value.column) == place
+    assert names in str(problem.value)
 
 
 def test_changes_reach_into_lists_by_number():
