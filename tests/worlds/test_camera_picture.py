@@ -3,39 +3,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
+from helpers.worlds.hall_with_people import hall as bare_hall
 
 from dva_sim.worlds.camera import Camera, Figure, SmokeView
-from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.hazards import Fire, Raster
 from dva_sim.worlds.hazards.fire import HEAT_PER_AREA
-from dva_sim.worlds.maps import rasterise
-from dva_sim.worlds.site import Site, load_site
+from dva_sim.worlds.site import load_site
 from dva_sim.worlds.site_parts import Exit, Room
 
 EAST = 0.0
 FOCAL = 160 / math.tan(math.radians(35))  # pixels: 320 across show 70 degrees
 
 
-def hall(ceiling=3.0, extra=(), doors=(), rooms=True):
+def hall(ceiling=3.0, extra=(), doors=()):
     """A hall from (0, 0) to (20, 10), perhaps with more walls and doors in it."""
-    ring = [(0, 0, 20, 0), (20, 0, 20, 10), (20, 10, 0, 10), (0, 10, 0, 0)]
-    walls = np.array([*ring, *extra], dtype=float)
-    corners = np.array([(0, 0), (20, 0), (20, 10), (0, 10)], dtype=float)
-    return Site(
-        name="hall",
-        frame=GeoFrame(38.0, -9.0),
-        walls=walls,
-        rooms=(Room("Hall", corners),) if rooms else (),
-        doors=np.array(doors, dtype=float).reshape(-1, 4),
-        robot_bases=(),
-        guard_posts=(),
-        operator_desks=(),
-        detectors=(),
-        extent=(0.0, 0.0, 20.0, 10.0),
-        grid=rasterise(shapely.Polygon(corners), walls, 0.1),
-        ceiling=ceiling,
-    )
+    room = Room("Hall", np.array([(0, 0), (20, 0), (20, 10), (0, 10)], dtype=float))
+    return replace(bare_hall(20, 10, extra, doors), rooms=(room,), ceiling=ceiling)
 
 
 class Steady(Fire):

@@ -4,6 +4,7 @@ import runpy
 import numpy as np
 import pytest
 from helpers.paths import ROOT
+from helpers.wording import unnamed
 from helpers.worlds.small_site import TWO_ROOMS, feature, square, write_site
 
 from dva_sim.kernel.errors import ConfigError
@@ -97,33 +98,26 @@ def test_wifi_is_a_word_numbers_or_both_and_the_later_covers_the_earlier(tmp_pat
     assert [area.grade for area in site.wifi] == ["fair", "poor", "poor"]
 
 
-def mistakes():
-    return {
-        "use: should be restricted, charging or assembly": feature(
-            "zone", "Polygon", square(1, 1, 1), use="secret"
-        ),
-        "should have a quality (good, fair, poor, none) or numbers": feature(
-            "wifi", "Polygon", square(1, 1, 1)
-        ),
-        "loss: should be at most 1": feature("wifi", "Polygon", square(1, 1, 1), loss=3),
-        "ceiling_m: should be at least 1.5": feature(
-            "room", "Polygon", square(0, 4, 2), name="low", ceiling_m=0.4
-        ),
-        "field_of_view_deg: should be at most 360": feature(
-            "camera", "Point", [(1, 1)], field_of_view_deg=400
-        ),
-        "an exit is at least 0.5 m wide": feature("exit", "LineString", [(8, 1), (8, 1.2)]),
-        "a path needs a name of its own, not 'west'": feature(
-            "path", "Polygon", square(8, 0, 2), name="west"
-        ),
-    }
+CAMERA = feature("camera", "Point", [(1, 1)], field_of_view_deg=400)
+LOW = feature("room", "Polygon", square(0, 4, 2), name="low", ceiling_m=0.4)
 
 
-@pytest.mark.parametrize(("words", "wrong"), mistakes().items())
-def test_a_property_that_does_not_fit_is_told_with_its_place(tmp_path, words, wrong):
+@pytest.mark.parametrize(
+    ("wrong", "names"),
+    [
+        (feature("zone", "Polygon", square(1, 1, 1), use="secret"), "use: restricted charging"),
+        (feature("wifi", "Polygon", square(1, 1, 1)), "quality good fair poor none numbers"),
+        (feature("wifi", "Polygon", square(1, 1, 1), loss=3), "loss: 1"),
+        (LOW, "ceiling_m: 1.5"),
+        (CAMERA, "field_of_view_deg: 360"),
+        (feature("exit", "LineString", [(8, 1), (8, 1.2)]), "exit 0.5 m wide"),
+        (feature("path", "Polygon", square(8, 0, 2), name="west"), "path name 'west'"),
+    ],
+)
+def test_a_property_that_does_not_fit_is_told_with_its_place(tmp_path, wrong, names):
     with pytest.raises(ConfigError) as error:
         site_of(tmp_path, wrong)
-    assert f"feature 6: {words}" in str(error.value)
+    assert unnamed(error.value, "feature 6: ", *names.split()) == []
     assert error.value.line > 100
 
 
@@ -132,15 +126,9 @@ def test_what_an_editor_adds_of_its_own_is_left_alone(tmp_path):
     assert site_of(tmp_path, odd).zones[0].name == "zone-1"
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"generate": "{kind: office_block}"}, "should have a plan"),
-        ({"plan": "null"}, "should have a plan"),
-    ],
-)
-def test_a_site_is_drawn_or_generated(tmp_path, change, words):
-    with pytest.raises(ConfigError, match=words):
+@pytest.mark.parametrize("change", [{"generate": "{kind: office_block}"}, {"plan": "null"}])
+def test_a_site_is_drawn_or_generated(tmp_path, change):
+    with pytest.raises(ConfigError, match=r"a plan .* generate"):
         site_of(tmp_path, **change)
 
 
@@ -171,14 +159,8 @@ def test_the_campus_has_gates_houses_with_exits_and_wifi_with_weak_spots():
     out = [o for o in site.openings if o.kind == "exit"]
     assert len(out) == len(site.exits) - 4
     assert all(o.room_b is None for o in out)
-    assert {
-        site.link_quality(x, y).grade for x, y in ((30, 66), (59, 60), (58, 15), (110, 65))
-    } == {
-        "good",
-        "fair",
-        "poor",
-        "none",
-    }
+    grades = [site.link_quality(*at).grade for at in ((30, 66), (59, 60), (58, 15), (110, 65))]
+    assert sorted(grades) == ["fair", "good", "none", "poor"]
     for detector in site.detectors:
         assert site.compartment_at(detector.x, detector.y) is not None
     for thing in (*site.cameras, *site.base_stations):

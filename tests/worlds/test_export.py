@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import shapely
 from helpers.paths import TESTS
+from helpers.wording import unnamed
 from PIL import Image
 
 from dva_sim.cli import site
@@ -67,10 +68,9 @@ def test_show_draws_a_site_and_says_what_it_is(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     site.show("caparica", None, [], coverage=False, width=400)
     line, file = capsys.readouterr().out.splitlines()
-    assert line == (
-        "caparica: 40.0 m x 24.0 m, 15 rooms, 15 doors, 4 exits, 3 robot bases, 3 guard posts, "
-        "2 operator desks, 28 detectors, 3 cameras, 112 wall segments"
-    )
+    counts = "15 rooms", "15 doors", "4 exits", "3 robot bases", "3 guard posts", "2 operator desks"
+    more = "28 detectors", "3 cameras", "112 wall segments"
+    assert unnamed(line, "caparica", "40.0 m", "24.0 m", *counts, *more) == []
     assert file == "caparica.png"
     with Image.open(tmp_path / file) as picture:
         assert picture.width == 400
@@ -80,19 +80,15 @@ def test_show_takes_options_of_a_generated_site_and_a_file(tmp_path, capsys):
     site.show(
         "office-block", tmp_path / "x.png", ["width_m=24", "depth_m=12"], coverage=True, width=400
     )
-    assert capsys.readouterr().out.startswith("office-block: 24.0 m x 12.0 m, ")
+    assert unnamed(capsys.readouterr().out, "office-block", "24.0 m", "12.0 m") == []
     assert (tmp_path / "x.png").stat().st_size > 10_000
 
 
 def test_show_refuses_options_of_a_map_and_a_format_that_nobody_knows(tmp_path):
-    Image.fromarray(np.full((60, 80), 254, np.uint8)).save(tmp_path / "hall.pgm")
-    (tmp_path / "hall.yaml").write_text(
-        "image: hall.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
-    )
-    site.show(str(tmp_path / "hall.yaml"), tmp_path / "hall.png", [], coverage=False, width=400)
+    recorded = str(MAPS / "hall.yaml")
+    site.show(recorded, tmp_path / "hall.png", [], coverage=False, width=400)
     with pytest.raises(ConfigError, match="no options"):
-        site.show(str(tmp_path / "hall.yaml"), None, ["seed=1"], coverage=False, width=400)
+        site.show(recorded, None, ["seed=1"], coverage=False, width=400)
     with pytest.raises(ConfigError, match="cannot be written"):
         site.show("caparica", tmp_path / "a.hologram", [], coverage=False, width=400)
 

@@ -130,18 +130,6 @@ def test_set_points_that_come_faster_than_ticks_move_the_robot_like_a_single_one
     assert once.pose().x > 5.0
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.4, 1.2, -1.57, 3.1])
-def test_no_robot_tunnels_through_a_wall_at_full_speed(world, heading):
-    robot = world.add_robot("robot-1", SPEC, Pose(35.5, 10.0, heading))  # in the south office
-    robot.drive(0.5, 0.0, math.inf)
-    for time in range(1, 40):
-        world.advance_to(time)
-        x, y, _ = robot.pose()
-        assert 28.2 + 0.28 < x < 40 - 0.28
-        assert 5.6 + 0.28 < y < 10.8 - 0.28
-    assert robot.contacts >= 1
-
-
 def test_a_robot_that_presses_against_a_wall_has_one_contact_and_its_momentum_as_impulse(world):
     robot = in_corridor(world, x=38.0)
     robot.drive(0.5, 0.0, math.inf)

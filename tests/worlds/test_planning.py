@@ -1,30 +1,21 @@
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers.paths import TESTS
+from helpers.worlds.hall_with_people import hall
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.line_of_sight import Sight
-from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid, rasterise
+from dva_sim.worlds.maps import UNKNOWN, OccupancyGrid
 from dva_sim.worlds.planning import Disc, Planner
-from dva_sim.worlds.site import DEFAULT_FRAME, FOOTPRINT, Site, load_site, map_site
+from dva_sim.worlds.site import FOOTPRINT, load_site, map_site
 
 MAPS = TESTS / "data"
-
-
-def make_site(walls, size=10.0):
-    """A square hall with some walls in it."""
-    import shapely
-
-    border = [(0, 0, size, 0), (size, 0, size, size), (size, size, 0, size), (0, size, 0, 0)]
-    lines = np.array([*border, *walls], float)
-    grid = rasterise(shapely.box(0, 0, size, size), lines, 0.05)
-    extent = (0.0, 0.0, size, size)
-    return Site(name="hall", frame=DEFAULT_FRAME, walls=lines, extent=extent, grid=grid)
 
 
 def with_door(middle, width):
@@ -41,7 +32,7 @@ def densely(path):
 
 
 def test_in_the_open_the_way_is_straight():
-    planner = Planner(make_site([]), 0.3)
+    planner = Planner(hall(10, 10), 0.3)
     path = planner.path((1.5, 2.0), (8.5, 7.0))
     assert path[0] == pytest.approx((1.5, 2.0))
     assert path[-1] == pytest.approx((8.5, 7.0))
@@ -50,14 +41,14 @@ def test_in_the_open_the_way_is_straight():
 
 @pytest.mark.parametrize("middle", np.arange(5.0, 5.25, 0.03))
 def test_a_door_of_one_metre_is_passed_near_its_middle_wherever_it_lies(middle):
-    planner = Planner(make_site(with_door(middle, 1.0)), 0.3)
+    planner = Planner(hall(10, 10, with_door(middle, 1.0)), 0.3)
     path = densely(planner.path((1, 1), (9, 1)))
     crossing = path[np.argmin(np.abs(path[:, 0] - 5))]
     assert crossing[1] == pytest.approx(middle, abs=0.12)
 
 
 def test_a_way_around_a_wall_is_hardly_longer_than_the_shortest():
-    planner = Planner(make_site([(5, 0, 5, 6)]), 0.3)
+    planner = Planner(hall(10, 10, [(5, 0, 5, 6)]), 0.3)
     shortest = math.dist((2, 2), (5, 6.3)) + math.dist((5, 6.3), (8, 2))
     assert shortest < planner.distance((2, 2), (8, 2)) < 1.15 * shortest
 
@@ -79,32 +70,30 @@ def test_a_corridor_is_followed_in_its_middle():
 
 
 def test_behind_a_closed_wall_there_is_no_way():
-    planner = Planner(make_site([(5, 0, 5, 10)]), 0.3)
+    planner = Planner(hall(10, 10, [(5, 0, 5, 10)]), 0.3)
     assert planner.path((2, 2), (8, 2)) is None
     assert planner.distance((2, 2), (8, 2)) == math.inf
 
 
 def test_an_opening_narrower_than_the_body_is_no_way():
-    site = make_site(with_door(5.0, 0.5))
+    site = hall(10, 10, with_door(5.0, 0.5))
     assert Planner(site, 0.3).path((2, 5), (8, 5)) is None
     assert Planner(site, 0.15).path((2, 5), (8, 5)) is not None
 
 
 def test_an_end_close_to_a_wall_is_joined_on_its_own_side():
-    planner = Planner(make_site(with_door(8.0, 1.0)), 0.3)
+    planner = Planner(hall(10, 10, with_door(8.0, 1.0)), 0.3)
     path = planner.path((4.9, 2.0), (5.1, 2.0))
     assert length(path) > 10
 
 
 def test_a_site_without_free_floor_has_no_ways():
     grid = OccupancyGrid(0.1, Pose(0, 0, 0), np.full((30, 30), UNKNOWN, np.uint8))
-    site = make_site([])
-    blind = Site(**{**{k: getattr(site, k) for k in site.__dataclass_fields__}, "grid": grid})
-    assert Planner(blind, 0.3).path((1, 1), (2, 2)) is None
+    assert Planner(replace(hall(10, 10), grid=grid), 0.3).path((1, 1), (2, 2)) is None
 
 
 def test_a_way_is_the_same_in_a_new_planner_and_whatever_was_asked_before():
-    first, second = make_site(with_door(3, 1.0)), make_site(with_door(3, 1.0))
+    first, second = hall(10, 10, with_door(3, 1.0)), hall(10, 10, with_door(3, 1.0))
     busy = Planner(first, 0.3)
     busy.path((2, 2), (9, 9))
     again = Planner(second, 0.3).path((1, 8), (9, 1))
@@ -112,7 +101,7 @@ def test_a_way_is_the_same_in_a_new_planner_and_whatever_was_asked_before():
 
 
 def test_walls_block_sight_and_openings_do_not():
-    planner = Planner(make_site(with_door(5.0, 1.0)), 0.3)
+    planner = Planner(hall(10, 10, with_door(5.0, 1.0)), 0.3)
     assert planner.line_of_sight((2, 5), (8, 5))
     assert not planner.line_of_sight((2, 3), (8, 3))
     assert planner.line_of_sight((2, 3), (4, 9))
@@ -126,7 +115,7 @@ def test_on_a_map_as_robots_record_them_all_bases_reach_each_other():
 
 
 def test_a_way_keeps_its_clearance_from_what_the_plan_does_not_show():
-    planner = Planner(make_site([]), 0.3)
+    planner = Planner(hall(10, 10), 0.3)
     start, goal = (1.5, 5.0), (8.5, 5.0)
     around = densely(planner.path(start, goal, [Disc(5.0, 5.0, 0.4), Disc(5.0, 6.0, 0.4)]))
     for y in (5.0, 6.0):
@@ -136,13 +125,13 @@ def test_a_way_keeps_its_clearance_from_what_the_plan_does_not_show():
 
 
 def test_who_stands_in_the_only_door_leaves_no_way_and_one_beside_the_plan_changes_nothing():
-    planner = Planner(make_site(with_door(5.0, 1.0)), 0.3)
+    planner = Planner(hall(10, 10, with_door(5.0, 1.0)), 0.3)
     assert planner.path((1, 5), (9, 5), [Disc(5.0, 5.0, 0.3)]) is None
     assert len(planner.path((1, 5), (9, 5), [Disc(500.0, 5.0, 0.3)])) > 2
 
 
 def test_the_room_around_a_point_is_its_distance_from_the_nearest_wall():
-    planner = Planner(make_site([]), 0.3)
+    planner = Planner(hall(10, 10), 0.3)
     room = planner.room_at(np.array([(5.0, 5.0), (5.0, 1.0), (9.5, 5.0)]))
     assert room == pytest.approx([5.0, 1.0, 0.5], abs=0.06)
 

@@ -10,11 +10,11 @@ import shapely
 from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
-from dva_sim.worlds.geo import GeoFrame, Pose
+from dva_sim.worlds.geo import Pose
 from dva_sim.worlds.maps import rasterise
 from dva_sim.worlds.physics import World
 from dva_sim.worlds.planning import Planner
-from dva_sim.worlds.site import Site
+from dva_sim.worlds.site import DEFAULT_FRAME, Site
 
 Wall = tuple[float, float, float, float]
 Point = tuple[float, float]
@@ -29,14 +29,9 @@ def hall(
     lines = np.array([*border, *walls], float)
     return Site(
         name="hall",
-        frame=GeoFrame(38.6612, -9.2058),
+        frame=DEFAULT_FRAME,
         walls=lines,
-        rooms=(),
         doors=np.array(doors, float).reshape(-1, 4),
-        robot_bases=(),
-        guard_posts=(),
-        operator_desks=(),
-        detectors=(),
         extent=(0.0, 0.0, width, height),
         grid=rasterise(shapely.box(0, 0, width, height), lines, 0.05),
     )

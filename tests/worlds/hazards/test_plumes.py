@@ -1,14 +1,10 @@
 """Gas outdoors: how wide puffs and plumes are, and that nothing of them is lost."""
 
-import json
-
 import numpy as np
 import pytest
-from helpers.paths import ROOT
 
 from dva_sim.worlds.hazards.gas_dispersion import CLASSES, plume, sigma_y, sigma_z
 
-TARGETS = ROOT.parent / "shared" / "targets" / "operator.json"
 AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0}  # Martin [m]
 
 
@@ -16,14 +12,6 @@ AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0} 
 def test_a_kilometre_off_a_plume_is_as_wide_as_martin_says(stability, metres):
     assert sigma_y(stability, 1000.0) == pytest.approx(metres, rel=1e-9)
     assert sigma_y(stability, 2000.0) == pytest.approx(metres * 2.0**0.894)
-
-
-def test_the_widths_are_those_of_the_target_file():
-    if not TARGETS.is_file():
-        pytest.skip("the file of published numbers is not beside the project")
-    checks = {check["id"]: check for check in json.loads(TARGETS.read_text())["checks"]}
-    published, band = checks["S16e"]["target"], checks["S16e"]["band_rel"]
-    assert [sigma_y(c, 1000.0) for c in "ABCDEF"] == pytest.approx(published, rel=band)
 
 
 @pytest.mark.parametrize("stability", CLASSES)
