@@ -66,7 +66,8 @@ def test_nobody_can_contain_what_is_not_confirmed(office):
     assert office.event().state is State.ON_SCENE
 
 
-def test_who_has_confirmed_it_may_be_the_one_to_deal_with_it(office):
+def test_who_has_confirmed_it_is_waited_for_to_deal_with_it_though_another_is_free(office):
+    office.register(OTHER_GUARD, "Guard", 80)
     office.busy(ROBOT, OPERATOR)
     office.ok(office.fire(12))
     assert office.finds(GUARD, "confirmed", 30.0)[1] == []
@@ -276,13 +277,3 @@ def test_after_a_restart_every_order_that_stands_is_said_again(standing_by):
 
 def test_a_detector_is_never_asked_to_do_anything(standing_by):
     assert DETECTOR not in {send.to for send in standing_by.sent}
-
-
-def test_a_guard_who_has_confirmed_an_event_is_waited_for_to_deal_with_it():
-    office = Office(rules=RULES)
-    office.register(OTHER_GUARD, "Guard", 80)
-    office.busy(OPERATOR)
-    office.fire(12)
-    assert office.working == {GUARD: 1, OPERATOR: 99}
-    assert office.finds(GUARD, "confirmed", 30.0)[1] == []
-    assert office.progress(GUARD, "done", 31.0)[1] == [Send(GUARD, order("contain"))]

@@ -149,12 +149,8 @@ def test_who_is_sent_gets_the_order_and_the_policy_is_overruled():
     assert isinstance(reply.content, m.EventStatus)
     assert (reply.content.event_state, reply.content.responder) == ("assigned", GUARD)
     (fact,) = facts(office)
-    assert (fact.action, fact.device, fact.advised, fact.overrides) == (
-        "assign",
-        GUARD,
-        ROBOT,
-        True,
-    )
+    assert (fact.action, fact.device, fact.advised) == ("assign", GUARD, ROBOT)
+    assert fact.overrides
     assert fact.cause == "it is locked"
     assert fact.arrival_in == pytest.approx(20 + 12 / 1.3, abs=0.1)
     assert fact.advised_in == pytest.approx(4 + 2 / 0.35 - 2.0, abs=0.1)
@@ -184,7 +180,7 @@ def test_who_is_at_an_event_is_not_called_away_by_being_sent_to_another():
     office.fire(60, now=1.0)
     reply, sends = decide(office, m.Assign(2, ROBOT, decisions=1), 2.0)
     assert (reply.code, sends) == (m.BUSY, [])
-    assert reply.text.startswith("robot is at event 1")
+    assert unnamed(reply.text, "robot ", "event 1") == []
 
 
 @pytest.mark.invariant("S5")
@@ -279,7 +275,7 @@ def test_from_each_stage_an_event_is_ended_once_and_who_was_sent_hears_it(body, 
     assert told == {"pending": set(), "confirmed": {GUARD}}.get(stage, {OPERATOR})
     reply, sends = decide(office, m.Assign(1, GUARD), 8.0, OTHER_ROOM)
     assert (reply.code, sends) == (m.OUT_OF_ORDER, [])
-    assert "by controlroom, 2.0 s ago" in reply.text
+    assert unnamed(reply.text, "controlroom", "2.0 s") == []
 
 
 # --- who wins ----------------------------------------------------------------------------------
@@ -311,8 +307,8 @@ def test_the_first_to_acknowledge_has():
     office.fire(12)
     assert decide(office, m.Acknowledge(1), 3.0)[0].code == m.OK
     reply, _ = decide(office, m.Acknowledge(1), 5.0, OTHER_ROOM)
-    assert (reply.code, reply.text) == (m.OUT_OF_ORDER, "acknowledged by controlroom, 2.0 s ago")
-    assert decide(office, m.Acknowledge(1), 6.0)[0].text == "acknowledged already"
+    assert (reply.code, unnamed(reply.text, "controlroom", "2.0 s")) == (m.OUT_OF_ORDER, [])
+    assert decide(office, m.Acknowledge(1), 6.0)[0].code == m.OK
     assert [f.code for f in facts(office) if f.action == "acknowledge"] == [m.OK, m.OUT_OF_ORDER]
 
 
@@ -372,7 +368,7 @@ def test_what_nobody_has_decided_in_time_is_done_as_proposed():
     assert office.desk.next_deadline() <= 61.0
     assert office.tick(61.0) == [Send(OPERATOR, order(1, ROBOT))]
     (fact,) = facts(office)
-    assert (fact.author, fact.role, fact.cause) == (DVA, None, "nobody has decided within 60 s")
+    assert (fact.author, fact.role, unnamed(fact.cause, "60 s")) == (DVA, None, [])
 
 
 def test_a_question_does_not_wait_longer_because_another_is_proposed():

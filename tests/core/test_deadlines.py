@@ -209,12 +209,6 @@ def test_news_of_an_order_that_is_another_responders_by_now_takes_nothing_from_i
 # --- orders that come to nothing -----------------------------------------------------------
 
 
-def test_a_responder_that_fails_is_replaced(office):
-    office.fire(12)
-    sends = office.progress(OPERATOR, "failed", 5.0)[1]
-    assert [(send.to, send.body.event_id) for send in sends] == [(GUARD, 1)]
-
-
 def test_a_responder_that_failed_goes_again_if_nobody_else_can(office):
     office.busy(GUARD)
     office.fire(12)
@@ -230,11 +224,13 @@ def test_who_says_done_without_a_finding_has_failed(office):
     assert office.event().attempts == 1
 
 
-def test_an_event_that_nobody_settles_is_escalated_after_its_attempts(office):
-    orders = office.fire(12)
+def test_who_fails_is_replaced_until_the_event_is_escalated_after_its_attempts(office):
+    orders, asked = office.fire(12), []
     for _ in range(MAX_ATTEMPTS):
         assert state(office) is State.ASSIGNED
-        orders = office.progress(orders[0].to, "failed", 1.0)[1]
+        asked.append(orders[0].to)
+        orders = office.progress(asked[-1], "failed", 1.0)[1]
+    assert asked[:2] == [OPERATOR, GUARD]
     assert (orders, office.event().attempts, state(office)) == ([], 4, State.ESCALATED)
 
 

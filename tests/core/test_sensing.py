@@ -11,6 +11,7 @@ from helpers.dva.dispatch_desk import (
     Office,
     east,
 )
+from helpers.wording import counted
 
 from dva_sim.core.assignments import Rules
 from dva_sim.core.events import State
@@ -160,7 +161,7 @@ def test_much_smoke_at_a_robot_is_a_fire_there_and_somebody_is_sent(office):
     assert (event.kind, event.position, event.sources) == ("fire", east(10), {ROBOT: 0.6})
     assert event.state is State.ASSIGNED
     assert [type(send.body) for send in sends] == [m.Order]
-    assert office.desk.counters["event raised by a sensor"] == 1
+    assert counted(office.desk.counters, "raised", "sensor") == 1
 
 
 @pytest.mark.parametrize("values", [(0.5, 0.5), (0.5, 0.5, 0.1, 0.5, 0.5), (0.29,) * 50])

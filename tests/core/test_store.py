@@ -340,7 +340,7 @@ def test_a_file_that_may_only_be_read_is_no_memory(file):
 
 def test_a_text_is_no_memory_and_stays_as_it_is(file):
     file.write_text("dear diary, " * 100)
-    assert refusal(file).endswith(": file is not a database")
+    assert "database" in refusal(file)
     assert file.read_text() == "dear diary, " * 100
 
 

@@ -10,34 +10,15 @@ INF = float("inf")
 RNG = np.random.default_rng(1)
 
 
-def look(event=1, kind="flood", severity=0.5, since=0.0, engaged=None, auction=None):
+def look(event=1, kind="flood", severity=0.5, since=0.0, **more):
     """A task to confirm."""
-    return Task(
-        event=event,
-        kind=kind,
-        stage="confirm",
-        due=True,
-        severity=severity,
-        confidence=0.9,
-        detected=since,
-        waiting_since=since,
-        engaged=engaged,
-        auction=auction,
-    )
+    told = {"severity": severity, "detected": since, "waiting_since": since, "confidence": 0.9}
+    return Task(**{"event": event, "kind": kind, "stage": "confirm", "due": True} | told | more)
 
 
-def act(event=1, kind="fire", due=True, severity=0.5, since=0.0):
+def act(event=1, kind="fire", due=True, severity=0.5):
     """A task to contain."""
-    return Task(
-        event=event,
-        kind=kind,
-        stage="contain",
-        due=due,
-        severity=severity,
-        confidence=0.9,
-        detected=since,
-        waiting_since=since,
-    )
+    return look(event, kind, severity, stage="contain", due=due)
 
 
 def situation(team, eta, tasks=None, now=100.0, operators=9, distance=None, **more):

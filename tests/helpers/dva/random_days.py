@@ -472,10 +472,7 @@ def snapshot(desk: Dva) -> dict[str, Any]:
 def _with_sets_in_order(event: Event) -> dict[str, Any]:
     fields = {name: getattr(event, name) for name in Event.__slots__}
     fields["times"] = dict(sorted(event.times.items()))
-    handling = vars_of(event.handling) | {"taken_off": sorted(event.handling.taken_off)}
+    handling = {name: getattr(event.handling, name) for name in Handling.__slots__}
+    handling["taken_off"] = sorted(event.handling.taken_off)
     sets = {"failed": sorted(event.failed), "sent": sorted(event.sent)}
     return fields | sets | {"handling": handling}
-
-
-def vars_of(handling: Handling) -> dict[str, Any]:
-    return {name: getattr(handling, name) for name in Handling.__slots__}
