@@ -350,7 +350,7 @@ class Scene:
             socket.linger = 0
             socket.connect(f"tcp://{self.dva}")
             socket.send(Voice(DETECTOR).registers("Sensor", f"127.{self.net}.251.1"))
-            assert socket.poll(30_000), "the DVA does not answer"
+            assert socket.poll(30_000)  # it answers
 
     def kill(self) -> None:
         """kill -9 the DVA, and start it again with what it kept."""

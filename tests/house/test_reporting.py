@@ -1,4 +1,4 @@
-"""What a run of the tests tells at its end, and which faults are planted to see them noticed."""
+"""When a run of the tests has failed, and which faults are planted to see them noticed."""
 
 import os
 import sys
@@ -7,34 +7,7 @@ import mutants
 import pytest
 from helpers.paths import PYTHON_PATH
 from helpers.processes.patience import run
-from helpers.reporting import cpu_by_room
 from helpers.reporting.left_out import MOST_SKIPPED
-from helpers.wording import unnamed
-
-
-def test_rooms_are_shown_beside_those_before_the_dearest_first():
-    head, *lines = cpu_by_room.table({"worlds": 2.0, "core": 3.5}, "abc", {"core": 1.0, "old": 4.0})
-    assert "abc" in head
-    assert [line.split() for line in lines] == [
-        ["core", "3.5", "1.0", "+2.5"],
-        ["worlds", "2.0", "0.0", "+2.0"],
-        ["old", "0.0", "4.0", "-4.0"],
-        ["all", "5.5", "5.0", "+0.5"],
-    ]
-
-
-def test_the_newest_commit_that_was_tested_before_is_the_one_beside(monkeypatch):
-    monkeypatch.setattr(cpu_by_room, "commits", lambda: ["now", "one", "two", "three"])
-    known = {"now": {"a": 1.0}, "three": {"a": 3.0}, "two": {"a": 2.0}}
-    assert cpu_by_room.before(known) == ("two", {"a": 2.0})
-    assert unnamed(cpu_by_room.before({"now": {"a": 1.0}})[0], "elsewhere") == []
-
-
-def test_figures_of_other_tests_are_not_beside(pytestconfig, monkeypatch):
-    all_tests = cpu_by_room.choice(pytestconfig)
-    assert cpu_by_room.choice(pytestconfig) == all_tests
-    monkeypatch.setattr(pytestconfig.option, "markexpr", "soak or x")
-    assert cpu_by_room.choice(pytestconfig) != all_tests
 
 
 @pytest.mark.system

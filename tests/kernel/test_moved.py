@@ -3,6 +3,7 @@
 from importlib import import_module
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.core.dispatch import load_policy
 from dva_sim.kernel.errors import ConfigError
@@ -13,12 +14,12 @@ from dva_sim.kernel.moved import MOVED
 def test_an_earlier_name_fails_with_the_new_one_which_is_there(old, new):
     with pytest.raises(ModuleNotFoundError) as told:
         import_module(f"dva_sim.{old}")
-    assert str(told.value) == f"dva_sim.{old} is now dva_sim.{new}"
+    assert unnamed(told.value, f"dva_sim.{old} ", f"dva_sim.{new}") == []
     import_module(f"dva_sim.{new}")
 
 
 def test_a_module_that_there_never_was_is_simply_not_there():
-    with pytest.raises(ModuleNotFoundError, match=r"No module named 'dva_sim\.never'"):
+    with pytest.raises(ModuleNotFoundError, match=r"'dva_sim\.never'"):
         import_module("dva_sim.never")
 
 
@@ -26,5 +27,6 @@ def test_a_plug_in_that_imports_an_earlier_name_is_told_in_one_line(tmp_path):
     (tmp_path / "mine.py").write_text("from dva_sim.errors import ConfigError\n")
     with pytest.raises(ConfigError) as told:
         load_policy("mine.py:Mine", base=tmp_path)
-    line = "ModuleNotFoundError: dva_sim.errors is now dva_sim.kernel.errors"
-    assert str(told.value).endswith(line)
+    assert (
+        unnamed(told.value, "ModuleNotFoundError", "dva_sim.errors", "dva_sim.kernel.errors") == []
+    )
