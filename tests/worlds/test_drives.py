@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.agents.robot.profile import load_robot
 from dva_sim.kernel.errors import ConfigError
@@ -168,14 +169,14 @@ class Dancing(Differential):
 
 @pytest.mark.invariant("S4")
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "names"),
     [
-        (Racing, "aims at [m/s] 50; allowed is 0 to 0.5"),
-        (Raving, "drives at [m/s] 0.52; allowed is 0 to 0.5"),
-        (Dancing, "aims at [rad/s] 9; allowed is -0.524 to 0.524"),
+        (Racing, "aims [m/s] 50; 0 to 0.5"),
+        (Raving, "drives [m/s] 0.52; 0 to 0.5"),
+        (Dancing, "aims [rad/s] 9; -0.524 to 0.524"),
     ],
 )
-def test_a_drive_that_wants_more_than_its_profile_has_is_limited_and_counted(kind, told):
+def test_a_drive_that_wants_more_than_its_profile_has_is_limited_and_counted(kind, names):
     world = World(hall(20.0, 20.0), 0.04)
     spec = DriveSpec(drive=lambda spec: GuardedDrive(kind(spec)))
     robot = world.add_robot("robot-1", spec, Pose(10.0, 10.0, 0.0))
@@ -184,7 +185,7 @@ def test_a_drive_that_wants_more_than_its_profile_has_is_limited_and_counted(kin
         world.advance_to(world.time + 0.1)
         assert robot.speed <= 0.5 + 1e-9
     assert robot.motors.failures >= 10
-    assert robot.motors.first_failure == told
+    assert unnamed(robot.motors.first_failure, *names.split()) == []
 
 
 def test_a_drive_that_keeps_within_its_profile_is_never_counted_whatever_it_is_asked_for():
@@ -284,21 +285,21 @@ def test_drives_are_made_by_name_and_by_file(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "said"),
+    ("name", "options", "names"),
     [
-        ("four_way", {}, "drive 'four_way' is unknown; known: differential, three_way; or a file"),
-        ("mine.py", {}, "drive 'mine.py' should name a class too, as mine.py:Mine"),
-        ("mine.py:Mine", {}, "drive 'mine.py:Mine': file 'mine.py' not found; looked in"),
-        ("tracked.py:Yours", {}, "drive 'tracked.py:Yours': there is no class 'Yours' in"),
-        ("tracked.py:DriveSpec", {}, "is not a drive; should be a class derived from dva_sim.worl"),
-        ("three_way", {"scrub": 1}, "has no option 'scrub'; known: wheelbase_m, steering_deg, ser"),
-        ("differential", {"gain": 1}, "drive 'differential' has no option 'gain'; it has none"),
+        ("four_way", {}, "drive 'four_way' differential, three_way"),
+        ("mine.py", {}, "drive 'mine.py' class mine.py:Mine"),
+        ("mine.py:Mine", {}, "drive 'mine.py:Mine': 'mine.py' not found"),
+        ("tracked.py:Yours", {}, "drive 'tracked.py:Yours': class 'Yours'"),
+        ("tracked.py:DriveSpec", {}, "drive; class dva_sim.worlds"),
+        ("three_way", {"scrub": 1}, "'scrub'; wheelbase_m, steering_deg, servo_s"),
+        ("differential", {"gain": 1}, "drive 'differential' 'gain'"),
     ],
 )
-def test_a_mistake_is_one_clear_line(name, options, said):
+def test_a_mistake_is_one_clear_line(name, options, names):
     with pytest.raises(ConfigError) as caught:
         load_drive(name, options)(DriveSpec())
-    assert said in str(caught.value)
+    assert unnamed(caught.value, *names.split()) == []
     assert "\n" not in str(caught.value)
 
 

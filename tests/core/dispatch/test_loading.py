@@ -4,6 +4,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 from helpers.dva.dispatch_situations import RNG, situation
+from helpers.wording import unnamed
 
 from dva_sim.core.dispatch import POLICIES, MinEta, Policy, known_policies, load_policy
 from dva_sim.kernel import plugins
@@ -63,52 +64,52 @@ def test_the_shipped_example_is_found_from_anywhere(folder):
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "said"),
+    ("name", "options", "names"),
     [
-        ("min_ate", {}, "policy 'min_ate' is unknown; did you mean 'min_eta'?"),
-        ("oracle", {}, "policy 'oracle': it needs a plan made with knowledge of the future"),
-        ("min_eta", {"pace": 1}, "policy 'min_eta' has no option 'pace'; it has none"),
-        ("preemptive", {"gain": 1}, "'gain'; did you mean 'gain_s'?"),
-        ("preemptive", {"margin": 0}, "option 'margin' is 0; should be a number above 0"),
-        ("preemptive", {"margin": True}, "option 'margin' is True; should be a number above 0"),
-        ("priority_eta", {"ageing_per_s": "x"}, "'ageing_per_s' is 'x'; should be a number of at"),
-        ("coverage", {"gain_s": float("nan")}, "'gain_s' is nan; should be a number above 0"),
-        ("batch_optimal", {"objective": "cost"}, "'objective' is 'cost'; should be one of dist"),
-        ("hazard_team", {"dangerous": "fire"}, "is 'fire'; should be a list of some of fire, flo"),
-        ("hazard_team", {"dangerous": ["ice"]}, "'dangerous' is ['ice']; should be a list"),
-        ("hazard_team", {"dangerous": [["fire"]]}, "should be a list of some of"),
-        ("mine.py", {}, "policy 'mine.py' should name a class too, as mine.py:Mine"),
-        ("none.py:Mine", {}, "policy 'none.py:Mine': file 'none.py' not found; looked in /"),
-        ("mine.py:Yours", {}, "policy 'mine.py:Yours': there is no class 'Yours' in /"),
-        ("mine.py:Other", {}, "'mine.py:Other' is not a policy; should be a class derived from"),
-        ("mine.py:dataclass", {}, "'mine.py:dataclass' is not a policy"),
-        ("mine.py:Nothing", {}, "'mine.py:Nothing' has no advise(situation, rng)"),
-        ("mine.py:Mine", {"speed": 1}, "'mine.py:Mine' has no option 'speed'; known: pace"),
-        ("mine.py:Mine", {"pace": 0}, "cannot be made: ZeroDivisionError: division by zero"),
+        ("min_ate", {}, "policy 'min_ate' 'min_eta'?"),
+        ("oracle", {}, "policy 'oracle' future"),
+        ("min_eta", {"pace": 1}, "policy 'min_eta' 'pace'"),
+        ("preemptive", {"gain": 1}, "'gain' 'gain_s'?"),
+        ("preemptive", {"margin": 0}, "'margin' 0; number above"),
+        ("preemptive", {"margin": True}, "'margin' True; number above 0"),
+        ("priority_eta", {"ageing_per_s": "x"}, "'ageing_per_s' 'x'; number"),
+        ("coverage", {"gain_s": float("nan")}, "'gain_s' nan; number above 0"),
+        ("batch_optimal", {"objective": "cost"}, "'objective' 'cost'; distance eta"),
+        ("hazard_team", {"dangerous": "fire"}, "'dangerous' 'fire'; list fire, flood"),
+        ("hazard_team", {"dangerous": ["ice"]}, "'dangerous' ['ice']; list"),
+        ("hazard_team", {"dangerous": [["fire"]]}, "'dangerous' list"),
+        ("mine.py", {}, "policy 'mine.py' class mine.py:Mine"),
+        ("none.py:Mine", {}, "policy 'none.py:Mine': 'none.py' not found"),
+        ("mine.py:Yours", {}, "policy 'mine.py:Yours': class 'Yours'"),
+        ("mine.py:Other", {}, "'mine.py:Other' policy; Policy"),
+        ("mine.py:dataclass", {}, "'mine.py:dataclass' policy"),
+        ("mine.py:Nothing", {}, "'mine.py:Nothing' advise(situation, rng)"),
+        ("mine.py:Mine", {"speed": 1}, "'mine.py:Mine' 'speed'; pace"),
+        ("mine.py:Mine", {"pace": 0}, "'mine.py:Mine' ZeroDivisionError"),
     ],
-)  # fmt: skip
-def test_a_mistake_is_one_clear_line(folder, name, options, said):
+)
+def test_a_mistake_is_one_clear_line(folder, name, options, names):
     with pytest.raises(ConfigError) as caught:
         load_policy(name, options)
-    assert said in str(caught.value)
+    assert unnamed(caught.value, *names.split()) == []
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "names"),
     [
-        ("x = 1\nclass A(:\n", "bad.py:2: is not valid Python: invalid syntax"),
-        ("\nimport no_such_thing\n", "bad.py:2: cannot be loaded: ModuleNotFoundError: No module"),
-        ("def f():\n  1 / 0\nf()\n", "bad.py:2: cannot be loaded: ZeroDivisionError: division"),
-        ("raise SystemExit\n", "bad.py:1: cannot be loaded: SystemExit"),
-        ("x = '\0'\n", "source code string cannot contain null bytes"),
+        ("x = 1\nclass A(:\n", "bad.py:2: Python"),
+        ("\nimport no_such_thing\n", "bad.py:2: ModuleNotFoundError:"),
+        ("def f():\n  1 / 0\nf()\n", "bad.py:2: ZeroDivisionError:"),
+        ("raise SystemExit\n", "bad.py:1: SystemExit"),
+        ("x = '\0'\n", "bad.py Python null"),
     ],
 )
-def test_a_file_that_cannot_be_loaded_is_told_with_its_line(folder, text, said):
+def test_a_file_that_cannot_be_loaded_is_told_with_its_line(folder, text, names):
     (folder / "bad.py").write_text(text)
     with pytest.raises(ConfigError) as caught:
         load_policy("bad.py:A")
-    assert said in str(caught.value)
+    assert unnamed(caught.value, *names.split()) == []
 
 
 def test_an_installed_package_can_offer_policies(monkeypatch):

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
@@ -21,38 +22,38 @@ REPEATED = {"demand": [{"between": 1, "repeats": {"share": 0.5}}]}
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "names"),
     [
-        ({"demand": [{}]}, "one of between, sources and batch"),
-        ({"demand": [{"between": 0}]}, "between should be longer than 0 s"),
-        ({"demand": [{"between": 1, "batch": {"count": 1}}]}, "one of between, sources and batch"),
-        ({"demand": [{"between": 1, "zones": {"hall": 1}}]}, "zone 'hall' is unknown; known: here"),
-        ({"demand": [{"between": 1}, {"between": 2}]}, "two streams 'fire'"),
-        ({"demand": [{"between": 1, "notice": "detectors"}]}, "'detectors' needs a site"),
-        ({"demand": [{"between": {"law": "exponential"}}]}, "missing key"),
-        ({"responders": [ROBOT]}, "robots need an operator"),
-        (DRIVEN | {"responders": [ROBOT | {"after": "recall"}]}, "driven back by its operator"),
-        ({"responders": [{"name": "a"}, {"name": "a"}]}, "two responders 'a'"),
-        ({"responders": [{"name": "a", "base": "hall"}]}, "place 'hall' is unknown"),
-        ({"responders": [{"name": "a", "base": "post"}]}, "place 'post' is unknown"),
-        (AREA | SITE, "a site or an area, not both"),
-        ({"zones": {"a": [0, 0, 1, 1]}}, "zones belong to an area"),
+        ({"demand": [{}]}, "between, sources batch"),
+        ({"demand": [{"between": 0}]}, "between 0 s"),
+        ({"demand": [{"between": 1, "batch": {"count": 1}}]}, "between, sources batch"),
+        ({"demand": [{"between": 1, "zones": {"hall": 1}}]}, "zone 'hall' here"),
+        ({"demand": [{"between": 1}, {"between": 2}]}, "streams 'fire'"),
+        ({"demand": [{"between": 1, "notice": "detectors"}]}, "'detectors' site"),
+        ({"demand": [{"between": {"law": "exponential"}}]}, "missing mean_s"),
+        ({"responders": [ROBOT]}, "robots operator"),
+        (DRIVEN | {"responders": [ROBOT | {"after": "recall"}]}, "driven operator"),
+        ({"responders": [{"name": "a"}, {"name": "a"}]}, "responders 'a'"),
+        ({"responders": [{"name": "a", "base": "hall"}]}, "place 'hall'"),
+        ({"responders": [{"name": "a", "base": "post"}]}, "place 'post'"),
+        (AREA | SITE, "site area"),
+        ({"zones": {"a": [0, 0, 1, 1]}}, "zones area"),
         (AREA | {"zones": {"a": [2, 0, 1, 1]}}, "xmin, ymin, xmax, ymax"),
-        (AREA | {"travel": "path"}, "travel 'path' needs a site"),
-        ({"travel": "straight"}, "needs a site or an area"),
-        ({"warm_up_s": 9, "horizon_s": 8}, "warm_up_s 9 should be before horizon_s 8"),
-        ({"dispatch": {"policy": "min_etta"}}, "policy"),
-        ({"dispatch": {"policy": "min_eta", "options": {"a": 1}}}, "option"),
-        ({"dispatch": {"preferences": {"here": ["guide"]}}}, "responder 'guide' is unknown"),
-        ({"dispatch": {"contaiment": True}}, "did you mean 'containment'"),
-        (REPEATED | {"dispatch": {"merge_distance_m": 0}}, "need dispatch.merge_distance_m"),
-        (DRIVEN | {"dispatch": {"containment": True}}, "containment needs guards"),
+        (AREA | {"travel": "path"}, "travel 'path' site"),
+        ({"travel": "straight"}, "travel site area"),
+        ({"warm_up_s": 9, "horizon_s": 8}, "warm_up_s 9 horizon_s 8"),
+        ({"dispatch": {"policy": "min_etta"}}, "policy 'min_etta' 'min_eta'?"),
+        ({"dispatch": {"policy": "min_eta", "options": {"a": 1}}}, "'min_eta' 'a'"),
+        ({"dispatch": {"preferences": {"here": ["guide"]}}}, "responder 'guide'"),
+        ({"dispatch": {"contaiment": True}}, "contaiment' 'containment'"),
+        (REPEATED | {"dispatch": {"merge_distance_m": 0}}, "repeats dispatch.merge_distance_m"),
+        (DRIVEN | {"dispatch": {"containment": True}}, "containment guards"),
     ],
 )
-def test_a_mistake_is_told_in_one_line(wrong, told):
+def test_a_mistake_is_told_in_one_line(wrong, names):
     with pytest.raises(ConfigError) as problem:
         build(GOOD | wrong)
-    assert told in str(problem.value)
+    assert unnamed(problem.value, *names.split()) == []
     assert "\n" not in str(problem.value)
 
 

@@ -22,13 +22,7 @@ SHORT = {
     "drive.practice": 0,
     "drive.horizon_s": 100,
 }
-BTP = {
-    "kind": "btp",
-    "header_bytes": 12,
-    "tolerance_s": 0.02,
-    "widen": 1.25,
-    "narrow": 1.1,
-}
+BTP = {"kind": "btp", "header_bytes": 12, "tolerance_s": 0.02, "widen": 1.25, "narrow": 1.1}
 
 
 def played(scenario, seed):
@@ -65,10 +59,10 @@ def test_who_sees_a_picture_per_second_drives_slower():
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"transport": BTP}, "missing key 'transport.longest_gap_s'"),
-        ({"transport.kind": "rtnp"}, "missing key 'transport.header_bytes'"),
-        ({"transport.king": "udp"}, "unknown key 'transport.king'"),
-        ({"drive.plant.speed_mps": None}, "what is driven in a course needs plant.speed_mps"),
+        ({"transport": BTP}, "'transport.longest_gap_s'"),
+        ({"transport.kind": "rtnp"}, "'transport.header_bytes'"),
+        ({"transport.king": "udp"}, "'transport.king'"),
+        ({"drive.plant.speed_mps": None}, r"course .*plant\.speed_mps"),
         ({"drive.task.kind": "reach"}, "drive.task"),
         ({"operator.strategy": "nobody"}, "nobody"),
     ],
