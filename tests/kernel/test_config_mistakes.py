@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config import validate
@@ -18,57 +19,57 @@ def complaint(data, model=Scenario):
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "names"),
     [
-        ({"robots": 3}, "unknown key 'robots'; did you mean 'robot.count'?"),
-        ({"robots": {}}, "unknown key 'robots'; did you mean 'robot'?"),
-        ({"command_rate_hz": 5}, "did you mean 'command.rate_hz'?"),
-        ({"fps": 5}, "did you mean 'camera.rate_hz'?"),
-        ({"latency_ms": 5}, "did you mean 'link.delay_s'? (in seconds)"),
-        ({"link": {"delay_ms": 5}}, "did you mean 'delay_s'? (in seconds)"),
-        ({"link": {"bandwidth": 5}}, "did you mean 'rate_bps'? (in bits per second)"),
-        ({"duration": 5}, "did you mean 'horizon_s'?"),
-        ({"filter": "none"}, "did you mean 'phone.filter'?"),
-        ({"policy": "random"}, "did you mean 'dispatch.policy'?"),
-        ({"count": 5}, "did you mean 'robot.count', 'guard.count' or 'bystander.count'?"),
-        ({"zebra": 5}, "unknown key 'zebra'; known here: access, bystander, camera"),
+        ({"robots": 3}, "'robots'; 'robot.count'?"),
+        ({"robots": {}}, "'robots'; 'robot'?"),
+        ({"command_rate_hz": 5}, "'command.rate_hz'?"),
+        ({"fps": 5}, "'camera.rate_hz'?"),
+        ({"latency_ms": 5}, "'link.delay_s'? seconds"),
+        ({"link": {"delay_ms": 5}}, "'delay_s'? seconds"),
+        ({"link": {"bandwidth": 5}}, "'rate_bps'? bits second"),
+        ({"duration": 5}, "'horizon_s'?"),
+        ({"filter": "none"}, "'phone.filter'?"),
+        ({"policy": "random"}, "'dispatch.policy'?"),
+        ({"count": 5}, "'robot.count', 'guard.count' 'bystander.count'?"),
+        ({"zebra": 5}, "'zebra'; access, bystander, camera"),
     ],
     ids=str,
 )
-def test_an_unknown_key_is_told_with_the_one_that_was_meant(data, told):
-    assert told in complaint(data)
+def test_an_unknown_key_is_told_with_the_one_that_was_meant(data, names):
+    assert unnamed(complaint(data), *names.split()) == []
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "names"),
     [
-        ({"link": {"delay_s": "500ms"}}, "delay_s: should be a number, not '500ms'; write 0.5"),
-        ({"link": {"loss": "5%"}}, "link.loss: should be a number, not '5%'; write 0.05"),
-        ({"link": {"rate_bps": "2 Mbit/s"}}, "not '2 Mbit/s'; write 2000000"),
-        ({"horizon_s": "1,5"}, "horizon_s: should be a number, not '1,5'; write 1.5"),
-        ({"horizon_s": "5 m"}, "horizon_s: should be a number, not '5 m'"),
-        ({"link": {"delay_s": math.nan}}, "link.delay_s: should be a finite number, not nan"),
-        ({"link": {"loss": 7}}, "link.loss: should be at most 0.9, not 7"),
-        ({"robot": {"charge": 0}}, "robot.charge: should be above 0, not 0"),
-        ({"horizon_s": None}, "horizon_s: should be a number, not null"),
-        ({"robot": {"count": "3"}}, "robot.count: should be a whole number, not '3'"),
-        ({"robot": {"count": 3.0}}, "should be a whole number, without a point, not 3.0"),
-        ({"link": 5}, "link: should be a mapping of keys to values, not 5, such as link.delay_s"),
-        ({"control": "coordinate"}, "not 'coordinate'; did you mean 'coordinated'?"),
-        ({"control": "x" * 500}, "not '" + "x" * 59 + "..."),
-        ({"link": {"delay_law": {"law": "gama"}}}, "law 'gama' is unknown; did you mean 'gamma'?"),
-        ({"link": {"delay_law": {}}}, "missing key 'link.delay_law.law'"),
+        ({"link": {"delay_s": "500ms"}}, "delay_s: number, '500ms'; 0.5"),
+        ({"link": {"loss": "5%"}}, "link.loss: number, '5%'; 0.05"),
+        ({"link": {"rate_bps": "2 Mbit/s"}}, "Mbit/s'; 2000000"),
+        ({"horizon_s": "1,5"}, "horizon_s: number, '1,5'; 1.5"),
+        ({"horizon_s": "5 m"}, "horizon_s: number, '5"),
+        ({"link": {"delay_s": math.nan}}, "link.delay_s: finite nan"),
+        ({"link": {"loss": 7}}, "link.loss: most 0.9, 7"),
+        ({"robot": {"charge": 0}}, "robot.charge: above 0, 0"),
+        ({"horizon_s": None}, "horizon_s: number, null"),
+        ({"robot": {"count": "3"}}, "robot.count: whole '3'"),
+        ({"robot": {"count": 3.0}}, "whole point, 3.0"),
+        ({"link": 5}, "link: mapping 5, link.delay_s"),
+        ({"control": "coordinate"}, "direct, supervisory, 'coordinate'; 'coordinated'?"),
+        ({"control": "x" * 500}, "'" + "x" * 59 + "..."),
+        ({"link": {"delay_law": {"law": "gama"}}}, "'gama' 'gamma'?"),
+        ({"link": {"delay_law": {}}}, "missing 'link.delay_law.law'"),
     ],
     ids=lambda value: str(value)[:50],
 )
-def test_a_value_that_does_not_fit_is_told_with_what_would_be_right(data, told):
-    assert told in complaint(data)
+def test_a_value_that_does_not_fit_is_told_with_what_would_be_right(data, names):
+    assert unnamed(complaint(data), *names.split()) == []
 
 
 def test_keys_of_studies_have_other_names_too():
     data = {"question": "?", "parts": {"a": {"scenario": "x"}}}
-    assert "did you mean 'persons'?" in complaint({**data, "participants": 4}, Study)
-    assert "did you mean 'replications'?" in complaint({**data, "trials": 4}, Study)
+    assert "'persons'?" in complaint({**data, "participants": 4}, Study)
+    assert "'replications'?" in complaint({**data, "trials": 4}, Study)
 
 
 def test_a_number_with_a_unit_is_read_only_where_the_unit_is_clear():

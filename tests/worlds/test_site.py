@@ -106,17 +106,17 @@ def test_a_mistake_in_a_plan_is_told_with_line_and_column(tmp_path, wrong, names
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "names"),
     [
-        ({"plan": "gone.geojson"}, "tiny.yaml:3:1: plan 'gone.geojson' not found"),
-        ({"plam": "x"}, "unknown key 'plam'; did you mean 'plan'?"),
+        ({"plan": "gone.geojson"}, "tiny.yaml:3:1: plan 'gone.geojson'"),
+        ({"plam": "x"}, "'plam'; 'plan'?"),
         ({"origin": "{latitude: 138, longitude: 0}"}, "tiny.yaml:2:10: origin.latitude"),
     ],
 )
-def test_a_mistake_in_a_site_file_is_told_with_its_place(tmp_path, changes, words):
+def test_a_mistake_in_a_site_file_is_told_with_its_place(tmp_path, changes, names):
     with pytest.raises(ConfigError) as error:
         load_site(write_site(tmp_path, TWO_ROOMS, **changes))
-    assert words in str(error.value)
+    assert unnamed(error.value, *names.split()) == []
 
 
 def test_a_plan_that_is_not_json_is_told_with_line_and_column(tmp_path):
