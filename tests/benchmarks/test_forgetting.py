@@ -15,18 +15,18 @@ import json
 import os
 import re
 import sqlite3
-import statistics
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
+import numpy as np
 import zmq
 
 DVA, ROBOT = "02:00:00:00:00:01", "02:00:00:01:00:01"
@@ -313,9 +313,7 @@ class Figures:
 
 def _part(times: list[float], percent: int) -> float:
     """A percentile [ms]."""
-    if len(times) < 2:
-        return 1000 * (times or [float("nan")])[0]
-    return 1000 * statistics.quantiles(times, n=100, method="inclusive")[percent - 1]
+    return 1000 * float(np.percentile(times or [np.nan], percent))
 
 
 class Scene:
@@ -431,10 +429,6 @@ def measured(args: argparse.Namespace) -> Iterator[Figures]:
         yield scene.rest(args.period, "kill -9")
         for _ in range(args.waves_after):
             yield scene.wave(args.size, args.period)
-        if args.last:
-            yield scene.rest(args.last, "much later")
-        with suppress(OSError):
-            print((Path(folder) / "errors").read_text()[-args.show :])
 
 
 def main(words: list[str] | None = None) -> list[Figures]:
@@ -446,8 +440,6 @@ def main(words: list[str] | None = None) -> list[Figures]:
     parser.add_argument("--size", type=int, default=1000)
     parser.add_argument("--period", type=float, default=25.0)
     parser.add_argument("--quiet", type=float, default=15.0)
-    parser.add_argument("--last", type=float, default=0.0)
-    parser.add_argument("--show", type=int, default=0)
     parser.add_argument("--wave", type=int)
     parser.add_argument("--net", type=int)
     parser.add_argument("--dva")

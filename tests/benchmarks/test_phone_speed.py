@@ -24,6 +24,7 @@ from benchmarks.console_visits import Console, console
 from benchmarks.goals import goal
 from helpers.console.browser_phone import Hand
 from helpers.console.chromium import chromium
+from helpers.console.simulated_phone import CALIBRATION
 from helpers.processes.patience import PATIENCE_S
 from playwright.sync_api import Page, Response, expect
 from websockets.exceptions import ConnectionClosed
@@ -34,15 +35,6 @@ HZ, BATCH_S = 60.0, 0.012  # as phones and the page have them
 DRIVEN, MANY, MANY_S = 2, 20, 15.0
 UPRIGHT, LEFT, RIGHT = (0.0, 6.9, 6.9), (1.2, 6.9, 6.8), (-1.2, 6.9, 6.8)  # [m/s^2]
 WORDS = ("--phones", "--phones-host", "127.0.0.1", "--phones-port", "0")
-CALIBRATION = {
-    "reference_mps2": UPRIGHT,
-    "speed_step_mps2": 0.35,
-    "turn_step_mps2": 0.12,
-    "max_delay_s": 0.5,
-    "pipeline": "default",
-    "filter": None,
-    "mapping": "absolute",
-}
 STARTS_WITHIN_S, REST_S = 15.0, 0.5
 DELAY_MS = 60.0  # hand to set point should take less, for 95 of 100
 
@@ -110,7 +102,7 @@ class Phone:
         answer = self.ask("phone_permission", device=device, level="teleoperation")
         assert answer["ok"], answer
         self.drives = True
-        assert self.ask("phone_calibrate", **CALIBRATION)["ok"]
+        assert self.ask("phone_calibrate", **CALIBRATION | {"reference_mps2": UPRIGHT})["ok"]
 
     def _note(self, line: dict[str, Any]) -> None:
         """A newer sample is in the set point: how long that took."""
