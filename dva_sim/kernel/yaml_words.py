@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 Place = tuple[int | None, int | None]
 
 
-class Said(NamedTuple):
+class Slip(NamedTuple):
     """What ruamel says, what we say, and whether the mistake is where what it reads began."""
 
     theirs: str
@@ -17,27 +17,27 @@ class Said(NamedTuple):
 
 
 _WORDS: Final = (
-    Said(r"mapping values are not allowed here",
+    Slip(r"mapping values are not allowed here",
          "a second colon in a line, or a key that is indented otherwise than those beside it; "
          "text with a colon needs quotes"),
-    Said(r"expected ',' or '([\]}])'", "a bracket is not closed: {0} is missing", True),
-    Said(r"found character '\\t'", "a tab; indent with spaces"),
-    Said(r"found character '(.)' that cannot start any token",
+    Slip(r"expected ',' or '([\]}])'", "a bracket is not closed: {0} is missing", True),
+    Slip(r"found character '\\t'", "a tab; indent with spaces"),
+    Slip(r"found character '(.)' that cannot start any token",
          "a value cannot begin with {0}; put it in quotes"),
-    Said(r"found unexpected (?:end of stream|document separator)", "a quote is not closed", True),
-    Said(r"found duplicate key \"?(.*?)\"? with value", "key {0!r} stands twice"),
-    Said(r"found undefined alias '(.*)'", "*{0} stands for nothing; text with a * needs quotes"),
-    Said(r"could not find expected ':'", "a key without a colon and a value", True),
-    Said(r"found unknown escape character '(.)'",
+    Slip(r"found unexpected (?:end of stream|document separator)", "a quote is not closed", True),
+    Slip(r"found duplicate key \"?(.*?)\"? with value", "key {0!r} stands twice"),
+    Slip(r"found undefined alias '(.*)'", "*{0} stands for nothing; text with a * needs quotes"),
+    Slip(r"could not find expected ':'", "a key without a colon and a value", True),
+    Slip(r"found unknown escape character '(.)'",
          "\\{0} means nothing within double quotes; use single ones"),
-    Said(r"expected <block end>, but found '(?:-|<block sequence start>)'",
+    Slip(r"expected <block end>, but found '(?:-|<block sequence start>)'",
          "a list item that is indented otherwise than those beside it"),
-    Said(r"expected <block end>",
+    Slip(r"expected <block end>",
          "indented otherwise than the lines beside it, or text behind a value"),
-    Said(r"but found another document", "a second document; give each a file of its own"),
-    Said(r"(?:block )?sequence entries are not allowed", "a list item begins on a line of its own"),
-    Said(r"expected (?:'<document start>'|<document start>)", "the file goes on behind its end"),
-    Said(r"found unhashable key", "a key is text or a number, not a list or a mapping"),
+    Slip(r"but found another document", "a second document; give each a file of its own"),
+    Slip(r"(?:block )?sequence entries are not allowed", "a list item begins on a line of its own"),
+    Slip(r"expected (?:'<document start>'|<document start>)", "the file goes on behind its end"),
+    Slip(r"found unhashable key", "a key is text or a number, not a list or a mapping"),
 )  # fmt: skip
 _THEIRS: Final = r"(found|expected|could|but|did|while) "  # what is not of our own constructor
 _SIGNS: Final = {

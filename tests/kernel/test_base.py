@@ -70,7 +70,7 @@ def test_derived_seeds_tell_parts_apart():
         ("name: a\ninner: {delay_s: fast}\n", "2:9", "inner.delay_s"),
         ("inner: {}\n", "1:1", "missing key 'name'"),
         ("name: a\nname: b\n", "2:1", "'name' stands twice"),
-        ("name: [a\n", "2:1", "expected"),
+        ("name: [a\n", "1:7", "] is missing"),
         ("name: a\nitems: [{delay_s: 1}, {delay_s: x}]\n", "2:24", "items.1.delay_s"),
         ("- 1\n", "1:1", "mapping"),
     ],
