@@ -111,7 +111,7 @@ def _checked(study: Study) -> list[DesignCell]:
         say("Checking every configuration before the first run ...")
         with _shown("checking", count, "configurations") as show:
             cells = rehearse_all(study, show)
-    warn(contradictions_in(cells))
+    warn([*study.lost, *contradictions_in(cells)])
     return cells
 
 

@@ -105,7 +105,7 @@ def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
             use = f"; try: {other.command} {name}" if other.command and is_asked else ""
             return f"{name!r} is a {other.word}, not a {kind}{use}"
     if path.suffix or len(path.parts) > 1:
-        return f"there is no file {name!r}{_meant(path, kind, known)}"
+        return f"file {name!r} not found{_meant(path, kind, known)}"
     for where, other in others.items() if not guess(name, known) else ():
         near = guess(name, available(where))
         if near is not None and other.command:

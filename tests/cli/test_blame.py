@@ -65,7 +65,7 @@ def test_a_file_that_is_not_there_is_told_as_a_file(tmp_path, command):
     assert told.returncode == 2
     assert "mine.yml" in told.stderr
     if command != "check":
-        assert unnamed(told.stderr, "no file", "'mine.yaml'") == []
+        assert unnamed(told.stderr, "file 'mine.yml'", "'mine.yaml'") == []
     assert "not found; available" not in told.stderr
 
 

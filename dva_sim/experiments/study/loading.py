@@ -337,7 +337,9 @@ def _built(data: Changed, document: Document, may_lose: bool = False) -> Study:
     if may_lose:
         # A claim that is made in the same breath is a mistake and no loss.
         _tell_first(study, (f for f in validation.of_claims(study) if not data.holds(f[1])))
+        lost = validation.lost_claims(study)
         study = validation.kept_claims(study)
+        study._lost = tuple(lost)
     elif wrong := next(validation.of_claims(study), None):
         # A claim may be right about a factor or level that is misspelt where it is declared.
         cells(validation.kept_claims(study))
@@ -353,7 +355,7 @@ def _table_of(study: Study) -> Document | None:
     try:
         path = resources.find(study.design.csv, FOLDER, suffix=".csv", base=study.folder)
     except ConfigError as error:
-        problem = error.problem.replace("study ", "file of rows ", 1)
+        problem = error.problem.replace("file ", "file of rows ", 1)
         raise study.error(problem, ("design", "csv")) from None
     return read_table(path)
 

@@ -116,6 +116,7 @@ class Study(Config):
     _version: Version | None = PrivateAttr(default=None)
     _status: Status = PrivateAttr(default_factory=Status)
     _usual: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _lost: tuple[str, ...] = PrivateAttr(default=())
 
     @field_validator("parts", "comparisons")
     @classmethod
@@ -169,6 +170,11 @@ class Study(Config):
     def settings(self) -> tuple[str, ...]:
         """The `key=value` pairs of `--set`; any makes the study exploratory."""
         return self._settings
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """What was declared about levels that settings have left out, each in a sentence."""
+        return self._lost
 
     @property
     def pilot(self) -> int | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from dva_sim.experiments.study.designs import MOST_CELLS, MOST_POINTS, MOST_RUNS, keys_of
@@ -25,6 +27,7 @@ from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import KeyPath
 from dva_sim.simulation.models import measured_names
 
+SAME = 1e-9  # relative difference of two levels that are meant as one
 Problem = tuple[str, KeyPath]
 """What is wrong, and the key at which that is said."""
 
@@ -82,6 +85,7 @@ def of_factors(study: Study) -> Iterator[Problem]:
     listed = keys_of(study.design, study.listed_rows)
     for factor in dict.fromkeys([*study.factors, *listed]):
         levels = _levels_of(study, factor)
+        yield from _faults_of_numbers(study, factor, levels)
         named = study.treatments.get(factor)
         if named is not None:
             yield from _faults_of_name(study, factor)
@@ -101,6 +105,15 @@ def of_factors(study: Study) -> Iterator[Problem]:
         yield str(error), ()
     yield from _faults_of_tuning(study)
     yield from of_size(study)
+
+
+def _faults_of_numbers(study: Study, factor: str, levels: Sequence[Level]) -> Iterator[Problem]:
+    """Levels that differ by rounding alone, as `numpy.arange` makes them, would share no row."""
+    numbers = {n for n in levels if isinstance(n, int | float) and not isinstance(n, bool)}
+    for low, high in itertools.pairwise(sorted(numbers)):
+        if math.isclose(low, high, rel_tol=SAME):
+            told = f"{low!r} and {high!r} are one level of {factor!r}, written twice"
+            yield told, _place(study, factor, high)
 
 
 def _faults_of_name(study: Study, factor: str) -> Iterator[Problem]:
@@ -193,6 +206,18 @@ def kept_claims(study: Study) -> Study:
     rest = study.model_copy(update=lost)
     kept = {n: h for n, h in rest.hypotheses.items() if not any(_faults_of_hypothesis(rest, n))}
     return rest.model_copy(update={"hypotheses": kept})
+
+
+def lost_claims(study: Study) -> list[str]:
+    """What cannot be said any more of a study whose factors or levels were changed, and why."""
+    kept = kept_claims(study)
+    lost = [f"the answer will not be computed: {problem}" for problem, _ in of_answer(study)][:1]
+    for what, declared, left in (
+        ("comparison", study.comparisons, kept.comparisons),
+        ("hypothesis", study.hypotheses, kept.hypotheses),
+    ):
+        lost += [f"{what} {name!r} is left out" for name in declared if name not in left]
+    return lost
 
 
 def of_answer(study: Study) -> Iterator[Problem]:

@@ -1,0 +1,39 @@
+"""Levels that differ by rounding alone, and levels that settings leave out."""
+
+import pytest
+from helpers.processes.command_line import call
+from helpers.wording import unnamed
+
+from dva_sim.experiments.study.loading import load_study, write_study
+from dva_sim.kernel.errors import ConfigError
+
+
+@pytest.fixture
+def mine(tmp_path):
+    return write_study(str(tmp_path / "mine"))
+
+
+@pytest.mark.parametrize(
+    "levels", ["[0.2, 0.3, 0.30000000000000004]", "[0, 1e-300, 0.1, 0.1000000000001]"]
+)
+def test_levels_that_differ_by_rounding_alone_are_one_level_twice(mine, levels):
+    with pytest.raises(ConfigError) as error:
+        load_study(mine, [f"factors.link.delay_s={levels}"])
+    assert unnamed(str(error.value), "link.delay_s", levels.split(", ")[-1][:-1]) == []
+
+
+def test_levels_that_are_merely_near_are_two(mine):
+    assert load_study(mine, ["factors.link.delay_s=[0.2, 0.20001, 0.5]"]).lost == ()
+
+
+def test_a_contrast_that_settings_take_half_of_is_told_before_any_run(mine, tmp_path):
+    told = call("run", mine, "--dry-run", "--set", "factors.pattern=req-rep", cwd=tmp_path)
+    assert told.returncode == 0
+    warned = [line for line in told.stderr.splitlines() + told.stdout.splitlines()
+              if line.startswith("warning: ")]  # fmt: skip
+    assert unnamed(warned[0], "answer", "'latest-wins'", "'pattern'") == []
+    assert unnamed(warned[1], "'waiting-costs'") == []
+
+
+def test_settings_that_leave_all_that_is_declared_lose_nothing(mine):
+    assert load_study(mine, ["persons=2", "factors.link.delay_s=[0, 0.25, 0.5]"]).lost == ()
