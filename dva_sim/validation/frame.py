@@ -20,6 +20,7 @@ from dva_sim.experiments.execution.scheduling import run_all
 from dva_sim.experiments.report.figures.style import Drawn, finish
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
+from dva_sim.kernel.whole_files import whole, write_whole
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.models import AnyScenario, Tables
 
@@ -152,13 +153,14 @@ class ValidationResult:
             (folder / "figures").mkdir(parents=True, exist_ok=True)
             drawn = self.draw()
             for table, rows in self.tables.items():
-                (folder / f"{table}.csv").write_text(_csv(rows), encoding="utf-8", newline="")
-                _write_parquet(folder / f"{table}.parquet", rows)
+                write_whole(folder / f"{table}.csv", _csv(rows))
+                with whole(folder / f"{table}.parquet") as part:
+                    _write_parquet(part, rows)
             for figure in drawn:
-                (folder / "figures" / f"{figure.name}.svg").write_bytes(figure.svg)
-                (folder / "figures" / f"{figure.name}.png").write_bytes(figure.png)
+                write_whole(folder / "figures" / f"{figure.name}.svg", figure.svg)
+                write_whole(folder / "figures" / f"{figure.name}.png", figure.png)
             path = folder / "index.html"
-            path.write_text(self.page(drawn), encoding="utf-8", newline="\n")
+            write_whole(path, self.page(drawn))
         except OSError as error:
             raise DvaSimError(f"{folder} cannot be written: {error.strerror or error}") from None
         return path

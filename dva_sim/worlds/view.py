@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.whole_files import whole
 from dva_sim.worlds.site import FOOTPRINT, Site
 from dva_sim.worlds.site_parts import Exit
 from dva_sim.worlds.tints import GRASS, PAVING, floor_tint
@@ -261,7 +262,8 @@ def write_poster(site: Site, file: Path, coverage: bool, width: int) -> None:
     """
     figure = poster(site, coverage)
     try:
-        figure.savefig(file, dpi=width / figure.get_figwidth(), facecolor="white")
+        with whole(file) as part:
+            figure.savefig(part, dpi=width / figure.get_figwidth(), facecolor="white")
     except (OSError, ValueError) as error:
         raise ConfigError(f"cannot be written: {error}", file) from error
 

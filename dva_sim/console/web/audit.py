@@ -18,6 +18,7 @@ from starlette.responses import JSONResponse, Response
 
 from dva_sim.console.audit_measures import measured
 from dva_sim.console.web.rest import NOT_KEPT, problem
+from dva_sim.kernel.csv_cells import harmless_row
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.audit_log import (
     COLUMNS,
@@ -31,7 +32,6 @@ from dva_sim.recordings.audit_log import (
 )
 
 MOST_ROWS = 1000  # in one answer
-FORMULAS = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet would compute what begins so
 
 
 class AuditPages:
@@ -134,12 +134,8 @@ def csv_of(rows: Sequence[AuditRow]) -> str:
     writer.writerow(COLUMNS)
     for row in rows:
         plain = plain_row(row) | {"details": json.dumps(row.details, sort_keys=True)}
-        writer.writerow([_harmless(value) for value in plain.values()])
+        writer.writerow(harmless_row(plain.values()))
     return text.getvalue()
-
-
-def _harmless(value: Any) -> Any:
-    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value
 
 
 def json_of(rows: Sequence[AuditRow]) -> str:

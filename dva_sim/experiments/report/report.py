@@ -53,6 +53,7 @@ from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.whole_files import whole, write_whole
 from dva_sim.kernel.wording import capital, listing, number
 from dva_sim.simulation.labels import factor_name, is_in_file, level_name, setting, with_unit
 
@@ -335,13 +336,13 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
     page = folder / PAGE
     try:
         _write_figures(folder / FIGURES, drawn)
-        page.write_text(_page(question, blocks), encoding="utf-8", newline="\n")
+        write_whole(page, _page(question, blocks))
         if pdf or (folder / PAPER).exists():
             from dva_sim.experiments.report.pdf import write_pdf  # late: start-up
 
-            write_pdf(folder / PAPER, question, blocks)
+            with whole(folder / PAPER) as part:
+                write_pdf(part, question, blocks)
     except OSError as error:
-        page.unlink(missing_ok=True)  # half a page would pass for a whole one
         raise DvaSimError(
             f"the report cannot be written in {folder}: {error.strerror}; "
             f"mend that, then 'dva-sim report {folder}' makes it"
@@ -364,7 +365,7 @@ def _write_figures(folder: Path, drawn: Sequence[Drawn]) -> None:
         if stale.suffix in (".svg", ".png", ".csv") and stale.name not in made:
             stale.unlink()
     for name, content in made.items():
-        (folder / name).write_bytes(content)
+        write_whole(folder / name, content)
 
 
 def _page(question: str, blocks: Sequence[Block]) -> str:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import csv
-import os
 import shutil
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from dva_sim.experiments.results.results import Results, quoted
+from dva_sim.experiments.results.results import Results, as_it_stands, quoted
+from dva_sim.kernel.csv_cells import ACTS, harmless, harmless_row
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.kernel.suggestions import either
+from dva_sim.kernel.whole_files import whole
 
 FORMATS = ("csv", "parquet")
 DICTIONARY = "columns.csv"
@@ -85,14 +86,21 @@ def _writer(results: Results, table: str, form: str) -> _Write:
     return partial(write, results.path_of(table))
 
 
+# How a cell is written, by the type of its column; no text acts in a spreadsheet.
+_CELLS = {
+    "DOUBLE": "nullif({0}, 'nan')",
+    "VARCHAR": "CASE WHEN regexp_matches({0}, '" + ACTS + "') THEN '''' || {0} ELSE {0} END",
+}
+
+
 def _write_csv(source: Path, path: Path) -> None:
     """What is nan is as empty as what is missing: both say that there is no number."""
     import duckdb
 
     with duckdb.connect(config={"threads": 1}) as connection:
-        rows = connection.read_parquet(str(source))
+        rows = connection.read_parquet(as_it_stands(source))
         columns = ", ".join(
-            f"nullif({quoted(n)}, 'nan') AS {quoted(n)}" if kind == "DOUBLE" else quoted(n)
+            f"{_CELLS.get(str(kind), '{0}').format(quoted(n))} AS {quoted(harmless(n))}"
             for n, kind in zip(rows.columns, rows.types, strict=True)
         )
         rows.project(columns).write_csv(str(path), header=True)
@@ -103,20 +111,17 @@ def _write_dictionary(results: Results, tables: Sequence[str], path: Path) -> No
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("table", "column", "unit", "meaning"))
         for table in tables:
-            writer.writerows(results.columns(table))
+            writer.writerows(map(harmless_row, results.columns(table)))
 
 
 def _put(path: Path, write: _Write) -> None:
     """A file whole or not at all."""
     import duckdb
 
-    part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write(part)
-        part.replace(path)
+        with whole(path) as part:
+            write(part)
     except (OSError, duckdb.Error) as error:
         reason = str(error).splitlines()[0]
         raise DvaSimError(f"{path} cannot be written: {reason}") from None
-    finally:
-        part.unlink(missing_ok=True)

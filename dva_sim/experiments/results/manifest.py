@@ -6,7 +6,6 @@ What differs from machine to machine is apart, in a file of its own.
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -30,6 +29,7 @@ from dva_sim.experiments.study.own_measures import columns_told, own_measures
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.experiments.study.tuning import load_tuned
 from dva_sim.kernel.errors import DvaSimError, RunTooLong
+from dva_sim.kernel.whole_files import write_whole
 
 _PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
 
@@ -121,13 +121,9 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
     Raises:
         DvaSimError: the disk is full or refuses to be written.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
     try:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        part.replace(path)
+        write_whole(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
 
 

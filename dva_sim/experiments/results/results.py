@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -388,7 +389,7 @@ class Results:
     def _read(self, name: str, columns: str, rows: str, part: str | None = None) -> Frame:
         import duckdb
 
-        file = str(self.path_of(name))
+        file = as_it_stands(self.path_of(name))
         values = [file] if part is None else [file, part]
         try:
             with _database().cursor() as cursor:
@@ -426,6 +427,11 @@ def _database() -> DuckDBPyConnection:
     import duckdb
 
     return duckdb.connect(config={"threads": 1, "enable_external_file_cache": False})
+
+
+def as_it_stands(path: Path) -> str:
+    """A path for DuckDB, to which `?`, `*` and `[` in it would mean several files."""
+    return re.sub(r"[?*\[]", r"[\g<0>]", str(path))
 
 
 def quoted(name: str) -> str:

@@ -137,12 +137,15 @@ class _Table:
 
         config: dict[str, str | bool | int | float | list[str]]
         config = {"threads": 1, "preserve_insertion_order": True}
-        apart = tempfile.mkdtemp(dir=self._folder)
-        self._database = duckdb.connect(str(Path(apart) / "rows.duckdb"), config=config)
+        odd = "?" in str(self._folder.absolute())  # behind which DuckDB expects options
+        self._apart = tempfile.TemporaryDirectory(dir=None if odd else self._folder)
+        file = Path(self._apart.name) / "rows.duckdb"
+        self._database = duckdb.connect(str(file), config=config)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._database.close()
+        self._apart.cleanup()
 
     def add(self, rows: list[Row]) -> None:
         """Take some rows in."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.kernel.whole_files import whole
 from dva_sim.simulation.full import Playback
 from dva_sim.simulation.scenario import Scenario
 
@@ -129,11 +130,13 @@ class Wanted:
             if self.camera is not None:
                 stills.save_eye(recordings[0], self.camera, time, self.still)
             else:
-                stills.still(recordings, time).savefig(self.still)
+                with whole(self.still) as part:
+                    stills.still(recordings, time).savefig(part)
             yield f"Still: {self.still}"
         if self.strip is not None:
             times = self.times or stills.even_times(recordings, self.panels)
-            stills.strip(recordings, times).savefig(self.strip)
+            with whole(self.strip) as part:
+                stills.strip(recordings, times).savefig(part)
             yield f"Strip: {self.strip}"
         if self.video is not None:
             film.write_film(Film(recordings, self.inset), self.video)

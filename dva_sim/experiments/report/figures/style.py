@@ -20,6 +20,7 @@ from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.study.parts import Level
+from dva_sim.kernel.csv_cells import harmless, harmless_row
 from dva_sim.kernel.units import ending_of, unit_of
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, factor_name, level_name, measure_name
@@ -59,8 +60,8 @@ class Numbers:
         heads = list(dict.fromkeys(key for row in self._rows for key in row))
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(heads)
-        writer.writerows([_text(row.get(head)) for head in heads] for row in self._rows)
+        writer.writerow(harmless_row(heads))
+        writer.writerows([_text(harmless(row.get(h))) for h in heads] for row in self._rows)
         return text.getvalue().encode()
 
 

@@ -1,0 +1,52 @@
+"""Files that are there whole or not at all, whatever happens while they are written."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Give a path to write to, which takes the place of `path` if the block ends without an error.
+
+    It has the same ending, by which some writers know the format.
+    """
+    _clear(path)
+    part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _clear(path: Path) -> None:
+    """Remove what processes that were killed have left beside a file."""
+    for part in path.parent.glob(f".{glob.escape(path.stem)}.*{glob.escape(path.suffix)}"):
+        owner = part.name.removeprefix(f".{path.stem}.").removesuffix(path.suffix)
+        if owner.isdecimal() and not _lives(int(owner)):
+            part.unlink(missing_ok=True)
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is somebody else's
+        return True
+    return True
+
+
+def write_whole(path: Path, content: bytes | str) -> None:
+    """Write bytes, or text in UTF-8 as it stands.
+
+    Raises:
+        OSError: it cannot be written; what was there is as it was.
+    """
+    with whole(path) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
