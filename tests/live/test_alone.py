@@ -4,6 +4,7 @@ import math
 from contextlib import nullcontext
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim.cli import call
 from dva_sim.kernel.errors import RunsFailed
@@ -25,14 +26,14 @@ def _impatient(monkeypatch):
 def test_a_part_that_no_dva_answers_says_so_and_what_to_do(capsys, part):
     assert call(["live", "drive-to-event", "--only", part, "--dva", "127.0.0.1:9"]) == 3
     said = capsys.readouterr()
-    assert said.out.startswith("Looking for the DVA at 127.0.0.1:9 for 0.2 s ...")
+    assert unnamed(said.out, "127.0.0.1:9", "0.2 s") == []
     (line,) = said.err.splitlines()
-    assert line.startswith("error: no DVA answered at 127.0.0.1:9 within 0.2 s; start it there")
+    assert unnamed(line, "error: ", "127.0.0.1:9", "0.2 s") == []
 
 
 def test_a_dva_that_no_device_joins_says_so_at_its_end():
     options = LiveOptions("drive-to-event", duration=0.2)
-    with pytest.raises(NobodyThere, match=r"no device joined the DVA at 127\.0\.0\.1:\d+ within"):
+    with pytest.raises(NobodyThere, match=r"no device .* 127\.0\.0\.1:\d+ "):
         run_part("dva", options, lambda _: None)
     assert issubclass(NobodyThere, RunsFailed)
 
@@ -62,23 +63,9 @@ class NotAsked:
     is_asked = False
 
 
-@pytest.mark.parametrize("words", ["foo", "foo:", "127.0.0.1", "127.0.0.1:x", ":5600", ""])
-def test_an_address_of_the_dva_has_a_host_and_a_port(capsys, words):
-    assert call(["live", "drive-to-event", "--dva", words]) == 2
-    told = f"error: --dva {words!r} should be HOST:PORT, as in 127.0.0.1:5600\n"
-    assert capsys.readouterr().err == told
-
-
-def test_what_the_site_has_no_place_for_is_told_at_its_setting_by_a_part_too(capsys):
-    assert call(["live", "drive-to-event", "--only", "world", "--set", "robot.count=900"]) == 2
-    assert capsys.readouterr().err.startswith(
-        "error: --set robot.count=900: site 'caparica' has room for 2"
-    )
-
-
-def test_a_host_that_is_not_this_machine_is_told_at_once(capsys):
-    assert call(["live", "drive-to-event", "--only", "dva", "--dva", "192.0.2.1:5600"]) == 2
-    assert "error: cannot listen on 192.0.2.1, ports 5600" in capsys.readouterr().err
-    words = ["live", "drive-to-event", "--only", "operator", "--host", "192.0.2.1"]
-    assert call(words) == 2
-    assert "error: cannot listen on 192.0.2.1: " in capsys.readouterr().err
+@pytest.mark.parametrize(
+    "words", [("dva", "--dva", "192.0.2.1:5600"), ("operator", "--host", "192.0.2.1")]
+)
+def test_a_host_that_is_not_this_machine_is_told_at_once(capsys, words):
+    assert call(["live", "drive-to-event", "--only", *words]) == 2
+    assert unnamed(capsys.readouterr().err, "error: ", "192.0.2.1", "listen") == []

@@ -1,9 +1,13 @@
-"""Mistakes in the words of `dva-sim live` that no process has to be started for."""
+"""Mistakes in the words of `dva-sim live` that no process has to be started for, and ports."""
+
+from itertools import islice
 
 import pytest
 from helpers.processes.command_line import call
+from helpers.wording import unnamed
 
 from dva_sim.live import supervisor
+from dva_sim.simulation import scenario as scenarios
 
 
 @pytest.mark.system
@@ -18,11 +22,12 @@ from dva_sim.live import supervisor
         (["--only", "operator", "--number", "0"], "should be a whole number of at least 1"),
         (["--operators", "idle"], "should be simulated or scripted"),
         (["--port", "70000"], "should be a whole number from 0 to 64999"),
-        (["--dva", "a:b:c"], "should be HOST:PORT"),
-        (["--dva", "127.0.0.1:65535"], "should be HOST:PORT"),
+        *((["--dva", dva], "HOST:PORT") for dva in ("a:b:c", "127.0.0.1:65535", "foo", "foo:", "")),
+        *((["--dva", dva], "HOST:PORT") for dva in ("127.0.0.1", "127.0.0.1:x", ":5600")),
         (["--for", "-1"], "--for '-1' should be a number above 0"),
         (["--for", "nan"], "--for 'nan' should be a number above 0"),
         (["--set", "robot.count=900"], "--set robot.count=900: site 'caparica' has room for 2"),
+        (["--only", "world", "--set", "robot.count=900"], "--set robot.count=900: site 'caparica'"),
         (["--record", "/dev/null"], "recording should end in .mcap, not 'null'; a folder for"),
         (["--record", "run.mcp"], "recording should end in .mcap, not 'run.mcp'; a folder for"),
         (["--record", "no/run.mcap"], "folder 'no' for the recording does not exist"),
@@ -46,6 +51,13 @@ def test_a_mistake_ends_in_one_line_before_anything_is_started(tmp_path, monkeyp
     ended = call("live", "drive-to-event", "--for", "60", *words, cwd=tmp_path)
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
-    assert line.startswith("error: ")
-    assert said in line
+    assert unnamed(line, "error: ", said) == []
     assert (tmp_path / "there.mcap").read_text() == "of an earlier run"
+
+
+@pytest.mark.parametrize(("first", "ports"), [(7000, [7002, 7014, 7016]), (0, [0, 0, 0])])
+def test_each_device_has_two_ports_in_a_row_from_the_first_or_free_ones(first, ports):
+    """The DVA has the first two; the drill's world has 2 robots, 2 guards and 2 detectors."""
+    drill = scenarios.build(scenarios.load("fire-drill"))
+    assert (drill.robot.count, drill.guard.count, len(drill.events)) == (2, 2, 2)
+    assert list(islice(supervisor._ports(first, drill), 3)) == ports

@@ -1,5 +1,6 @@
 """`dva-sim live` as users run it: real processes, real sockets, real signals."""
 
+import errno
 import json
 import os
 import re
@@ -60,19 +61,15 @@ def test_a_run_tells_its_story_shows_all_devices_and_ends_when_its_script_is_don
     run = programs.start(*SCRIPTED, "--record", "traces")
     assert run.ends() == 0, run.complained
     assert all_held(run)
-    for line in ("breaks out", "is now in mode Teleoperation", "is now in mode Idle"):
-        assert line in run.said
-    for line in ("200 of 200 commands obeyed", "an emergency: obeyed", "refused (wrong mode)"):
-        assert line in run.said
+    words = ("breaks out", "mode Teleoperation", "mode Idle", "200 of 200 commands")
+    assert unnamed(run.said, *words, "an emergency: obeyed", "refused (wrong mode)") == []
     first, *lines = run.said.partition("after ")[0].splitlines()
     assert first.startswith("DVA: 127.0.0.1:")
     story = [float(line.split(" s ")[0]) for line in lines]
     assert story == sorted(story)
-    # Nobody who follows a script goes to the fire.
-    assert "The run ended (the script is done): event 1 (fire) is pending." in run.said
-    table = run.said[run.said.rindex("is now in mode Idle") :]
-    for device in ("robot-1", "operator-1"):
-        assert device in table
+    table = run.said[run.said.rindex("mode Idle") :]
+    words = ("(the script is done)", "robot-1", "operator-1", "event 1 (fire)")
+    assert unnamed(table, *words, "pending") == []  # nobody who follows a script goes there
     assert run.complained == []
     assert programs.processes() == {}
 
@@ -106,8 +103,8 @@ def test_a_robot_that_answers_an_emergency_and_ignores_it_lets_no_run_end_as_don
     assert run.ends() == 1
     assert "an emergency: obeyed" in run.said
     story, told = [line for line in run.said.splitlines() if "S3 broken" in line]
-    assert re.fullmatch(r" +\d+\.\d s  robot-1 +S3 broken: obeys a command after an .*", story)
-    assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: obeys a command after an .*", told)
+    assert re.fullmatch(r" +[\d.]+ s  robot-1 +S3 broken: .*", story)
+    assert re.fullmatch(r"S3 broken: robot-1, at \d+\.\d s.*: .*", told)
     (complaint,) = run.complained  # on a busy machine S1, too: it moves for longer than allowed
     assert unnamed(complaint, "S3") == []
     ended = call("check", tmp_path / "run.mcap")
@@ -137,36 +134,34 @@ def test_a_run_leaves_a_recording_that_is_replayed_and_whose_decisions_hold(prog
     assert "robot-1" in opened.playback.recorder.tracks
     told = call("replay", file, "--still", "still.png", cwd=tmp_path)
     assert told.returncode == 0, told.stderr
-    for line in ("breaks out", "an emergency: obeyed", "refused (wrong mode)", "event 1 (fire) is"):
-        assert line in told.stdout
+    words = ("breaks out", "an emergency: obeyed", "refused (wrong mode)", "event 1 (fire)")
+    assert unnamed(told.stdout, *words) == []
     assert not list(tmp_path.glob("*.part"))
 
 
 @pytest.mark.usefixtures("briefly")
 def test_the_robots_go_on_when_the_disk_becomes_full(programs, tmp_path):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
-    run.wait_to_say("is now in mode Teleoperation")
+    run.wait_to_say("mode Teleoperation")
     resource.prlimit(run.process.pid, resource.RLIMIT_FSIZE, (50_000, 50_000))
     assert run.ends() == 2
-    assert "20 of 20 commands obeyed" in run.said
-    assert "The run ended (the script is done)" in run.said
+    assert unnamed(run.said, "20 of 20 commands", "(the script is done)") == []
     (complaint,) = run.complained
-    assert complaint.startswith("error: run.mcap was not recorded: File too large")
-    assert "run.mcap.part" in complaint
+    assert unnamed(complaint, "error: run.mcap ", os.strerror(errno.EFBIG), "run.mcap.part") == []
     assert call("replay", tmp_path / "run.mcap.part").returncode == 0
 
 
 def test_a_run_lasts_as_long_as_it_is_told_to(programs):
     run = programs.start(*SCRIPTED, "--for", "3")
     assert run.ends() == 0
-    assert "The run ended (time is up)" in run.said
+    assert "(time is up)" in run.said
     assert programs.processes() == {}
 
 
 def test_a_simulated_person_drives_to_the_fire_and_confirms_it(programs, tmp_path):
     run = programs.start("live", "drive-to-event", *NEAR, "--record", "traces")
     assert run.ends() == 0, run.complained
-    assert "The run ended (settled): event 1 (fire) is confirmed." in run.said
+    assert unnamed(run.said, "(settled)", "event 1 (fire)", "confirmed") == []
     assert all_held(run)
     assert programs.processes() == {}
     decided = list(replay(tmp_path / "traces" / "robot-1.trace.jsonl"))
@@ -179,11 +174,11 @@ def test_a_simulated_person_drives_to_the_fire_and_confirms_it(programs, tmp_pat
 
 def test_a_run_that_is_interrupted_ends_cleanly(programs):
     run = programs.start("live", "drive-to-event")
-    run.wait_to_say("is now in mode Teleoperation")
+    run.wait_to_say("mode Teleoperation")
     run.send(signal.SIGTERM)
     assert run.ends() == 0
     assert "The run ended (interrupted)" in run.said
-    assert run.said.rindex("is now in mode Idle") > run.said.rindex("is now in mode Teleoperation")
+    assert run.said.rindex("mode Idle") > run.said.rindex("mode Teleoperation")
     assert run.complained == []
     assert programs.processes() == {}
 
@@ -193,7 +188,7 @@ def test_a_run_can_be_interrupted_before_anything_has_happened(programs):
     programs.process_of("dva")
     run.send(signal.SIGINT)
     assert run.ends() == 0
-    assert "The run ended (interrupted): no event was reported." in run.said
+    assert unnamed(run.said, "(interrupted)", "no event") == []
     assert programs.processes() == {}
 
 
@@ -201,18 +196,17 @@ def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_repla
     programs, tmp_path
 ):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
-    run.wait_to_say("is now in mode Teleoperation")
+    run.wait_to_say("mode Teleoperation")
     run.send(signal.SIGKILL)
     assert run.ends() == -signal.SIGKILL
     programs.wait_for_none()
     again = call(*SCRIPTED, "--record", "run.mcap", cwd=tmp_path)
     assert again.returncode == 2
-    assert "run.mcap.part" in again.stderr
-    assert "dva-sim replay" in again.stderr
+    assert unnamed(again.stderr, "run.mcap.part", "dva-sim replay") == []
     left = (tmp_path / "run.mcap.part").read_bytes()
     told = call("replay", tmp_path / "run.mcap.part", "--mcap", tmp_path / "run.mcap")
     assert told.returncode == 0, told.stderr
-    assert "is now in mode Teleoperation" in told.stdout
+    assert "mode Teleoperation" in told.stdout
     assert count_in(tmp_path / "run.mcap", b"<StartTeleOp") > 0
     assert (tmp_path / "run.mcap.part").read_bytes() == left
 
@@ -220,11 +214,12 @@ def test_parts_whose_supervisor_is_killed_end_and_what_was_recorded_can_be_repla
 @pytest.mark.parametrize("part", ["world", "operator"])
 def test_a_part_that_is_killed_ends_the_run_and_what_it_said_is_kept(programs, tmp_path, part):
     run = programs.start(*SCRIPTED, "--record", "run.mcap")
-    run.wait_to_say("is now in mode Teleoperation")
+    run.wait_to_say("mode Teleoperation")
     os.kill(programs.process_of(part), signal.SIGKILL)
     assert run.ends() == 3
     name = "operator-1" if part == "operator" else part
-    assert run.complained == [f"error: {name} has ended by itself: exit code -9"]
+    (complaint,) = run.complained
+    assert unnamed(complaint, f"error: {name} ", "exit code -9") == []
     assert programs.processes() == {}
     assert count_in(tmp_path / "run.mcap", b"<StartTeleOp") > 0
     assert set(read_recording(tmp_path / "run.mcap").traces) == {"dva", "robot-1"}
@@ -237,8 +232,7 @@ def test_a_mistake_that_a_part_finds_ends_in_one_line_and_exit_code_2(programs):
     run = programs.start("live", "drive-to-event", "--for", "60", "--keys", ".")
     assert run.ends() == 2
     (line,) = run.complained
-    assert line.startswith("error: ")
-    assert "holds no keys" in line
+    assert unnamed(line, "error: ", "no keys") == []
     assert programs.processes() == {}
 
 
@@ -253,8 +247,7 @@ def test_a_port_that_is_taken_ends_in_one_line(programs, address):
             run = programs.start(*words)
             assert run.ends() == 2
         (line,) = run.complained
-        assert f"cannot listen on 127.0.0.1, ports {port} and {port + 1}" in line
-        assert "Address already in use" in line
+        assert unnamed(line, "127.0.0.1", port, port + 1, os.strerror(errno.EADDRINUSE)) == []
     assert programs.processes() == {}
 
 
@@ -267,7 +260,7 @@ def test_three_parts_started_by_hand_work_together(programs, address):
     parts.append(programs.start(*SCRIPTED, "--only", "operator", *at))
     dva, world, operator = parts
     dva.wait_to_say(f"DVA: {address}\n", "event 1 (fire) is pending")
-    world.wait_to_say("is now in mode Teleoperation", "is now in mode Idle")
+    world.wait_to_say("mode Teleoperation", "mode Idle")
     for part in reversed(parts):
         part.send(signal.SIGINT)
         assert part.ends() == 0
@@ -283,7 +276,7 @@ def test_parts_may_start_before_the_dva(programs, address):
     world = programs.start(*SCRIPTED, "--only", "world", *at)
     world.wait_to_say("breaks out")  # both have found nobody so far
     programs.start(*SCRIPTED, "--only", "dva", *at)
-    world.wait_to_say("is now in mode Teleoperation", "is now in mode Idle")
+    world.wait_to_say("mode Teleoperation", "mode Idle")
     assert (operator.process.poll(), world.process.poll()) == (None, None)
 
 
@@ -302,7 +295,7 @@ def test_devices_register_again_at_a_dva_that_was_killed_and_is_back(programs, a
     dva = programs.start(*SCRIPTED, "--only", "dva", *at)
     world = programs.start(*SCRIPTED, "--only", "world", *at, "--record", "traces")
     operator = programs.start(*SCRIPTED, "--only", "operator", *at)
-    world.wait_to_say("is now in mode Teleoperation")
+    world.wait_to_say("mode Teleoperation")
     for part in (dva, operator):
         part.send(signal.SIGKILL)
         assert part.ends() == -signal.SIGKILL
@@ -323,7 +316,7 @@ def test_a_dva_that_was_killed_remembers_its_events_and_goes_on_with_them(
     dva = programs.start(*live, *keeps, "--record", "first")
     world = programs.start(*live, "--only", "world")
     programs.start(*live, "--only", "operator")
-    world.wait_to_say("is now in mode Teleoperation")
+    world.wait_to_say("mode Teleoperation")
     dva.send(signal.SIGKILL)
     assert dva.ends() == -signal.SIGKILL
     again = programs.start(*live, *keeps, "--record", "second")
