@@ -27,22 +27,31 @@ SPECIFICATION = ROOT / "protocol" / "README.md"
 ROBOT = id_of("robot", 1)
 
 
+QUIET = {"events": [{"kind": "fire", "at_s": 500}]}
+
+
 @pytest.fixture
 def network():
-    clock = LiveClock()
-    network = SocketNetwork(clock)
+    network = SocketNetwork(LiveClock())
     yield network
     network.close()
 
 
-def live_until(clock, condition):
-    def look():
-        if condition():
-            clock.stop()
-            return False
-        return None
+def scenario_of(name="drive-to-event", changes=QUIET):
+    return scenarios.build(scenarios.load(name), changes)
 
-    clock.every(0.05, look)
+
+def a_dva(network, scenario):
+    """A DVA, and the world of its devices."""
+    join = lambda kind, number: network.join(id_of(kind, number))  # noqa: E731
+    stage = Stage(scenario, 1, network, Recorder(), join)
+    dva, field = add_dva(stage), Field(stage)
+    field.populate()
+    return dva, field
+
+
+def live_until(clock, condition):
+    clock.every(0.05, lambda: not condition() or bool(clock.stop()))
     clock.run(clock.now + PATIENCE_S)
 
 
@@ -57,7 +66,7 @@ def programs_of_the_specification():
     return [*others, beats, lock]
 
 
-def run(code, dva, clock, folder):
+def run(code, dva, folder):
     """What a program prints that is given the address of a DVA."""
     program = folder / "client.py"
     program.write_text(code)
@@ -68,7 +77,7 @@ def run(code, dva, clock, folder):
         text=True,
     )
     try:
-        live_until(clock, lambda: client.poll() is not None)
+        live_until(dva.device.clock, lambda: client.poll() is not None)
     finally:
         client.kill()
         out, err = client.communicate()
@@ -76,25 +85,17 @@ def run(code, dva, clock, folder):
 
 
 def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
-    quiet = {"events": [{"kind": "fire", "at_s": 500}]}
-    scenario = scenarios.build(scenarios.load("drive-to-event"), quiet)
-    stage = Stage(
-        scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
-    )
-    dva = add_dva(stage)
-    field = Field(stage)
-    field.populate()
+    dva, field = a_dva(network, scenario_of())
     robot = field.robots[ROBOT]
-    clock = network.clock
-    live_until(clock, lambda: dva.beats[ROBOT] > 0)
+    live_until(network.clock, lambda: dva.beats[ROBOT] > 0)
 
     code = programs_of_the_specification()[0]
     assert len(code.splitlines()) <= 30
-    out, err = run(code, dva, clock, tmp_path)
+    out, err = run(code, dva, tmp_path)
     assert (out.endswith("code 0\n"), err) == (True, "")
     assert robot.applied == 20
     assert robot.controller.without_tick == 20
-    field.world.advance_to(clock.now)
+    field.world.advance_to(network.clock.now)
     assert robot.body.distance > 0.3
     assert robot.controller.mode == "Idle"
 
@@ -103,34 +104,25 @@ def test_the_client_of_the_specification_drives_a_robot(network, tmp_path):
 def test_a_client_of_another_make_drives_with_keys_and_not_without(tmp_path, is_known):
     code = programs_of_the_specification()
     me = re.search(r'ME, DVA, sent = "(.*?)"', code[0])[1]
-    scenario = scenarios.build(
-        scenarios.load("drive-to-event"), {"events": [{"kind": "fire", "at_s": 500}]}
-    )
-    folder = tmp_path / "keys"
+    scenario, folder = scenario_of(), tmp_path / "keys"
     told = call("keys", folder, "dva", "robot-1", *team_of(scenario), *([me] if is_known else []))
     assert told.returncode == 0, told.stderr
-    clock = LiveClock()
-    network = SocketNetwork(clock, KeyRing(folder))
+    network = SocketNetwork(LiveClock(), KeyRing(folder))
     own = folder
     if not is_known:
         own = tmp_path / "own"  # the device has keys that nobody has been given
         shutil.copytree(folder, own)
         call("keys", own, me)
     try:
-        stage = Stage(
-            scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
-        )
-        dva = add_dva(stage)
-        field = Field(stage)
-        field.populate()
-        live_until(clock, lambda: dva.beats[ROBOT] > 0)
+        dva, field = a_dva(network, scenario)
+        live_until(network.clock, lambda: dva.beats[ROBOT] > 0)
         program = code[0].replace("def ask(", f"{code[-1]}\ndef ask(")
         for name, server in (("dva", "DVA"), ("robot", "it")):
             locked = f"lock({name}, {str(own)!r}, {server})\n{name}.connect("
             program = program.replace(f"{name}.connect(", locked)
         if not is_known:
             program = program.replace("dva.connect(", "dva.rcvtimeo = 1000; dva.connect(")
-        out, err = run(program, dva, clock, tmp_path)
+        out, err = run(program, dva, tmp_path)
     finally:
         network.close()
     if is_known:
@@ -151,19 +143,13 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
         "dispatch.mode": "ask_first",
         "dva.control_rooms": {me: "dispatch"},
     }
-    scenario = scenarios.build(scenarios.load("fire-drill"), changes)
-    stage = Stage(
-        scenario, 1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))
-    )
-    dva = add_dva(stage)
-    field = Field(stage)
-    field.populate()
+    dva, field = a_dva(network, scenario_of("fire-drill", changes))
     field.schedule_incidents()
     guards = [id_of("guard", 1), id_of("guard", 2)]
     live_until(network.clock, lambda: all(dva.desk.registry.entries.get(g) for g in guards))
     live_until(network.clock, lambda: dva.desk.registry.located("Guard"))
     code = client.partition("dva, robot =")[0] + control_room
-    out, err = run(code, dva, network.clock, tmp_path)
+    out, err = run(code, dva, tmp_path)
     assert (out.startswith("code 0"), err) == (True, "")
     event = dva.desk.book.get(1)
     assert event.handling.acknowledged.author == me
@@ -172,16 +158,12 @@ def test_the_control_room_of_the_specification_acknowledges_and_sends_as_propose
 
 def test_a_client_of_another_make_hears_the_heartbeats_of_the_dva(network, tmp_path):
     client, *_, beats, _ = programs_of_the_specification()
-    stage = Stage(
-        scenarios.build(scenarios.load("drive-to-event"), {}),
-        *(1, network, Recorder(), lambda kind, number: network.join(id_of(kind, number))),
-    )
-    dva = add_dva(stage)
+    dva, _ = a_dva(network, scenario_of())
     dva.start()
     code = client.partition("dva, robot =")[0] + beats
     code += "while True:\n    before = heard\n    if silence() < 1 and heard != before: break\n"
     code += "    time.sleep(0.01)\nprint('it is there')\n"
-    assert run(code, dva, network.clock, tmp_path) == ("it is there\n", "")
+    assert run(code, dva, tmp_path) == ("it is there\n", "")
 
 
 def test_two_lives_of_the_client_within_a_second_differ_in_their_bytes(monkeypatch):

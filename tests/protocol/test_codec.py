@@ -1,10 +1,9 @@
 import math
-from typing import get_args
 
 import numpy as np
 import pytest
-from helpers.messages.message_strategies import BODIES, ROBOT, TABLET, message, messages
-from helpers.paths import ROOT
+from helpers.messages.message_oracle import SCHEMA
+from helpers.messages.message_strategies import ROBOT, TABLET, message, messages
 from helpers.processes.search_settings import search
 from hypothesis import given
 from lxml import etree
@@ -13,12 +12,6 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode, timestamp
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.schema import MAX_BYTES
-
-SCHEMA = etree.XMLSchema(file=str(ROOT / "protocol" / "dva.xsd"))
-
-
-def test_every_body_has_a_strategy():
-    assert set(BODIES) == set(get_args(m.Body))
 
 
 @search(40)

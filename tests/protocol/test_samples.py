@@ -5,6 +5,7 @@ from contextlib import suppress
 from typing import get_args
 
 import pytest
+from helpers.messages.message_oracle import BODY_ELEMENTS, SCHEMA
 from helpers.paths import ROOT, TESTS
 from lxml import etree
 
@@ -13,19 +14,11 @@ from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
 PROTOCOL = ROOT / "protocol"
-SCHEMA = etree.XMLSchema(file=str(PROTOCOL / "dva.xsd"))
 VALID = sorted((PROTOCOL / "samples" / "valid").glob("*.xml"))
 INVALID = sorted((PROTOCOL / "samples" / "invalid").glob("*.xml"))
 ROW = re.compile(r"^\| `([\w-]+\.xml)` \| `(\w+)` \| (.+) \| (XML|schema|rule) \|$", re.MULTILINE)
 ROWS = ROW.findall((PROTOCOL / "samples/README.md").read_text())
 FOUND_BY = {name: by for name, _, _, by in ROWS}
-ELEMENTS = {
-    m.Emergency: "EmergencyMsg",
-    m.Heartbeat: "HBMsg",
-    m.Registration: "RegMsg",
-    m.Reply: "reply",
-}
-
 
 NEW = {
     "1.4": {
@@ -91,7 +84,7 @@ def test_every_invalid_sample_is_explained():
 
 def test_there_is_an_invalid_sample_of_every_message_and_it_is_of_that_message():
     named = {name: element for name, element, _, _ in ROWS}
-    assert set(named.values()) >= {ELEMENTS.get(body, body.__name__) for body in get_args(m.Body)}
+    assert set(named.values()) >= BODY_ELEMENTS
     misspelt = {"cancel-mission-misspelt.xml"}
     for path in INVALID:
         if path.name not in misspelt:

@@ -1,4 +1,6 @@
-"""One strategy per body: everything the protocol can say, at its bounds too."""
+"""One strategy per body, by the types and names of its fields: all the protocol can say."""
+
+from typing import Any, get_args, get_origin, get_type_hints
 
 from hypothesis import strategies as st
 
@@ -19,206 +21,74 @@ def characters(least: int, most: int) -> st.SearchStrategy[str]:
     return st.text(allowed, min_size=least, max_size=most)
 
 
+def one_word(words: str) -> st.SearchStrategy[str]:
+    return st.sampled_from(words.split())
+
+
 ids = st.from_regex(r"\A[0-9A-F]{2}(:[0-9A-F]{2}){5}\Z")
 clocks = st.from_regex(r"\A([01][0-9]|2[0-3])(:[0-5][0-9]){2}(\.[0-9]{1,9})?\Z")
-addresses = st.ip_addresses(v=4).map(str) | st.ip_addresses(v=4).map("{}:5556".format)
-urls = st.text(st.characters(min_codepoint=0x21, max_codepoint=0x7E), min_size=1, max_size=256)
-names = characters(1, 64)
 numbers = st.integers(1, UINT32)
-counts = st.integers(0, UINT32)
-ticks = st.integers(0, 2**53 - 1)
-positions = st.builds(m.Position, real(-90, 90), real(-180, 180))
-speeds = turn_rates = real(-100, 100)
-shares = real(0, 1)
-kinds = st.sampled_from(["fire", "gas_leak", "flood"])
-tasks = st.sampled_from(["confirm", "contain", "stand_by"])
-levels = st.sampled_from(["teleoperation", "missions", "both", "sensors"])
-
-sessions = st.integers(1, UINT64)
-sensor_names = st.lists(names, max_size=4).map(tuple)
-sensors = st.builds(m.Sensor, names, names)
-granted = levels, sessions, st.none() | addresses, sensor_names
-
-measured = st.lists(real(-1e8, 1e8), min_size=1, max_size=40).map(tuple)
-mission_states = st.sampled_from(["none", "under_way", "waiting", "replanning", "done", "failed"])
-mission_statuses = st.builds(
-    m.MissionStatus,
-    st.integers(0, UINT32),
-    mission_states,
-    st.integers(0, 64),
-    characters(0, 256),
-)
-devices = st.builds(m.Device, ids, names, names, addresses)
-held = real(0, 1e6)
-spans, texts, maybe_text = real(0, 1e6), characters(0, 256), st.none() | characters(0, 256)
-maybe_tasks, maybe_count, maybe_ids = st.none() | tasks, st.none() | counts, st.none() | ids
-modes_of_dispatch = st.sampled_from(["automatic", "ask_first"])
-roles = st.none() | st.sampled_from(["look", "drive", "dispatch", "supervise"])
-by_whom = st.none() | st.builds(m.ByWhom, ids, names, spans)
-event_statuses = st.builds(
-    m.EventStatus,
-    numbers,
-    kinds,
-    positions,
-    shares,
-    shares,
-    st.sampled_from(
-        [
-            "pending",
-            "assigned",
-            "on_scene",
-            "confirmed",
-            "contained",
-            "refuted",
-            "escalated",
-            "expired",
-        ]
+STRATEGIES: dict[str, st.SearchStrategy[Any]] = {
+    "actor advised author device holder id_tag operator responder": ids,
+    "action activity device_type label name policy sensor sensors unit": characters(1, 64),
+    "note reason text": characters(0, 256),
+    "age ago advised_in arrival_in bid_within closed_for decide_within held_for": real(0, 1e6),
+    "state_for": real(0, 1e6),
+    "confidence severity": real(0, 1),
+    "speed turn_rate": real(-100, 100),
+    "frequency": real(0, 1000),
+    "heading": real(-1e6, 1e6),
+    "latitude": real(-90, 90),
+    "longitude": real(-180, 180),
+    "values": real(-1e8, 1e8),
+    "event_id": numbers,
+    "answers decisions mission_id": st.integers(0, UINT32),
+    "code": st.integers(0, 999),
+    "laps": st.integers(0, 1000),
+    "seen_tick tick": st.integers(0, 2**53 - 1),
+    "session": st.integers(1, UINT64),
+    "waypoints_left": st.integers(0, 64),
+    "address": st.ip_addresses(v=4).map(str) | st.ip_addresses(v=4).map("{}:5556".format),
+    "camera_url": st.text(
+        st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=256
     ),
-    spans,
-    spans,
-    counts,
-    st.none() | spans,
-    maybe_tasks,
-    maybe_ids,
-    maybe_ids,
-    maybe_ids,
-    by_whom,
-    st.none() | st.builds(m.LastDecision, ids, names, names, spans, maybe_text),
-    st.none() | st.builds(m.Proposed, ids, tasks, spans, spans),
-    maybe_text,
-)
-dispatch_statuses = st.builds(m.DispatchStatus, modes_of_dispatch, spans, by_whom, roles)
-candidates = st.builds(m.Candidate, ids, names, texts, st.none() | spans)
-contents = st.one_of(
-    st.none(),
-    st.builds(m.EventList, st.lists(event_statuses, max_size=2).map(tuple)),
-    event_statuses,
-    st.builds(
-        m.Proposal,
-        numbers,
-        names,
-        texts,
-        maybe_tasks,
-        maybe_ids,
-        st.none() | spans,
-        st.none() | spans,
-        st.lists(candidates, max_size=3).map(tuple),
+    "dispatch_mode": one_word("automatic ask_first"),
+    "event_state": one_word(
+        "pending assigned on_scene confirmed contained refuted escalated expired"
     ),
-    dispatch_statuses,
-    st.builds(m.DeviceList, st.lists(devices, max_size=6).map(tuple)),
-    st.builds(m.SensorInfo, urls, st.lists(sensors, max_size=4).map(tuple)),
-    st.builds(m.Permission, ids, *granted),
-    mission_statuses,
-    st.builds(m.Holder, ids, names, held),
-    st.builds(m.SessionFloor, sessions),
-    st.builds(
-        m.SensorList,
-        st.lists(
-            st.builds(
-                m.DeviceSensors, ids, st.none() | urls, st.lists(sensors, max_size=3).map(tuple)
-            ),
-            max_size=3,
-        ).map(tuple),
-    ),
-)
-BODIES: dict[type, st.SearchStrategy[m.Body]] = {
-    m.Emergency: st.builds(m.Emergency),
-    m.Heartbeat: st.builds(m.Heartbeat),
-    m.Registration: st.builds(m.Registration, names, names, addresses),
-    m.StartTeleOp: st.builds(m.StartTeleOp),
-    m.SetTeleOp: st.builds(m.SetTeleOp, speeds, turn_rates, st.none() | ticks),
-    m.StopTeleOp: st.builds(m.StopTeleOp),
-    m.RobotStatus: st.builds(
-        m.RobotStatus,
-        st.sampled_from(["Idle", "Mission", "Teleoperation"]),
-        positions,
-        real(-1e6, 1e6),
-        speeds,
-        turn_rates,
-        ticks,
-    ),
-    m.RobotHolder: st.builds(
-        m.RobotHolder, st.none() | ids, st.none() | names, held, st.none() | st.integers(0, 999)
-    ),
-    m.PersonStatus: st.builds(m.PersonStatus, names, positions),
-    m.GoTo: st.builds(m.GoTo, st.lists(positions, min_size=1, max_size=40).map(tuple)),
-    m.Patrol: st.builds(
-        m.Patrol, st.lists(positions, min_size=1, max_size=40).map(tuple), st.integers(0, 1000)
-    ),
-    m.Inspect: st.builds(m.Inspect, numbers, kinds, positions),
-    m.ReturnToBase: st.builds(m.ReturnToBase),
-    m.CancelMission: st.builds(m.CancelMission),
-    m.GetMissionStatus: st.builds(m.GetMissionStatus),
-    m.MissionStatus: mission_statuses,
-    m.GetSensorInfo: st.builds(m.GetSensorInfo, st.none() | ids),
-    m.SensorValue: st.builds(m.SensorValue, names, measured, names, ticks),
-    m.GetDeviceList: st.builds(m.GetDeviceList),
-    m.DevSub: st.builds(m.DevSub, names, real(0, 1000)),
-    m.PermissionRequest: st.builds(
-        m.PermissionRequest,
-        ids,
-        levels,
-        sensor_names,
-        st.none() | st.sampled_from(["no", "ask", "force"]),
-    ),
-    m.HandoverRequest: st.builds(m.HandoverRequest, ids, ids, names),
-    m.GetGrant: st.builds(m.GetGrant, st.none() | ids, st.none() | levels),
-    m.PermissionGrant: st.builds(m.PermissionGrant, ids, *granted),
-    m.PermissionRevocation: st.builds(m.PermissionRevocation, ids, ids, sessions),
-    m.EventReport: st.builds(
-        m.EventReport,
-        st.none() | numbers,
-        kinds,
-        positions,
-        shares,
-        shares,
-        st.sampled_from(["detected", "confirmed", "refuted", "contained"]),
-    ),
-    m.Order: st.builds(m.Order, numbers, kinds, positions, st.none() | ids, tasks),
-    m.OrderProgress: st.builds(
-        m.OrderProgress,
-        numbers,
-        st.sampled_from(["accepted", "declined", "departed", "arrived", "failed", "done"]),
-    ),
-    m.TaskAnnouncement: st.builds(
-        m.TaskAnnouncement, numbers, kinds, positions, shares, real(0, 1e6)
-    ),
-    m.TaskBid: st.builds(m.TaskBid, numbers, real(0, 1e6)),
-    m.TaskAward: st.builds(m.TaskAward, numbers),
-    m.Relocation: st.builds(m.Relocation, positions),
-    m.GetEventList: st.builds(m.GetEventList, st.none() | numbers),
-    m.GetDispatch: st.builds(m.GetDispatch),
-    m.SetDispatch: st.builds(m.SetDispatch, modes_of_dispatch, maybe_text),
-    m.Acknowledge: st.builds(m.Acknowledge, numbers),
-    m.Assign: st.builds(m.Assign, numbers, ids, maybe_ids, maybe_tasks, maybe_text, maybe_count),
-    m.TakeOff: st.builds(m.TakeOff, numbers, ids, maybe_text, maybe_count),
-    m.FalseAlarm: st.builds(m.FalseAlarm, numbers, texts, maybe_count),
-    m.Escalate: st.builds(m.Escalate, numbers, maybe_text, maybe_count),
-    m.AddNote: st.builds(m.AddNote, numbers, texts),
-    m.GetProposal: st.builds(m.GetProposal, numbers),
-    m.Revoke: st.builds(m.Revoke, ids, maybe_text),
-    m.EventStatus: event_statuses,
-    m.DispatchStatus: dispatch_statuses,
-    m.AuditRecord: st.builds(
-        m.AuditRecord,
-        ids,
-        names,
-        names,
-        texts,
-        st.integers(0, 999),
-        texts,
-        roles,
-        st.none() | numbers,
-        maybe_ids,
-        maybe_tasks,
-        st.none() | spans,
-        maybe_ids,
-        st.none() | spans,
-    ),
-    m.Reply: st.builds(
-        m.Reply, st.integers(0, UINT32), st.integers(0, 999), characters(0, 256), contents
-    ),
+    "finding": one_word("detected confirmed refuted contained"),
+    "kind": one_word("fire gas_leak flood"),
+    "level": one_word("teleoperation missions both sensors"),
+    "mission_state": one_word("none under_way waiting replanning done failed"),
+    "mode": one_word("Idle Mission Teleoperation"),
+    "role": one_word("look drive dispatch supervise"),
+    "state": one_word("accepted declined departed arrived failed done"),
+    "takeover": one_word("no ask force"),
+    "task waits_for": one_word("confirm contain stand_by"),
 }
+BY_NAME = {name: strategy for names, strategy in STRATEGIES.items() for name in names.split()}
+SIZES = {"waypoints": (1, 40), "values": (1, 40), "events": (0, 2)}
+
+
+def held(hint: Any, name: str) -> st.SearchStrategy[Any]:
+    """What a field may hold."""
+    if get_origin(hint) is tuple:
+        least, most = SIZES.get(name, (0, 3))
+        part = held(get_args(hint)[0], name)
+        return st.lists(part, min_size=least, max_size=most).map(tuple)
+    if parts := get_args(hint):
+        return st.one_of(*(held(part, name) for part in parts))
+    if hint is type(None):
+        return st.none()
+    return BY_NAME[name] if hint in (str, int, float) else built(hint)
+
+
+def built(kind: type) -> st.SearchStrategy[Any]:
+    fields = get_type_hints(kind)
+    return st.builds(kind, **{name: held(hint, name) for name, hint in fields.items()})
+
+
+BODIES: dict[type, st.SearchStrategy[m.Body]] = {kind: built(kind) for kind in get_args(m.Body)}
 
 
 def with_header(body: m.Body) -> st.SearchStrategy[m.Message]:
