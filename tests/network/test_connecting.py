@@ -1,23 +1,16 @@
 """Which depth a connection gets: messages where that is exact, segments everywhere else."""
 
-from typing import Any
-
 import pytest
+from helpers.network.links import link
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, Load, ZeromqConfig, is_calm
-from dva_sim.network.link import ConstantRate, Link, LinkConfig
+from dva_sim.network.link import LinkConfig
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import simulate
 from dva_sim.simulation.full.run import load_of
 
 LOAD = Load(rate_bps=1e6, burst=20_000)
-
-
-def link(**config: Any) -> Link:
-    settings = LinkConfig(**config)
-    return Link(settings, ConstantRate(settings.rate_bps), Streams(1), "l")
 
 
 def test_delay_alone_is_no_reason_for_segments():

@@ -3,32 +3,18 @@
 from typing import Any
 
 import pytest
+from helpers.network.links import links
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, DatagramConnection
-from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.messaging import Request, Requester
 from dva_sim.network.virtual_network import VirtualNetwork
 
 
-def links(seed: int = 1, **config: Any) -> tuple[Link, Link]:
-    settings, streams = LinkConfig(**config), Streams(seed)
-    up, down = (
-        Link(settings, make_serialiser(settings, way, streams, "l"), streams, f"l/{way}", way)
-        for way in ("up", "down")
-    )
-    return up, down
-
-
 def network(**config: Any) -> VirtualNetwork:
-    up, down = links(**config)
-    return VirtualNetwork(
-        Clock(),
-        lambda a, b: (up, down) if b == "robot" else (down, up),
-        None,
-        Connector("datagrams"),
-    )
+    pair = links(**config)
+    between = lambda _, there: pair if there == "robot" else pair[::-1]  # noqa: E731
+    return VirtualNetwork(Clock(), between, None, Connector("datagrams"))
 
 
 def heard(size: int, count: int, **config: Any) -> list[int]:

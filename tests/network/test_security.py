@@ -159,7 +159,7 @@ def test_a_key_that_is_unknown_is_told_at_both_ends(
     open_both(server, client, binds, connects)
     at_server, at_client = both_say(server, client, Reason.UNKNOWN_KEY)
     key = half.public(OPERATOR).decode()[:8]
-    assert f"an unknown key ({key}...) tried to connect from 127.0.0.1" in at_server
+    assert unnamed(at_server, f"({key}...)", "127.0.0.1") == []
     assert not unnamed(at_client, ROBOT, f"the key of {OPERATOR}")
     assert client.said[0].gave_up
     assert server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 1

@@ -4,12 +4,11 @@ import itertools
 from typing import Any, Literal
 
 import pytest
+from helpers.network.links import links
 
 from dva_sim.agents.robot.command_queue import CommandQueue, Letter
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.streams import Streams
 from dva_sim.network.connections import Connector, ZeromqConfig
-from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.messaging import Request, Requester
 from dva_sim.network.virtual_network import RECONNECT, VirtualNetwork
 
@@ -20,15 +19,8 @@ DEPTHS = pytest.mark.parametrize("depth", ["message", "segment"])
 def network(
     depth: Depth, zeromq: dict[str, Any] | None = None, seed: int = 1, **config: Any
 ) -> VirtualNetwork:
-    settings, streams = LinkConfig(**config), Streams(seed)
-    up, down = (
-        Link(settings, make_serialiser(settings, way, streams, "l"), streams, f"l/{way}", way)
-        for way in ("up", "down")
-    )
-
-    def between(source: str, destination: str) -> tuple[Link, Link]:
-        return (up, down) if destination == "robot" else (down, up)
-
+    pair = links(seed, **config)
+    between = lambda _, there: pair if there == "robot" else pair[::-1]  # noqa: E731
     connector = Connector(depth=depth, zeromq=ZeromqConfig(**(zeromq or {})))
     return VirtualNetwork(Clock(), between, connector=connector)
 

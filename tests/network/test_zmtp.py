@@ -4,10 +4,9 @@ import itertools
 from typing import Any
 
 import pytest
+from helpers.network.links import links
 
 from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.streams import Streams
-from dva_sim.network.link import Link, LinkConfig, make_serialiser
 from dva_sim.network.tcp import TcpOptions
 from dva_sim.network.zmtp import BATCH, ReceivePipe, ZmtpConnection, ZmtpOptions, framed
 
@@ -25,16 +24,11 @@ class Pair:
         **config: Any,
     ) -> None:
         self.clock = Clock()
-        settings, streams = LinkConfig(**config), Streams(seed)
-        links = [
-            Link(settings, make_serialiser(settings, way, streams, "l"), streams, f"l/{way}", way)
-            for way in ("up", "down")
-        ]
         self.at_peer, self.at_opener = list[Any](), list[Any]()
         self.times: dict[Any, float] = {}
         self.ready: list[float] = []
         self.connection = ZmtpConnection(
-            self.clock, *links, self._at_peer, self.at_opener.append, opener, peer
+            self.clock, *links(seed, **config), self._at_peer, self.at_opener.append, opener, peer
         )
 
     def _at_peer(self, message: Any) -> None:

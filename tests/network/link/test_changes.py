@@ -1,14 +1,9 @@
 """A link that changes while it carries: what is under way keeps its fate, and its order."""
 
 import pytest
+from helpers.network.links import link
 
-from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import LinkConfig
-from dva_sim.network.link.link import make_link
-
-
-def link(**about):
-    return make_link(LinkConfig(**about), "up", Streams(1), "a link")
 
 
 def test_packets_sent_before_keep_their_fate_and_later_ones_do_not_overtake_them():

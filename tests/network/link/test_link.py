@@ -2,16 +2,11 @@
 
 import numpy as np
 import pytest
+from helpers.network.links import GAMMA, NORMAL, SHIFTED, link
 
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.streams import Streams
-from dva_sim.network.link import ConstantRate, Link, LinkConfig, TraceRate, read_trace
-from dva_sim.network.link.link import make_link
-
-
-def link(**config: float) -> Link:
-    settings = LinkConfig(**config)  # type: ignore[arg-type]
-    return Link(settings, ConstantRate(settings.rate_bps), Streams(1), "test")
+from dva_sim.network.link import LinkConfig, TraceRate, read_trace
 
 
 def test_a_packet_takes_its_serialisation_and_the_delay():
@@ -31,12 +26,6 @@ def test_loss_is_as_frequent_as_asked_within_three_sigma():
     line, n, p = link(loss=0.1), 20_000, 0.1
     lost = sum(line.carry(i * 0.0137, 100) is None for i in range(n))
     assert abs(lost - n * p) < 3 * np.sqrt(n * p * (1 - p))
-
-
-def test_packets_of_one_millisecond_do_not_share_their_fate():
-    line = link(loss=0.5, rate_bps=1e9)
-    fates = [line.carry(0.0, 100) is None for _ in range(40)]
-    assert 10 < sum(fates) < 30
 
 
 def test_two_senders_meet_the_same_weather_at_the_same_time():
@@ -74,10 +63,9 @@ def test_an_opportunity_that_finds_no_packet_is_wasted():
 def test_a_trace_starts_at_a_seeded_offset_and_adds_to_the_delay(tmp_path):
     path = tmp_path / "trace.up"
     path.write_text("".join(f"{ms}\n" for ms in range(0, 1001, 20)))
-    config = LinkConfig(delay_s=0.5, trace_up=str(path))
-    first = make_link(config, "up", Streams(1), "a").carry(0.0, 100)
-    again = make_link(config, "up", Streams(1), "a").carry(0.0, 100)
-    other = make_link(config, "up", Streams(2), "a").carry(0.0, 100)
+    first, again, other = (
+        link(seed=seed, delay_s=0.5, trace_up=str(path)).carry(0.0, 100) for seed in (1, 1, 2)
+    )
     assert first == again != other
     assert 0.5 <= first <= 0.52
 
@@ -104,6 +92,34 @@ def test_a_missing_trace_is_named():
         read_trace("nowhere.up")
 
 
-def test_jitter_above_the_delay_is_impossible():
-    with pytest.raises(ValueError, match=r"jitter_s 0\.2 is above delay_s 0\.1"):
-        LinkConfig(delay_s=0.1, jitter_s=0.2)
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        ({"delay_s": 0.05, "delay_law": NORMAL}, "sd_s 0.02 of a normal law is above a third of"),
+        ({"delay_s": 0.03, "delay_law": GAMMA}, "least_s 0.04 should be below delay_s 0.03"),
+        ({"delay_s": 0.04, "delay_law": SHIFTED}, "least_s 0.04 should be below delay_s 0.04"),
+        ({"delay_s": 0.1, "up": {"delay_s": 0.05}, "delay_law": NORMAL}, "third of delay_s 0.05"),
+        ({"delay_s": 0.1, "jitter_s": 0.1, "delay_law": NORMAL}, "jitter_s and delay_law exclude"),
+        ({"delay_law": NORMAL, "delay_log": "x", "delay_s": 1}, "delay_law and delay_log exclude"),
+        ({"delay_law": {"law": "empirical"}}, "needs either delays_s or file"),
+        ({"delay_law": "normal"}, "delay_law: a law is a mapping, such as .*, not 'normal'"),
+        ({"delay_law": {"law": "normal"}}, "missing key 'delay_law.sd_s'"),
+        ({"delay_law": {"law": "cauchy"}}, "'cauchy'.*normal, gamma"),
+        ({"delay_law": {"law": "gamma", "sd_s": 1, "sdd": 2}}, "unknown key 'delay_law.sdd'"),
+        ({"up": {"delay": 1}}, "unknown key 'up.delay'; did you mean 'delay_s'"),
+        ({"bursts": {}}, "bursts need either mean_s or mean_packets"),
+        ({"bursts": {"mean_s": 1, "mean_packets": 2}}, "bursts need either"),
+        ({"loss": 0.5, "bursts": {"mean_s": 1, "loss": 0.5}}, "should be below bursts.loss 0.5"),
+        ({"loss": 0.8, "bursts": {"mean_packets": 2}}, "too short for a loss of 0.8: at least 4"),
+        ({"loss": 0.1, "down": {"loss": 0.6}, "bursts": {"mean_s": 1, "loss": 0.5}}, "loss 0.6"),
+        ({"outages": [{"from_s": 1}]}, "missing key 'outages.0.for_s'"),
+        ({"outages": [{"from_s": 1, "for_s": 2, "every_s": 2}]}, "for_s 2 should be below every_s"),
+        ({"outages": [{"from_s": 1, "for_s": 2, "direction": "left"}]}, "up, down or both"),
+        ({"partitions": [{"from_s": 1, "for_s": 2, "to": "x"}]}, "unknown key 'partitions.0.to'"),
+        ({"queue_packets": 0}, "queue_packets: "),
+        ({"delay_s": 0.1, "jitter_s": 0.2}, r"jitter_s 0\.2 .*delay_s 0\.1"),
+    ],
+)
+def test_what_no_link_can_be_is_refused(config, words):
+    with pytest.raises(ConfigError, match=words):
+        validate(LinkConfig, config)

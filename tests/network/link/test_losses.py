@@ -1,21 +1,14 @@
 """Losses by chance and in bursts against what is known of them; bands are four standard errors."""
 
+from functools import partial
 from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.network import links
 
-from dva_sim.kernel.config import validate
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.streams import Streams
-from dva_sim.network.link import Link, LinkConfig
-from dva_sim.network.link.link import make_link
-
-
-def link(direction: Any = "up", **config: Any) -> Link:
-    settings = LinkConfig(**{"rate_bps": 1e12, **config})
-    return make_link(settings, direction, Streams(1), "link")
+link = partial(links.link, rate_bps=links.FAST)
 
 
 def fates(count: int, every: float, **config: Any) -> list[bool]:
@@ -97,18 +90,3 @@ def test_losses_of_one_millisecond_come_in_pairs_as_often_as_chance_has_them():
     assert np.mean(pairs) == pytest.approx(p, abs=4 * (p * (1 - p) / (2 * n)) ** 0.5)
     both = np.mean([a and b for a, b in pairs])
     assert both == pytest.approx(p * p, abs=4 * (p * p / n) ** 0.5)
-
-
-@pytest.mark.parametrize(
-    ("config", "words"),
-    [
-        ({"bursts": {}}, "bursts need either mean_s or mean_packets"),
-        ({"bursts": {"mean_s": 1, "mean_packets": 2}}, "bursts need either"),
-        ({"loss": 0.5, "bursts": {"mean_s": 1, "loss": 0.5}}, "should be below bursts.loss 0.5"),
-        ({"loss": 0.8, "bursts": {"mean_packets": 2}}, "too short for a loss of 0.8: at least 4"),
-        ({"loss": 0.1, "down": {"loss": 0.6}, "bursts": {"mean_s": 1, "loss": 0.5}}, "loss 0.6"),
-    ],
-)
-def test_bursts_that_cannot_be_are_refused(config, words):
-    with pytest.raises(ConfigError, match=words):
-        validate(LinkConfig, config)

@@ -1,18 +1,10 @@
 """When nothing gets through, and to whom."""
 
-from typing import Any
-
 import pytest
+from helpers.network.links import link
 
-from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import Link, LinkConfig, check_partitions, part_links
-from dva_sim.network.link.link import make_link
-
-
-def link(direction: Any = "up", **config: Any) -> Link:
-    return make_link(LinkConfig(**config), direction, Streams(1), "link")
 
 
 def heard(line: Link, times: list[float]) -> list[float]:
@@ -98,17 +90,3 @@ def test_a_partition_of_nobody_is_refused():
     check_partitions(partitions, ["dva", "operator-1", "robot-1"])
     with pytest.raises(ConfigError, match=r"'operator-\*' .*known: "):
         check_partitions(partitions, ["dva", "robot-1"])
-
-
-@pytest.mark.parametrize(
-    ("key", "given", "words"),
-    [
-        ("outages", {"from_s": 1}, "missing key 'outages.0.for_s'"),
-        ("outages", {"from_s": 1, "for_s": 2, "every_s": 2}, "for_s 2 should be below every_s 2"),
-        ("outages", {"from_s": 1, "for_s": 2, "direction": "left"}, "up, down or both"),
-        ("partitions", {"from_s": 1, "for_s": 2, "to": "x"}, "unknown key 'partitions.0.to'"),
-    ],
-)
-def test_gaps_that_cannot_be_are_refused(key, given, words):
-    with pytest.raises(ConfigError, match=words):
-        validate(LinkConfig, {key: [given]})

@@ -1,18 +1,11 @@
 """Queues in bytes and in packets, per direction; what a link says of itself."""
 
-from typing import Any
-
 import pytest
+from helpers.network.links import link
 
-from dva_sim.kernel.config import validate
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
-from dva_sim.network.link import Link, LinkConfig
+from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.link import make_link
-
-
-def link(direction: Any = "up", **config: Any) -> Link:
-    return make_link(LinkConfig(**config), direction, Streams(1), "link")
 
 
 def test_a_queue_may_count_packets_with_the_one_under_way():
@@ -83,8 +76,3 @@ def test_a_link_is_ideal_whatever_its_delay_rate_and_queue():
     assert link(delay_s=1.0, rate_bps=1e4, queue_packets=3).is_ideal()
     assert link("down", up={"loss": 0.01}).is_ideal()
     assert not make_link(LinkConfig(), "up", Streams(1), "x", lambda: None).is_ideal()
-
-
-def test_what_no_queue_can_be_is_refused():
-    with pytest.raises(ConfigError, match="queue_packets: "):
-        validate(LinkConfig, {"queue_packets": 0})

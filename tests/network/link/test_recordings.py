@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.network import links
 from helpers.paths import ROOT
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.streams import Streams
-from dva_sim.network.link import Link, LinkConfig, read_delay_log, read_trace
-from dva_sim.network.link.link import make_link
+from dva_sim.network.link import Link, read_delay_log, read_trace
 
 TRACES = ROOT / "experiments" / "traces"
 PING = """\
@@ -38,9 +37,8 @@ def write(folder: Path, text: str, name: str = "delays.log") -> str:
     return str(path)
 
 
-def link(path: str, direction: Any = "up", seed: int = 1, **config: Any) -> Link:
-    settings = LinkConfig(delay_log=path, rate_bps=1e12, **config)
-    return make_link(settings, direction, Streams(seed), "link")
+def link(path: str, direction: str = "up", **config: Any) -> Link:
+    return links.link(direction, **{"delay_log": path, "rate_bps": links.FAST} | config)
 
 
 def played(line: Link, every: float = 0.05, count: int = 400) -> list[float | None]:
@@ -141,25 +139,20 @@ def test_a_log_begins_at_a_seeded_moment_the_same_in_both_directions(tmp_path):
         ("", "needs probes of at least two moments"),
         ("PING h (1) 56(84) bytes\n64 bytes from h: icmp_seq=1 ttl=9 time=1 ms\n", r":2:1: .*ping"),
         ("PING h (1) 56(84) bytes\n[1.5] no answer yet for icmp_seq=1\n", "holds no reply"),
+        (None, r"no\.log: "),
     ],
 )
-def test_a_bad_log_is_refused_with_its_line(tmp_path, text, words):
-    path = write(tmp_path, text)
+def test_a_bad_log_is_refused_with_its_line_and_a_missing_one_named(tmp_path, text, words):
+    path = "no.log" if text is None else write(tmp_path, text)
     with pytest.raises(ConfigError, match=words) as caught:
         link(path)
     assert str(caught.value).startswith(path)
 
 
-def test_a_missing_log_is_named():
-    with pytest.raises(ConfigError, match=r"no\.log: "):
-        link("no.log")
-
-
 @pytest.mark.parametrize("name", ["cellular.up", "cellular.down"])
 def test_a_cellular_link_lets_through_what_was_recorded(name):
     times = read_trace(str(TRACES / name))
-    way = {"trace_up": str(TRACES / name), "queue_bytes": 10**9}
-    line = make_link(LinkConfig(**way), "up", Streams(1), "link")  # type: ignore[arg-type]
+    line = links.link(trace_up=str(TRACES / name), queue_bytes=10**9)
     n = len(times)
     arrivals = np.array([line.carry(0.0, 1500) for _ in range(2 * n)], dtype=float)
     assert arrivals[n:] - arrivals[:n] == pytest.approx(float(times[-1]))  # one lap
@@ -170,7 +163,7 @@ def test_a_cellular_link_lets_through_what_was_recorded(name):
 def test_on_a_cellular_link_commands_wait_for_each_gap_in_coverage():
     path = str(TRACES / "cellular.up")
     times = read_trace(path)
-    line = make_link(LinkConfig(trace_up=path), "up", Streams(1), "link")
+    line = links.link(trace_up=path)
     sent = np.arange(0, float(times[-1]), 0.1)
     waits = np.array([line.carry(t, 15) for t in sent.tolist()], dtype=float) - sent
     # A few bytes every 100 ms never queue: each waits for the next opportunity only.
