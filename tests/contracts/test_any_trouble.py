@@ -14,7 +14,6 @@ from helpers.network.transports import (
     Meddled,
     Meddler,
     Plan,
-    SocketWorld,
     Tap,
     VirtualWorld,
     World,
@@ -73,14 +72,9 @@ def test_each_request_ends_once_in_virtual_time(kind, seed, plan, window, attemp
 
 
 @pytest.mark.system
-@pytest.mark.parametrize(("window", "keys"), [(1, False), (3, True)], ids=["plain", "with keys"])
-def test_each_request_ends_once_over_sockets(ring, window, keys):
-    world = SocketWorld(ring if keys else None)
-    try:
-        plan = Plan(lose=0.25, double=0.5, hold=1.5 * BRIEF)
-        ask_in_trouble(world, 1, plan, window, count=5)
-    finally:
-        world.close()
+def test_each_request_ends_once_over_sockets(sockets):
+    plan = Plan(lose=0.25, double=0.5, hold=1.5 * BRIEF)
+    ask_in_trouble(sockets, 1, plan, window=3 if sockets.ring else 1, count=5)
 
 
 @pytest.mark.parametrize("kind", VIRTUAL)
@@ -103,13 +97,9 @@ def test_each_request_ends_once_while_nodes_come_and_go_in_virtual_time(
 
 
 @pytest.mark.system
-@pytest.mark.parametrize(("window", "keys"), [(1, False), (3, True)], ids=["plain", "with keys"])
-def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(ring, window, keys):
-    world = SocketWorld(ring if keys else None)
-    try:
-        for at in (0.3, 0.9):
-            world.clock.call_after(at, world.leave, ROBOT)
-            world.clock.call_after(at + 0.2, world.come_back_soon, ROBOT)
-        ask_in_trouble(world, 1, Plan(lose=0.1, double=0.3, hold=BRIEF), window, count=6)
-    finally:
-        world.close()
+def test_each_request_ends_once_while_the_service_comes_and_goes_over_sockets(sockets):
+    for at in (0.3, 0.9):
+        sockets.clock.call_after(at, sockets.leave, ROBOT)
+        sockets.clock.call_after(at + 0.2, sockets.come_back_soon, ROBOT)
+    plan = Plan(lose=0.1, double=0.3, hold=BRIEF)
+    ask_in_trouble(sockets, 1, plan, window=3 if sockets.ring else 1, count=6)

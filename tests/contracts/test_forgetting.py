@@ -1,13 +1,13 @@
 """A DVA leaves who is silent, hears who is back, and keeps nothing open for who is gone."""
 
 import math
-import os
 from pathlib import Path
 
 import pytest
 import zmq
 from helpers.dva.dispatch_desk import Office
 from helpers.network.transports import DVA, PHONE, ROBOT, SocketWorld, World, small_device
+from helpers.processes.memory import needs_proc, resident_bytes
 
 from dva_sim.agents.device import HEARTBEAT, AgentDevice
 from dva_sim.network import sockets
@@ -131,32 +131,26 @@ def test_waves_of_devices_that_vanish_leave_no_file_open(monkeypatch):
     assert max(levels[1:]) <= levels[0]
 
 
-def memory() -> float:
-    """How much of it this process has [MB]."""
-    pages = Path("/proc/self/statm").read_text().split()[1]
-    return int(pages) * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-@pytest.mark.skipif(not FILES.exists(), reason="no list of memory")
+@needs_proc
 def test_the_memory_of_connections_that_are_closed_goes_back(monkeypatch):
     monkeypatch.setattr(sockets, "GIVE_BACK", 0.1)
     network = sockets.SocketNetwork(LiveClock())
     try:
         network.introduce(ROBOT, "127.0.0.1:9")
         sockets.give_back_memory()
-        before = memory()
+        before = resident_bytes()
         heard = [network.subscribe(DVA, ROBOT, f"{n}|", print) for n in range(300)]
         network.clock.run(network.clock.now + 0.1)
-        taken = memory() - before
+        taken = resident_bytes() - before
         for subscription in heard:
             subscription.close()
         heard.clear()
         network.clock.run(network.clock.now + 300 * sockets.LOOK_ASIDE / sockets.CLOSED_AT_ONCE)
         network.clock.run(network.clock.now + 1.0)
-        kept = memory() - before
+        kept = resident_bytes() - before
     finally:
         network.close()
-    assert taken > 5.0
+    assert taken > 5e6
     assert kept < taken / 2
 
 

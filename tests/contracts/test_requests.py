@@ -29,17 +29,22 @@ WINDOWS = pytest.mark.parametrize(
 )
 
 
-def silent(_: Request) -> None:
-    """A service that never answers."""
+def answered(world: World, asker: Asker, *questions: bytes) -> list[bytes | None]:
+    """How all that was asked has ended, once these questions have, too."""
+    asker.ask(*questions)
+    world.run_until(asker.all_over)
+    return asker.replies()
+
+
+def echoes(*questions: bytes) -> list[bytes | None]:
+    return [b"re: " + question for question in questions]
 
 
 def asked_until_answered(world: World, asker: Asker) -> int:
     """How many requests it took until one was answered."""
     for number in range(1, 101):
         question = b"are you there? %d" % len(asker.ends)
-        asker.ask(question)
-        world.run_until(asker.all_over)
-        if asker.ends[question] == [b"re: " + question]:
+        if answered(world, asker, question)[-1:] == echoes(question):
             return number
     raise AssertionError("100 requests have failed")
 
@@ -48,12 +53,9 @@ def asked_until_answered(world: World, asker: Asker) -> int:
 def test_each_request_gets_its_own_reply_in_the_order_asked(world, window):
     seen: list[bytes] = []
     world.serve(ROBOT, lambda request: (seen.append(request.data), echo(request)))
-    asker = Asker(world.network, window=window)
     questions = numbered(50)
-    asker.ask(*questions)
-    world.run_until(asker.all_over)
-    assert seen == questions
-    assert asker.replies() == [b"re: " + question for question in questions]
+    replies = answered(world, Asker(world.network, window=window), *questions)
+    assert (seen, replies) == (questions, echoes(*questions))
 
 
 @WINDOWS
@@ -66,13 +68,10 @@ def test_doubled_replies_answer_one_request_each(world, window):
 
     world.serve(ROBOT, stutter)
     asker = Asker(world.network, window=window)
-    questions = numbered(20)
-    asker.ask(*questions)
-    world.run_until(asker.all_over)
-    asker.ask(b"and now?")
-    world.run_until(asker.all_over)
+    answered(world, asker, *numbered(20))
+    answered(world, asker, b"and now?")
     world.run_for(0.1)
-    assert asker.replies() == [b"re: " + question for question in [*questions, b"and now?"]]
+    assert asker.replies() == echoes(*numbered(20), b"and now?")
 
 
 @WINDOWS
@@ -87,9 +86,7 @@ def test_a_request_is_sent_three_times_then_fails_and_others_are_served(world, w
     world.serve(ROBOT, choosy)
     tap = Tap(world.network)
     asker = Asker(tap, BRIEF, window)
-    asker.ask(b"never")
-    world.run_until(asker.all_over)
-    assert asker.replies() == [None]
+    assert answered(world, asker, b"never") == [None]
     assert tap.sent == [b"never"] * 3
     assert tap.wires == (3 if window == 1 else 1)
     assert (asker.requester.timeouts, asker.requester.failures) == (3, 1)
@@ -109,10 +106,9 @@ def test_the_same_bytes_come_again_until_they_are_answered(world, window):
 
     world.serve(ROBOT, third_time_lucky)
     asker = Asker(world.network, BRIEF, window, attempts=1000)
-    asker.ask(b"\x00\xff any bytes <&>")
-    world.run_until(asker.all_over)
-    assert asker.replies() == [b"re: \x00\xff any bytes <&>"]
-    assert set(seen) == {b"\x00\xff any bytes <&>"}
+    data = b"\x00\xff any bytes <&>"
+    assert answered(world, asker, data) == echoes(data)
+    assert set(seen) == {data}
     assert len(seen) >= 3
 
 
@@ -126,8 +122,7 @@ def test_a_reply_that_comes_after_the_failure_answers_nothing(world, window):
     world.serve(ROBOT, slow_for_one)
     asker = Asker(world.network, BRIEF, window)
     while not late:
-        asker.ask(b"slow %d" % len(asker.ends))
-        world.run_until(asker.all_over)
+        answered(world, asker, b"slow %d" % len(asker.ends))
     slow = list(asker.ends)
     for request in late:
         echo(request)
@@ -154,7 +149,7 @@ def test_never_more_than_the_window_is_unanswered(world, window):
         echo(held.pop(0))
     world.run_until(asker.all_over)
     assert most == window
-    assert asker.replies() == [b"re: " + question for question in numbered(20)]
+    assert asker.replies() == echoes(*numbered(20))
     assert not asker.requester.busy
 
 
@@ -169,8 +164,7 @@ def test_a_full_queue_refuses_at_once_and_what_waits_is_served(world, window):
     asker.ask(b"one too many")
     assert asker.ends[b"one too many"] == [None]
     assert asker.requester.overflows == 1
-    world.run_until(asker.all_over)
-    assert asker.replies() == [b"re: " + question for question in numbered(room)] + [None]
+    assert answered(world, asker) == [*echoes(*numbered(room)), None]
 
 
 @WINDOWS
@@ -203,9 +197,7 @@ def test_who_closes_in_the_middle_of_a_reply_hears_nothing_more(world, window):
     asker.requester.request(b"first", first)
     asker.ask(*numbered(10))
     world.run_until(lambda: got)
-    other = Asker(world.network)
-    other.ask(*numbered(10))
-    world.run_until(other.all_over)
+    answered(world, Asker(world.network), *numbered(10))
     assert got == [b"re: first"]
     assert list(asker.ends.values()) == [[]] * 10
 
@@ -235,10 +227,8 @@ def test_a_peer_that_vanishes_fails_and_is_reached_when_it_is_back(world, window
         asker.ask(b"under way %d" % len(asker.ends))
         world.run_until(lambda: held or asker.all_over())
     world.leave(ROBOT)
-    asker.ask(b"too late")
-    world.run_until(asker.all_over)
-    failed = list(asker.ends)
-    assert asker.replies() == [None] * len(failed)
+    replies, failed = answered(world, asker, b"too late"), list(asker.ends)
+    assert replies == [None] * len(failed)
     for request in held:
         echo(request)  # the service has not noticed, or notices too late
     world.serve(ROBOT, echo)
@@ -256,15 +246,12 @@ def test_a_peer_that_nobody_knows_fails_and_harms_nobody(world, window):
     well.ask(*numbered(2))
     world.run_until(lambda: lost.all_over() and well.all_over())
     assert lost.replies() == [None] * 2
-    assert well.replies() == [b"re: " + question for question in numbered(2)]
+    assert well.replies() == echoes(*numbered(2))
 
 
 @WINDOWS
 def test_a_peer_that_does_not_serve_fails(world, window):
-    asker = Asker(world.network, BRIEF, window)
-    asker.ask(b"anybody?")
-    world.run_until(asker.all_over)
-    assert asker.replies() == [None]
+    assert answered(world, Asker(world.network, BRIEF, window), b"anybody?") == [None]
 
 
 def test_everybody_can_ask_everybody_at_once(world):
@@ -276,7 +263,7 @@ def test_everybody_can_ask_everybody_at_once(world):
         asker.ask(*numbered(10, f"{a} to {b}"))
     world.run_until(lambda: all(asker.all_over() for asker in askers))
     for asker in askers:
-        assert asker.replies() == [b"re: " + question for question in asker.ends]
+        assert asker.replies() == echoes(*asker.ends)
 
 
 def test_a_peer_is_reached_once_somebody_has_told_where_it_is(sockets):
@@ -284,9 +271,7 @@ def test_a_peer_is_reached_once_somebody_has_told_where_it_is(sockets):
     address = elsewhere.join(GUARD)
     elsewhere.serve(GUARD, echo)
     asker = Asker(sockets.network, BRIEF, peer=GUARD)
-    asker.ask(b"where are you?")
-    sockets.run_until(asker.all_over)
-    assert asker.replies() == [None]
+    assert answered(sockets, asker, b"where are you?") == [None]
     sockets.network.introduce(GUARD, address)
     asked_until_answered(sockets, asker)
 

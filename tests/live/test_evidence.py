@@ -46,8 +46,10 @@ def trace_of(path: Path, name: str, memory: Store | None = None, **changes: obje
     """A virtual run whose DVA is written down."""
     run = Run(scenario_of(name, **changes), 1)
     with path.open("w") as file:
-        desk = run.dva.desk
+        run.dva._memory, desk = memory, run.dva.desk
         run.dva.desk = traced(desk, lambda line: file.write(line + "\n"), run.stage, memory)
+        if memory:
+            run.dva.start()
         run.run()
         run.dva.close()
     return run
@@ -92,14 +94,8 @@ def test_a_dva_that_remembers_an_earlier_life_decides_the_same_again(tmp_path):
     store = Store(tmp_path / "memory.sqlite")
     first.dva._memory = store
     first.run()
-    run = Run(scenario_of(horizon_s=60), 1)
     path = tmp_path / "dva.trace.jsonl"
-    with path.open("w") as file:
-        run.dva._memory = store
-        desk = run.dva.desk
-        run.dva.desk = traced(desk, lambda line: file.write(line + "\n"), run.stage, store)
-        run.dva.start()
-        run.run()
+    run = trace_of(path, "drive-to-event", store, horizon_s=60)
     assert '"do": "recall"' in path.read_text()
     assert run.dva.desk.book.total == 1
     assert differences(path) == 0

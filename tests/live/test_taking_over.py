@@ -6,16 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from helpers.network.scripted_session import (
-    OPERATOR,
-    PATIENT,
-    ROBOT,
-    SILENT_AFTER,
-    STEP,
-    Witness,
-    _quick_network,
-)
-from helpers.processes.patience import PATIENCE_S
+from helpers.network.scripted_session import OPERATOR, PATIENT, ROBOT, _quick_network
+from helpers.network.scripted_session import Scene as AnyScene
 
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
 from dva_sim.core.events import State
@@ -26,8 +18,6 @@ from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full.control_room import add_dva
-from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
 pytestmark = pytest.mark.system
@@ -50,39 +40,17 @@ def network(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transpor
     live.close()
 
 
-class Scene:
-    """The DVA, a robot in a building where nothing happens, and whoever is added."""
+class Scene(AnyScene):
+    """One where nothing happens for long."""
 
     def __init__(self, network: Transport, **changes: object) -> None:
         quiet = {"events": [{"kind": "fire", "at_s": 5000}], "operator.count": 3}
         quiet |= {"dva.supervisors": ["operator-2"]}
         scenario = scenarios.build(scenarios.load("drive-to-event"), PATIENT | quiet | changes)
-        self.stage = Stage(scenario, 1, network, Recorder())
+        stage = Stage(scenario, 1, network, Recorder())
         if isinstance(network, SocketNetwork):
-            self.stage.address = lambda kind, number: network.join(id_of(kind, number))
-        self.dva = add_dva(self.stage)
-        self.dva.desk.registry.silent_after = SILENT_AFTER
-        self.field = Field(self.stage)
-        self.field.populate()
-        self.robot = self.field.robots[ROBOT]
-        self.witness = Witness(self.robot.controller)
-        self.robot.trace = self.witness  # type: ignore[assignment]
-        self.dva.start()
-
-    def enters(
-        self, number: int, script: Callable[[ScriptedOperator], Script], kind: str = "TeleOp"
-    ) -> ScriptedOperator:
-        device = self.stage.device("operator", number)
-        device.device_type = kind
-        operator = ScriptedOperator(device, script)
-        operator.start()
-        return operator
-
-    def until(self, condition: Callable[[], object]) -> None:
-        clock, end = self.stage.clock, self.stage.clock.now + PATIENCE_S
-        while not condition():
-            assert clock.now < end, "has not come true"
-            clock.run(clock.now + STEP)
+            stage.address = lambda kind, number: network.join(id_of(kind, number))
+        super().__init__(stage)
 
 
 def request(takeover: str | None) -> Ask:

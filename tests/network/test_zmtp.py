@@ -8,7 +8,7 @@ from helpers.network.links import links
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.tcp import TcpOptions
-from dva_sim.network.zmtp import BATCH, ReceivePipe, ZmtpConnection, ZmtpOptions, framed
+from dva_sim.network.zmtp import BATCH, Pipe, ReceivePipe, ZmtpConnection, ZmtpOptions, framed
 
 SMALL_BUFFER = TcpOptions(send_buffer=4096)
 
@@ -231,3 +231,55 @@ def test_a_small_buffer_is_filled_and_drained_in_the_rhythm_of_real_sockets():
     breaks = [i for i in range(1, len(settled)) if settled[i] != settled[i - 1] + 1]
     assert {b - a for a, b in itertools.pairwise(breaks)} == {4, 5}
     assert {settled[i] - settled[i - 1] for i in breaks} <= {8, 9, 10, 11}
+
+
+# --- pipes: the high-water mark, the low one at half of it, keeping only the newest ---------
+
+
+@pytest.mark.parametrize(("mark", "low"), [(1, 1), (2, 1), (3, 2), (10, 5), (1000, 500)])
+def test_a_full_pipe_has_room_again_when_half_of_it_has_been_read(mark, low):
+    pipe: Pipe[int] = Pipe(mark)
+    assert [pipe.put(number) for number in range(mark + 1)] == [True] * mark + [False]
+    for _ in range(low - 1):
+        pipe.take()
+        assert not pipe.put(-1)
+    pipe.take()
+    assert [pipe.put(number) for number in range(low + 1)] == [True] * low + [False]
+
+
+def test_who_was_refused_is_told_once_when_there_is_room():
+    pipe, told = Pipe[int](4), list[int]()
+    pipe.on_room = lambda: told.append(len(pipe))
+    for number in range(5):
+        pipe.put(number)
+    assert [pipe.take() for _ in range(4)] == [0, 1, 2, 3]
+    assert told == [2]
+
+
+def test_what_conflates_keeps_the_newest_and_is_never_full():
+    pipe = Pipe[int](1, conflate=True)
+    assert all(pipe.put(number) for number in range(5))
+    assert (len(pipe), pipe.superseded, pipe.take(), pipe.take()) == (1, 4, 4, None)
+
+
+class Flow:
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def pause(self) -> None:
+        self.said.append("pause")
+
+    def resume(self) -> None:
+        self.said.append("resume")
+
+
+def test_a_full_receiver_lets_its_connection_wait_until_half_is_read():
+    pipe, flow = ReceivePipe[int](4), Flow()
+    pipe.flow = flow
+    for number in range(4):
+        pipe.put(number)
+    assert flow.said == ["pause"]
+    pipe.take()
+    assert flow.said == ["pause"]
+    pipe.take()
+    assert flow.said == ["pause", "resume"]

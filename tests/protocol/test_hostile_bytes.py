@@ -5,11 +5,8 @@ separately, and its text.
 """
 
 import itertools
-import os
 import re
-import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from random import Random
 
 import pytest
@@ -17,6 +14,7 @@ from helpers.messages.damaged_messages import LEAF, mutated
 from helpers.messages.message_oracle import decode_or_refuse
 from helpers.messages.message_strategies import message
 from helpers.paths import ROOT
+from helpers.processes.memory import needs_proc, resident_bytes
 from helpers.processes.search_settings import LONGER, search
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -295,12 +293,6 @@ def test_threads_share_the_parser():
     assert got == [decode(GOOD), None, decode(REPLY)] * 200
 
 
-def resident_bytes():
-    """Memory that this process holds now."""
-    pages = Path("/proc/self/statm").read_text().split()[1]
-    return int(pages) * os.sysconf("SC_PAGE_SIZE")
-
-
 def with_new_blanks(number):
     """Allowed, and never the same twice."""
     rng = Random(number)
@@ -321,9 +313,6 @@ HOSTILE = {
         with_new_blanks(n).replace(b"\t<", b"&#9;\t<").replace(b" <", b"&#32; <")
     ),
 }
-reads_proc = pytest.mark.skipif(
-    sys.platform != "linux", reason="reads the memory in use from /proc, which only Linux has"
-)
 
 
 def attack(messages):
@@ -335,7 +324,7 @@ def attack(messages):
 
 
 @pytest.mark.invariant("S10")
-@reads_proc
+@needs_proc
 @pytest.mark.parametrize("what", HOSTILE)
 def test_what_was_never_seen_before_is_not_kept(what):
     """The parser keeps names and blanks for ever; 3,000 of these made 3 MB."""
@@ -356,7 +345,7 @@ def test_blanks_between_elements_mean_nothing_and_are_no_value():
 
 
 @pytest.mark.soak
-@reads_proc
+@needs_proc
 def test_hostile_messages_leave_no_memory_behind():
     rng, seeds = Random(8192), list(ALL.values())
     attack(mutated(rng.choice(seeds), rng) for _ in range(50_000))

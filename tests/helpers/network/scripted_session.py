@@ -1,6 +1,6 @@
 """One session of one robot and one scripted operator, in virtual time or over sockets."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -195,27 +195,41 @@ def _stage(network: Transport, changes: dict[str, object], **address: object) ->
     return Stage(scenario, 1, network, Recorder(), **address)  # type: ignore[arg-type]
 
 
+class Scene:
+    """The DVA, a robot in a building, what it decides, and whoever is added."""
+
+    def __init__(self, stage: Stage, trace: Path | None = None) -> None:
+        self.stage, self.dva = stage, add_dva(stage)
+        self.dva.desk.registry.silent_after = SILENT_AFTER
+        self.field = Field(stage)
+        self.field.populate()
+        self.robot = self.field.robots[ROBOT]
+        controller = self.robot.controller
+        self.witness = Witness(controller, trace and DecisionLog(trace, controller))
+        self.robot.trace = self.witness  # type: ignore[assignment]
+        self.dva.start()
+
+    def enters(
+        self, number: int, script: Callable[[ScriptedOperator], Script], kind: str = "TeleOp"
+    ) -> ScriptedOperator:
+        device = self.stage.device("operator", number)
+        device.device_type = kind
+        operator = ScriptedOperator(device, script)
+        operator.start()
+        return operator
+
+    def until(self, condition: Callable[[], object]) -> None:
+        clock, end = self.stage.clock, self.stage.clock.now + PATIENCE_S
+        while not condition():
+            assert clock.now < end, "has not come true"
+            clock.run(clock.now + STEP)
+
+
 def _act_out(stage: Stage, way: Way, trace: Path | None = None) -> list[Decided]:
     """Let everybody do what they do until the operator is done and the robot knows."""
-    dva = add_dva(stage)
-    dva.desk.registry.silent_after = SILENT_AFTER
-    field_ = Field(stage)
-    field_.populate()
-    robot = field_.robots[ROBOT]
-    witness = Witness(robot.controller, trace and DecisionLog(trace, robot.controller))
-    robot.trace = witness  # type: ignore[assignment]
-    operator = ScriptedOperator(stage.device("operator", 1), lambda o: way(o, witness))
-    operator.start()
-    dva.start()
-    for _ in _steps_of(stage.clock):
-        if operator.done and robot.controller.grant is None:
-            if witness.trace is not None:
-                witness.trace.close()
-            return witness.decisions
-    raise TimeoutError(f"not over within {PATIENCE_S:g} s: {operator.transcript[-3:]}")
-
-
-def _steps_of(clock: Clock) -> Iterator[None]:
-    while clock.now < PATIENCE_S:
-        clock.run(clock.now + STEP)
-        yield
+    scene = Scene(stage, trace)
+    operator = scene.enters(1, lambda o: way(o, scene.witness))
+    scene.until(lambda: operator.done and scene.robot.controller.grant is None)
+    if scene.witness.trace is not None:
+        scene.witness.trace.close()
+    return scene.witness.decisions

@@ -50,12 +50,12 @@ def test_a_train_is_looked_at_packet_by_packet_where_there_are_outages():
     assert link("down", outages=[{"from_s": 1, "for_s": 1, "direction": "up"}]).is_ideal()
 
 
-PARTED = [{"source": "operator-*", "destination": "robot-1", "from_s": 3, "for_s": 4}]
+PARTED = {"source": "operator-*", "destination": "robot-1", "from_s": 3, "for_s": 4}
+PARTITIONS = LinkConfig(partitions=[PARTED]).partitions  # type: ignore[list-item]
 
 
 def parted(source: str, destination: str) -> tuple[Link, Link]:
-    partitions = LinkConfig(partitions=PARTED).partitions  # type: ignore[arg-type]
-    return part_links((link("up"), link("down")), source, destination, partitions)
+    return part_links((link("up"), link("down")), source, destination, PARTITIONS)
 
 
 def test_a_partition_cuts_one_way_between_some_nodes_only():
@@ -71,8 +71,7 @@ def test_a_partition_cuts_one_way_between_some_nodes_only():
 
 def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others():
     whole = link("up", rate_bps=8e3, queue_bytes=9000, delay_s=0.5)
-    partitions = LinkConfig(partitions=PARTED).partitions  # type: ignore[arg-type]
-    mine, _ = part_links((whole, link("down")), "operator-1", "robot-1", partitions)
+    mine, _ = part_links((whole, link("down")), "operator-1", "robot-1", PARTITIONS)
     assert whole.carry(0.0, 1000) == pytest.approx(1.5)
     assert mine.carry(0.0, 1000) == pytest.approx(2.5)
     assert mine.backlog_bytes(1.0) == pytest.approx(1000)
@@ -86,7 +85,6 @@ def test_nodes_that_are_kept_apart_share_the_link_and_its_counts_with_others():
 
 
 def test_a_partition_of_nobody_is_refused():
-    partitions = LinkConfig(partitions=PARTED).partitions  # type: ignore[arg-type]
-    check_partitions(partitions, ["dva", "operator-1", "robot-1"])
+    check_partitions(PARTITIONS, ["dva", "operator-1", "robot-1"])
     with pytest.raises(ConfigError, match=r"'operator-\*' .*known: "):
-        check_partitions(partitions, ["dva", "robot-1"])
+        check_partitions(PARTITIONS, ["dva", "robot-1"])

@@ -29,31 +29,18 @@ def test_in_a_dialogue_the_acknowledgement_rides_on_the_answer():
     assert acknowledged_at(pair, 1.0) == [1.05]
 
 
-def test_in_a_dialogue_without_an_answer_it_waits_40_ms():
+@pytest.mark.parametrize(
+    ("written", "acknowledged"),
+    [([1.0, 1.1], [1.19]), ([1.0, 1.2, 1.5], [1.29, 1.55]), ([1.0, 1.2, 1.21], [1.26])],
+    ids=["it waits 40 ms", "after a wait in vain it is over", "a second segment is told at once"],
+)
+def test_in_a_dialogue_without_an_answer(written, acknowledged):
     pair = Pair()
     answer(pair)
-    pair.write_at([1.0, 1.1])
+    pair.write_at(written)
     pair.at(1.12, setattr, pair.peer, "on_readable", pair.read)
     pair.clock.run(2.0)
-    assert acknowledged_at(pair, 1.12) == pytest.approx([1.19])
-
-
-def test_after_a_wait_in_vain_the_dialogue_is_over():
-    pair = Pair()
-    answer(pair)
-    pair.write_at([1.0, 1.2, 1.5])
-    pair.at(1.12, setattr, pair.peer, "on_readable", pair.read)
-    pair.clock.run(2.0)
-    assert acknowledged_at(pair, 1.12) == pytest.approx([1.29, 1.55])
-
-
-def test_in_a_dialogue_a_second_segment_is_acknowledged_at_once():
-    pair = Pair()
-    answer(pair)
-    pair.write_at([1.0, 1.2, 1.21])
-    pair.at(1.12, setattr, pair.peer, "on_readable", pair.read)
-    pair.clock.run(2.0)
-    assert acknowledged_at(pair, 1.12) == pytest.approx([1.26])
+    assert acknowledged_at(pair, 1.12) == pytest.approx(acknowledged)
 
 
 def test_an_answer_later_than_40_ms_makes_no_dialogue():

@@ -23,6 +23,13 @@ def opened(delay=0.05, lose_out=(), lose_back=(), until=200.0, dead=False, opene
     return times, out, connection
 
 
+def ends(pair, end):
+    """When an end is told that it is over."""
+    told = []
+    end.on_end = lambda: told.append(round(pair.clock.now, 6))
+    return told
+
+
 def test_the_opener_may_write_after_one_round_trip_and_the_peer_after_one_and_a_half():
     assert opened()[0] == {"opener": 0.1, "peer": 0.15}
 
@@ -79,8 +86,7 @@ def test_an_unknown_congestion_control_is_named_with_the_known_ones():
 
 def test_what_was_written_before_finishing_is_still_delivered_even_if_it_was_lost():
     pair = Pair()
-    ended = []
-    pair.peer.on_end = lambda: ended.append(round(pair.clock.now, 6))
+    ended = ends(pair, pair.peer)
 
     def write_and_finish():
         pair.out.lose(1)
@@ -96,8 +102,7 @@ def test_what_was_written_before_finishing_is_still_delivered_even_if_it_was_los
 
 def test_data_for_a_finished_program_is_answered_by_a_reset():
     pair = Pair()
-    ended = []
-    pair.peer.on_end = lambda: ended.append(round(pair.clock.now, 6))
+    ended = ends(pair, pair.peer)
     pair.at(1.0, pair.opener.finish)
     pair.back.lost = set()
     pair.at(1.02, pair.peer.write, 200)
@@ -111,8 +116,7 @@ def test_data_for_a_finished_program_is_answered_by_a_reset():
 
 def test_finishing_with_unread_bytes_resets_at_once():
     pair = Pair(reads=False)
-    ended = []
-    pair.opener.on_end = lambda: ended.append(round(pair.clock.now, 6))
+    ended = ends(pair, pair.opener)
     pair.write_at([1.0])
     pair.at(1.2, pair.peer.finish)
     pair.clock.run(5.0)
@@ -135,8 +139,7 @@ def test_a_closed_connection_sends_and_tells_nothing_more():
 def test_a_dead_peer_is_given_up_after_the_stated_number_of_timeouts():
     # probe at 0.3 s, then time-outs after 0.3, 0.6 and 1.2 s, and the last wait of 2.4 s
     pair = Pair(opener=options(retries=3))
-    ended = []
-    pair.opener.on_end = lambda: ended.append(round(pair.clock.now, 6))
+    ended = ends(pair, pair.opener)
     pair.out.dead = True
     pair.write_at([1.0])
     pair.clock.run(20.0)

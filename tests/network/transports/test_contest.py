@@ -8,25 +8,14 @@ import pytest
 from dva_sim.kernel.config import validate
 from dva_sim.network.transports import Contest, ContestConfig, play
 
+CUBED = {"linear": 0.2, "square": 0.02, "decrease": 0.125}
+GAPS = {"tolerance_s": 0.02, "widen": 1.25, "narrow": 1.1, "longest_gap_s": 0.1}
 KINDS: dict[str, dict[str, Any]] = {
     "udp": {"kind": "udp"},
     "rtnp": {"kind": "rtnp", "header_bytes": 12},
-    "trinomial": {
-        "kind": "trinomial",
-        "header_bytes": 12,
-        "linear": 0.2,
-        "square": 0.02,
-        "decrease": 0.125,
-    },
+    "trinomial": {"kind": "trinomial", "header_bytes": 12} | CUBED,
     "irtp": {"kind": "irtp", "header_bytes": 12, "increase": 1.0, "decrease": 0.5},
-    "btp": {
-        "kind": "btp",
-        "header_bytes": 12,
-        "tolerance_s": 0.02,
-        "widen": 1.25,
-        "narrow": 1.1,
-        "longest_gap_s": 0.1,
-    },
+    "btp": {"kind": "btp", "header_bytes": 12} | GAPS,
     "tcp": {"kind": "tcp"},
     "zeromq": {"kind": "zeromq"},
 }
