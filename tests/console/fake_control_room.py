@@ -160,27 +160,14 @@ class ControlRoomDesk:
     def do_event_proposal(self, asked: Line) -> str:
         """Whom the policy would send."""
         strange = "<img src=x onerror=alert(1)>" if self.hostile else "free"
+        could = [(who, True, strange, when) for who, when in WHO.items()]
         rows = [
-            {
-                "label": who,
-                "robot": who.startswith("robot"),
-                "can": True,
-                "free": True,
-                "reason": strange,
-            }
-            | {"arrival_s": when}
-            for who, when in WHO.items()
+            {"label": who, "robot": who.startswith("robot"), "can": can, "free": can}
+            | {"reason": reason, "arrival_s": when}
+            for who, can, reason, when in (*could, ("guard-2", False, "at event 1", None))
         ]
-        busy = {
-            "label": "guard-2",
-            "robot": False,
-            "can": False,
-            "free": False,
-            "reason": "at event 1",
-        }
         about = {"event": asked["event"], "policy": "nearest", "reason": "is there first"}
         about |= {"task": "confirm", "label": "robot-2", "arrival_s": 41.0}
-        rows.append(busy | {"arrival_s": None})
         self.more = {"proposal": about | {"decide_within_s": None, "candidates": rows}}
         return ""
 

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import base64
-import json
 import math
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
 from fake_phones import DVA_ADDRESS, OFFER
 
-from dva_sim.worlds.geojson import write_features
+from dva_sim.console.scene import site_of
 from dva_sim.worlds.site import Site, load_site
-from dva_sim.worlds.site_export import features_of
-from dva_sim.worlds.tints import floor_tint
 
 PATTERNS = (("req-rep", "REQ/REP"), ("pub-sub", "PUB/SUB"), ("latest-wins", "PUB/SUB, latest wins"))
 LINK = {"delay_s": 0.05, "jitter_s": 0.01, "loss": 0.0, "rate_bps": 2e7, "processing_s": 0.05}
@@ -27,39 +22,6 @@ LIMITS = {
     "rate_bps": [1e4, 1e9],
     "processing_s": [0, 3],
 }
-
-
-def collection(site: Site) -> dict[str, Any]:
-    """A site as GeoJSON, in degrees."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "plan.geojson"
-        write_features(path, features_of(site), site.frame)
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
-
-
-def site_line(site: Site) -> dict[str, Any]:
-    """A site as the scene carries it."""
-    tints: dict[str, str] = {}
-    return {
-        "name": site.name,
-        "extent_m": [round(v, 3) for v in site.extent],
-        "origin": {"latitude_deg": site.frame.latitude, "longitude_deg": site.frame.longitude},
-        "features": collection(site),
-        "rooms": [
-            {
-                "name": room.name,
-                "polygon_m": np.round(room.polygon, 3).tolist(),
-                "floor": floor_tint(room, tints),
-                "outdoor": room.outdoor,
-            }
-            for room in site.rooms
-        ],
-        "walls_m": np.round(site.wall_lines, 3).tolist(),
-        "solids_m": [np.round(solid, 3).tolist() for solid in site.solids],
-        "doors_m": [np.round(door, 3).reshape(-1).tolist() for door in site.doors],
-        "exits_m": [[round(float(v), 3) for v in way.ends] for way in site.exits],
-    }
 
 
 class Walker:
@@ -145,7 +107,7 @@ class Scene:
             "scenario": "fake",
             "title": "A world that is not one",
             "seed": 1,
-            "site": site_line(self.site),
+            "site": site_of(self.site),
             "things": [self._thing(walker) for walker in self.all],
             "patterns": [{"name": name, "title": title} for name, title in PATTERNS],
             "link": LINK,

@@ -35,9 +35,7 @@ from fake_scene import LINK, Scene, Walker  # noqa: E402
 from dva_sim.cameras.frames import ALIVE, Picture, pack  # noqa: E402
 
 STEP = 0.02  # [s]
-SILENT_S = (
-    5.0  # without input; longer than in the real world, for pages may be late on a busy machine
-)
+SILENT_S = 5.0  # without input; longer than in the real world: pages may be late [s]
 
 
 class Seat:

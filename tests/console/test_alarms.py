@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
@@ -15,9 +16,11 @@ from dva_sim.console.alarms import (
     AlarmState,
 )
 
+CORRIDOR = "Corridor 2"
+
 
 def fire(number: int = 1, priority: str = "high", **more: Any) -> AlarmCondition:
-    room = more.pop("place", "Corridor 2")
+    room = more.pop("place", CORRIDOR)
     return AlarmCondition(
         f"event {number}", "fire", priority, room, f"fire {number}, {room}", **more
     )
@@ -31,44 +34,44 @@ def texts(alarms: Alarms, now: float = 100.0) -> list[str]:
     return [row["text"] for row in alarms.rows(now)]
 
 
-def test_a_condition_is_unacknowledged_until_somebody_has_seen_it():
+@pytest.fixture
+def burning() -> Alarms:
+    """One fire, reported at 0 s."""
     alarms = Alarms()
     alarms.update([fire()], 0.0)
-    assert states(alarms) == {"event 1": "unacknowledged"}
-
-    alarms.acknowledge("event 1", "ana")
-    alarms.update([fire()], 1.0)
-    assert states(alarms) == {"event 1": "acknowledged"}
-    assert alarms.rows(1.0)[0]["seen_by"] == "ana"
+    return alarms
 
 
-def test_what_is_over_and_seen_is_no_alarm_any_more():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.acknowledge("event 1", "ana")
-    alarms.update([], 1.0)
+def test_a_condition_is_unacknowledged_until_somebody_has_seen_it(burning):
+    assert states(burning) == {"event 1": "unacknowledged"}
 
-    assert states(alarms) == {}
-
-
-def test_what_is_over_before_anybody_saw_it_stays_as_returned_until_somebody_does():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.update([], 1.0)
-    assert states(alarms) == {"event 1": "returned"}
-
-    alarms.acknowledge("event 1", "ana")
-    assert states(alarms) == {}
+    burning.acknowledge("event 1", "ana")
+    burning.update([fire()], 1.0)
+    assert states(burning) == {"event 1": "acknowledged"}
+    assert burning.rows(1.0)[0]["seen_by"] == "ana"
 
 
-def test_what_comes_back_is_new_again():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.update([], 10.0)
-    alarms.update([fire()], 20.0)
+def test_what_is_over_and_seen_is_no_alarm_any_more(burning):
+    burning.acknowledge("event 1", "ana")
+    burning.update([], 1.0)
 
-    assert states(alarms) == {"event 1": "unacknowledged"}
-    assert alarms.rows(21.0)[0]["is_new"]
+    assert states(burning) == {}
+
+
+def test_what_is_over_before_anybody_saw_it_stays_as_returned_until_somebody_does(burning):
+    burning.update([], 1.0)
+    assert states(burning) == {"event 1": "returned"}
+
+    burning.acknowledge("event 1", "ana")
+    assert states(burning) == {}
+
+
+def test_what_comes_back_is_new_again(burning):
+    burning.update([], 10.0)
+    burning.update([fire()], 20.0)
+
+    assert states(burning) == {"event 1": "unacknowledged"}
+    assert burning.rows(21.0)[0]["is_new"]
 
 
 def test_an_alarm_that_becomes_graver_has_to_be_seen_again():
@@ -83,13 +86,11 @@ def test_an_alarm_that_becomes_graver_has_to_be_seen_again():
     assert states(alarms) == {"event 1": "acknowledged"}
 
 
-def test_what_was_seen_by_a_message_to_the_dva_is_seen_here():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.update([fire(seen_by="ben")], 1.0)
+def test_what_was_seen_by_a_message_to_the_dva_is_seen_here(burning):
+    burning.update([fire(seen_by="ben")], 1.0)
 
-    assert states(alarms) == {"event 1": "acknowledged"}
-    assert alarms.rows(1.0)[0]["seen_by"] == "ben"
+    assert states(burning) == {"event 1": "acknowledged"}
+    assert burning.rows(1.0)[0]["seen_by"] == "ben"
 
 
 def test_only_a_new_alarm_stands_out_and_only_for_5_seconds():
@@ -111,37 +112,31 @@ def test_the_list_has_the_gravest_first_then_what_nobody_saw_then_the_newest():
     assert [row["key"] for row in alarms.rows(9.0)] == ["event 4", "event 3", "event 2", "event 1"]
 
 
-def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.shelve("event 1", 60.0, "ana", 0.0)
-    alarms.update([fire()], 59.0)
-    assert texts(alarms) == []
-    (row,) = alarms.shelved(59.0)
+def test_a_shelved_alarm_is_out_of_the_list_until_its_end_and_then_new(burning):
+    burning.shelve("event 1", 60.0, "ana", 0.0)
+    burning.update([fire()], 59.0)
+    assert texts(burning) == []
+    (row,) = burning.shelved(59.0)
     assert (row["left_s"], row["shelved_by"]) == (1, "ana")
 
-    alarms.update([fire()], 60.0)
-    assert alarms.shelved(60.0) == []
-    assert alarms.rows(60.0)[0]["is_new"]
+    burning.update([fire()], 60.0)
+    assert burning.shelved(60.0) == []
+    assert burning.rows(60.0)[0]["is_new"]
 
 
-def test_no_shelf_lasts_longer_than_a_shift():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.shelve("event 1", 1e9, "ana", 0.0)
+def test_no_shelf_lasts_longer_than_a_shift(burning):
+    burning.shelve("event 1", 1e9, "ana", 0.0)
 
-    assert alarms.known["event 1"].shelved_until == LONGEST_SHELF
+    assert burning.known["event 1"].shelved_until == LONGEST_SHELF
 
 
-def test_what_returns_on_the_shelf_stays_shelved_when_it_comes_back():
-    alarms = Alarms()
-    alarms.update([fire()], 0.0)
-    alarms.shelve("event 1", 60.0, "ana", 0.0)
-    alarms.update([], 10.0)
-    alarms.update([fire()], 20.0)
+def test_what_returns_on_the_shelf_stays_shelved_when_it_comes_back(burning):
+    burning.shelve("event 1", 60.0, "ana", 0.0)
+    burning.update([], 10.0)
+    burning.update([fire()], 20.0)
 
-    assert texts(alarms) == []
-    assert len(alarms.shelved(20.0)) == 1
+    assert texts(burning) == []
+    assert len(burning.shelved(20.0)) == 1
 
 
 def test_ten_alarms_in_ten_minutes_are_a_flood_and_alike_ones_fold():
@@ -152,7 +147,7 @@ def test_ten_alarms_in_ten_minutes_are_a_flood_and_alike_ones_fold():
     assert len(texts(alarms)) == 9
 
     alarms.update([*nine, fire(9, "critical", place="Lab 318")], 1.0)
-    assert texts(alarms) == ["fire 9, Lab 318", "7 x fire, Corridor 2", "2 x fire, Hall"]
+    assert texts(alarms) == ["fire 9, Lab 318", f"7 x fire, {CORRIDOR}", "2 x fire, Hall"]
     assert alarms.is_flood
 
 

@@ -1,17 +1,16 @@
 """A console at a DVA that runs elsewhere: what messages tell, and nothing that they do not."""
 
 import json
-import re
 import signal
 import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers.console.console_program import started
 from helpers.network.free_ports import free_port
 from helpers.processes.command_line import call
 from helpers.processes.patience import becomes
-from helpers.processes.programs import Program, Programs, all_gone_after
+from helpers.processes.programs import Program, Programs
 
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.options import AttachOptions
@@ -50,11 +49,8 @@ def test_a_robot_is_shown_as_it_says_itself():
     holder = m.RobotHolder(id_of("operator", 1), "ana", 10.0), 2.0
     robot = told(status=status, holder=holder, heard=4.0)
     row = lines.robot_row(robot, 3, 5.0)
-    assert (row["mode"], row["holder_label"], row["session_age_s"]) == (
-        "Teleoperation",
-        "ana",
-        13.0,
-    )
+    shown = (row["mode"], row["holder_label"], row["session_age_s"])
+    assert shown == ("Teleoperation", "ana", 13.0)
     assert lines.positions({ROBOT: robot}, {ROBOT: 3}, HERE) == [[3, 300, -400, 1000, 250]]
     shown = lines.device_row(robot, 5.0, False, True)
     assert (shown["doing"], shown["heard_s"], shown["link"]) == ("Teleoperation", 1.0, "good")
@@ -67,17 +63,9 @@ def test_a_device_that_left_the_list_is_shown_as_lost_for_a_while():
 
 def test_an_event_is_shown_as_the_dva_tells_it():
     latitude, longitude = HERE.to_latlon(1.0, 2.0)
+    place, times = m.Position(latitude, longitude), {"age": 20.0, "state_for": 5.0}
     status = m.EventStatus(
-        event_id=4,
-        kind="fire",
-        position=m.Position(latitude, longitude),
-        severity=0.8,
-        confidence=0.9,
-        event_state="on_scene",
-        age=20.0,
-        state_for=5.0,
-        decisions=1,
-        responder=ROBOT,
+        4, "fire", place, 0.8, 0.9, "on_scene", **times, decisions=1, responder=ROBOT
     )
     row = lines.event_row(status, 100.0, {ROBOT: "robot-1"}, None, HERE)
     assert (row["state"], row["severity"], row["over"]) == ("on scene", "critical", False)
@@ -121,19 +109,12 @@ def test_keys_without_one_of_a_control_room_are_not_enough(tmp_path):
 # --- the programs ------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def programs(tmp_path: Path) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path)
-
-
 class Attached:
     """A console at a DVA, and what it knows."""
 
     def __init__(self, programs: Programs, dva: str, *words: str) -> None:
-        self.program = programs.start("console", "--no-open", "--port", "0", "--dva", dva, *words)
+        self.program, self.address = started(programs, "--dva", dva, *words)
         self.program.wait_to_say("Attached to:")
-        said = self.program.said
-        (self.address,) = re.findall(r"^Console: +(\S+)", said, re.MULTILINE)
 
     def _ask(self, path: str, body: object = None) -> dict:
         base, _, token = self.address.partition("?token=")

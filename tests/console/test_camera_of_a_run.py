@@ -3,17 +3,17 @@
 import io
 import json
 import os
-import re
 import signal
 import subprocess
-import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers.console.console_program import started
 from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.processes.programs import all_gone_after
 from PIL import Image
 
 pytestmark = pytest.mark.system
@@ -22,20 +22,9 @@ pytestmark = pytest.mark.system
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, int]]:
     """The address of a console, and its process."""
-    out = tmp_path_factory.mktemp("console") / "out"
-    words = ["console", "--no-open", "--port", "0", "--no-token"]
-    with out.open("wb") as file:
-        command = [sys.executable, "-m", "dva_sim.cli", *words]
-        process = subprocess.Popen(command, stdout=file, stderr=file)
-    wanted = re.compile(r"^Console: +(http://\S+/)\n", re.MULTILINE)
-    try:
-        assert becomes(lambda: wanted.search(out.read_text()) or process.poll() is not None)
-        found = wanted.search(out.read_text())
-        assert found is not None, out.read_text()
-        yield found[1], process.pid
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.wait(PATIENCE_S)
+    for programs in all_gone_after(tmp_path_factory.mktemp("console")):
+        console, address = started(programs, "--no-token")
+        yield address, console.process.pid
 
 
 def picture(base: str, label: str = "robot-1", after: int = -1) -> bytes:

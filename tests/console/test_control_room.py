@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.console.simulated_phone import PhonePage
+from helpers.console.simulated_phone import FIRE, PhonePage
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
@@ -13,8 +13,6 @@ from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.core.events import State
 from dva_sim.protocol.mistakes import check_message
 from dva_sim.recordings.audit_log import AuditRow, read_rows, verify
-
-FIRE = [{"kind": "fire", "room": "North office", "at_s": 2, "latest_s": 2, "reported": True}]
 
 
 def page(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> PhonePage:
@@ -35,8 +33,7 @@ def room(monkeypatch: pytest.MonkeyPatch) -> PhonePage:
 
 def fire(one: PhonePage) -> None:
     """Wait until it is reported and told."""
-    while not events(one):
-        one.let(0.5)
+    one.until(lambda: events(one))
     one.let(0.3)
 
 
@@ -218,10 +215,7 @@ def test_a_robot_goes_and_looks_by_itself_and_is_given_back(room):
     assert done, text
     assert room.robot(0).controller.mode is Mode.MISSION
 
-    end = room.world.clock.now + 400.0
-    while room.robot(0).controller.grant is not None and room.world.clock.now < end:
-        room.let(5.0)
-    assert room.robot(0).controller.grant is None
+    room.until(lambda: room.robot(0).controller.grant is None, 400.0, 5.0)
 
 
 def test_an_alarm_is_seen_at_the_dva_where_an_event_is_behind_it(room):

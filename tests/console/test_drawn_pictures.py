@@ -32,10 +32,7 @@ class Drawing(Page):
 @pytest.fixture
 def page(monkeypatch):
     page = Drawing(monkeypatch)
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.want(0.2)
-    page.let(2.0)
+    page.sets_out(0.2, then=2.0)
     assert page.robot().body.speed > 0.05
     return page
 
@@ -128,8 +125,6 @@ def test_a_picture_that_there_never_was_makes_no_command_younger(page, seen):
 
 def test_a_program_that_says_nothing_of_pictures_drives_as_before(monkeypatch):
     page = Page(monkeypatch)
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.want(0.2)
+    page.sets_out(0.2)
     page.let(2 * LIMIT)
     assert page.robot().controller.mode is Mode.TELEOPERATION

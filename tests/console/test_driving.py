@@ -16,10 +16,7 @@ def page(monkeypatch):
 
 @pytest.fixture
 def driving(page):
-    assert page.do("take", robots=[0, 1])[0]
-    assert page.do("start")[0]
-    page.want(0.5)
-    page.let(3.0)
+    page.sets_out(0.5, robots=[0, 1], then=3.0)
     return page
 
 
@@ -32,10 +29,7 @@ def test_two_robots_are_driven_by_the_same_input(driving):
 
 
 def test_input_turns_left_for_positive_values_and_is_a_share_of_the_robots_limits(page):
-    assert page.do("take", robots=["robot-1"])[0]
-    assert page.do("start")[0]
-    page.want(0.0, 0.5)
-    page.let(2.0)
+    page.sets_out(0.0, 0.5, robots=["robot-1"], then=2.0)
     assert page.robot().body.turn_rate == pytest.approx(0.262, abs=0.03)
     assert page.drive()["wanted"] == [0.0, 0.262]
     assert page.drive()["command"] == pytest.approx([0.0, 0.262], abs=0.002)
@@ -74,14 +68,6 @@ def test_what_ends_a_drive_ends_it_for_good(driving, end, why):
         assert robot.controller.mode is Mode.IDLE
         assert robot.body.speed == pytest.approx(0.0, abs=1e-3)
     assert [log.outcome for log in logs] == [why, why]
-
-
-def test_who_stops_may_start_again(driving):
-    assert driving.do("stop")[0]
-    driving.let(2.0)
-    assert driving.do("start")[0]
-    driving.let(2.0)
-    assert driving.robot().body.speed > 0.2
 
 
 def test_while_held_by_lag_nobody_starts_and_the_page_says_why(driving):
@@ -129,8 +115,8 @@ def test_a_permission_on_its_way_to_the_robot_is_news_only_when_it_takes_long(pa
     not_yet = m.Reply(1, m.NOT_PERMITTED, f"{person.device.id_tag} holds no permission here")
     asked["waits"](not_yet)
     assert person.alert == ""
-    asked["waits"](m.Reply(1, m.BUSY, "driven by hand, at the robot"))
-    assert unnamed(person.alert, "robot-1", "driven by hand, at the robot") == []
+    asked["waits"](m.Reply(1, m.BUSY, "driven by hand"))
+    assert unnamed(person.alert, "robot-1", "driven by hand") == []
     page.let(6.0)
     asked["waits"](not_yet)
     assert unnamed(person.alert, "robot-1", "permission") == []

@@ -3,13 +3,11 @@
 import math
 
 import pytest
-from helpers.console.simulated_phone import PhonePage
+from helpers.console.simulated_phone import FIRE, PhonePage
 
 from dva_sim.core.events import State
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.scenario import build, load
-
-FIRE = [{"kind": "fire", "room": "North office", "at_s": 2, "latest_s": 2, "reported": True}]
 
 
 @pytest.fixture
@@ -38,10 +36,7 @@ def line(page, client="g1"):
 def ordered(page):
     """Wait until the person's guard has an order; stand near the fire so that it is the nearest."""
     assert page.do("guard_join", guard="guard-2")[0]
-    end = page.world.clock.now + 60.0
-    while guard(page).order is None and page.world.clock.now < end:
-        page.let(0.5)
-    assert guard(page).order is not None
+    page.until(lambda: guard(page).order is not None)
     page.let(0.2)
     return line(page)["order"]
 
@@ -127,12 +122,9 @@ def test_what_is_declined_goes_to_others_and_the_reason_is_told(page):
 
 
 def test_where_nobody_sits_an_order_is_declined_after_half_a_minute(page):
-    end = page.world.clock.now + 60.0
-    while guard(page).order is None and page.world.clock.now < end:
-        page.let(0.5)
+    page.until(lambda: guard(page).order is not None)
     then = page.world.clock.now
-    while guard(page).order is not None:
-        page.let(0.5)
+    page.until(lambda: guard(page).order is None)
     assert 29.0 < page.world.clock.now - then < 32.0
     assert guard(page).activity == "nobody there"
 
@@ -233,7 +225,6 @@ def test_without_an_order_there_is_nothing_to_say(page):
 
 def test_operators_are_people_by_number(monkeypatch):
     page = PhonePage(monkeypatch, operator__count=3, operator__kind={1: "person", 3: "person"})
-    labels = set(page.world.run.dva.desk.registry.entries)
     page.let(1.0)
     labels = {e.device.label for e in page.world.run.dva.desk.registry.entries.values()}
     assert {"console-1", "console-2", "operator-2"} <= labels

@@ -23,12 +23,17 @@ from dva_sim.simulation.full.stage import DVA, id_of, kind_of
 pytestmark = pytest.mark.system
 
 
+def begun(monkeypatch, out, *changes, seed=1):
+    """A console whose results are kept, and its page."""
+    results = KeptResults(out, "hands-on", changes, seed, False)
+    page = Page(monkeypatch, results.scenario.model_dump(mode="json"), seed, measured=True)
+    results.follow(page.world)
+    return results, page
+
+
 def driven(monkeypatch, out, seed=1, end=KeptResults.write):
     """The results of two drives of two robots by one person, under two patterns."""
-    results = KeptResults(out, "hands-on", ["link.delay_s=0.1"], seed, False)
-    scenario = results.scenario.model_dump(mode="json")
-    page = Page(monkeypatch, scenario, results.seed, measured=True)
-    results.follow(page.world)
+    results, page = begun(monkeypatch, out, "link.delay_s=0.1", seed=seed)
     page.let(1.0)
     assert page.do("take", robots=[0, 1])[0]
     for pattern in ("latest-wins", "req-rep"):
@@ -107,14 +112,10 @@ def test_the_same_drives_give_the_same_bytes(whole, cut_off):
 
 def test_what_a_person_calls_a_device_is_in_no_table(monkeypatch, tmp_path):
     out = tmp_path / "out"
-    results = KeptResults(out, "hands-on", [], 1, False)
-    page = Page(monkeypatch, results.scenario.model_dump(mode="json"), measured=True)
-    results.follow(page.world)
+    results, page = begun(monkeypatch, out)
     device = page.world.person(0).device
     device.label = device.labels[device.id_tag] = "Jane's own"
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.let(3.0)
+    page.sets_out(then=3.0)
     results.write()
     results.close()
     for table in Results.load(out).tables:
@@ -227,7 +228,7 @@ def test_a_disk_that_stays_full_is_told_and_what_it_took_is_kept(monkeypatch, tm
         killed_thread = results._kept._thread
         monkeypatch.setattr(KeptRun, "_keep", full)
         monkeypatch.setattr(kept_run, "AGAIN", 0.01)
-        with pytest.raises(DvaSimError, match="database or disk is full"):
+        with pytest.raises(DvaSimError, match="disk is full"):
             results.write()
         assert not killed_thread.is_alive()
 
@@ -239,13 +240,8 @@ def test_a_disk_that_stays_full_is_told_and_what_it_took_is_kept(monkeypatch, tm
 
 
 def test_memory_does_not_grow_with_what_was_kept(monkeypatch, tmp_path):
-    results = KeptResults(tmp_path / "out", "hands-on", [], 1, False)
-    page = Page(monkeypatch, results.scenario.model_dump(mode="json"), measured=True)
-    results.follow(page.world)
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.want(0.3, 0.5)
-    page.let(30.0)
+    results, page = begun(monkeypatch, tmp_path / "out")
+    page.sets_out(0.3, 0.5, then=30.0)
     (drive,) = page.world.recorder.drives
     assert drive.sent > 500
     for grown in (drive.frames, drive.commands, drive.applied, drive.intents):

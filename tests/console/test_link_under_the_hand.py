@@ -22,10 +22,7 @@ def ages(page, seconds):
 @pytest.fixture
 def driving(monkeypatch):
     page = Page(monkeypatch, pattern="req-rep", command__rate_hz=20)
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.want(0.3)
-    page.let(2.0)
+    page.sets_out(0.3, then=2.0)
     return page
 
 
@@ -150,9 +147,7 @@ def test_until_the_first_command_comes_the_robot_says_what_it_waits_for(monkeypa
     page = Page(monkeypatch)
     assert page.do("link", delay_s=0.5)[0]
     page.let(10.0)
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.let(0.6)
+    page.sets_out(then=0.6)
     told = page.told("rows")[-1]["robots"][0]["stands"]
     assert "connection" in told
 

@@ -41,9 +41,15 @@ class Desk:
             tap.serve(lambda request: request.answer(b"re"), Request(data, lambda _: None))
 
 
-def test_nothing_taps_a_device_that_nobody_looks_at():
-    desk = Desk()
-    desk.logs.keep("dva")
+@pytest.fixture
+def desk() -> Desk:
+    """One whose log is kept."""
+    made = Desk()
+    made.logs.keep("dva")
+    return made
+
+
+def test_nothing_taps_a_device_that_nobody_looks_at(desk):
     assert list(desk.network.taps) == [DVA]
     desk.logs.look({"robot-1": True, "nobody": False})
     assert list(desk.network.taps) == [DVA, ROBOT]
@@ -51,22 +57,16 @@ def test_nothing_taps_a_device_that_nobody_looks_at():
     assert list(desk.network.taps) == [DVA]
 
 
-def test_a_batch_holds_what_came_since_the_last_one():
-    desk = Desk()
-    desk.logs.keep("dva")
+def test_a_batch_holds_what_came_since_the_last_one(desk):
     desk.ask(b"one")
     desk.ask(b"two")
     (told,) = desk.logs.batches()
-    assert [(one[0], one[2], one[3]) for one in told["lines"]] == [
-        (1, "one", "re"),
-        (2, "two", "re"),
-    ]
+    found = [(one[0], one[2], one[3]) for one in told["lines"]]
+    assert found == [(1, "one", "re"), (2, "two", "re")]
     assert desk.logs.batches() == []
 
 
-def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not():
-    desk = Desk()
-    desk.logs.keep("dva")
+def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(desk):
     for n in range(1, 1405):
         desk.ask(b"%d" % n)
     (told,) = desk.logs.batches()
@@ -80,9 +80,7 @@ def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not():
     assert len(line_["lines"]) == AT_ONCE
 
 
-def test_large_messages_make_a_batch_short_and_are_cut():
-    desk = Desk()
-    desk.logs.keep("dva")
+def test_large_messages_make_a_batch_short_and_are_cut(desk):
     for _ in range(60):
         desk.ask(b"x" * 60_000)
     (told,) = desk.logs.batches()
@@ -138,9 +136,8 @@ def test_a_row_says_who_asked_what_and_what_came_of_it():
     logs.names[DVA] = "dva"
     register = m.Registration("BQ Curie 2", "TeleOp", "192.168.0.9:5600")
     wish = m.PermissionRequest(ROBOT, "teleoperation")
+    looks = looking(logs)
     logs.take(batch(line(1, said(1, register)), line(2, said(2, wish, 7), m.BUSY)))
-    looks = Looks(logs, True)
-    looks.look({"dva": {}}, [])
     registered, asked = looks.next()["lines"]
     assert (registered["kind"], registered["from_label"]) == ("RegMsg", "BQ Curie 2")
     assert asked == {
@@ -190,13 +187,12 @@ def test_an_answer_that_comes_later_changes_the_row_and_not_its_place():
 def test_a_page_sees_what_its_filter_takes(wanted, numbers):
     logs = KeptLogs()
     register = m.Registration("BQ Curie 2", "TeleOp", "192.168.0.9")
-    beat = said(4, m.Heartbeat(), None)
     logs.take(
         batch(
             line(1, said(1, register)),
             line(2, said(2, m.PermissionRequest(PHONE, "missions")), m.BUSY),
             line(3, said(3, m.GetDeviceList(), source=ROBOT), None),
-            line(4, beat, None, published=True),
+            line(4, said(4, m.Heartbeat(), None), None, published=True),
         )
     )
     looks = Looks(logs, True)

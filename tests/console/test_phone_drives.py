@@ -16,14 +16,7 @@ def page(monkeypatch):
 
 @pytest.fixture
 def driving(page):
-    assert page.register()["ok"]
-    assert page.permit()["ok"]
-    assert page.calibrate()["ok"]
-    page.held = HeldPhone(page)
-    page.held.tilt(10.3)  # five levels of 0.35 m/s^2
-    page.let(1.0)
-    assert page.do("start")[0]
-    page.let(3.0)
+    page.drives_by_tilt()
     return page
 
 
@@ -122,7 +115,7 @@ def test_the_second_who_asks_for_a_robot_is_told_who_holds_it(driving):
     assert driving.register(client="p2", label="second")["ok"]
     answer = driving.permit(client="p2")
     assert not answer["ok"]
-    assert "BQ Curie 2" in answer["text"]
+    assert "phone p1" in answer["text"]
     assert driving.permit(1, client="p2")["ok"]
 
 
@@ -175,14 +168,8 @@ def test_readings_are_live_before_anybody_registers_or_calibrates(page):
 @pytest.mark.parametrize("pipeline", ["default", "dissertation"])
 @pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
 def test_every_pipeline_and_mapping_drives(page, pipeline, mapping):
-    assert page.register()["ok"]
-    assert page.permit()["ok"]
-    assert page.calibrate(pipeline=pipeline, mapping=mapping)["ok"]
-    held = HeldPhone(page)
-    held.tilt(10.3)
-    page.let(0.5)
-    assert page.do("start")[0]
-    page.let(2.5)  # the document's app says nothing while nothing changes: the watchdog takes 3 s
+    # The document's app says nothing while nothing changes: the watchdog takes 3 s.
+    page.drives_by_tilt(pipeline=pipeline, mapping=mapping, then=2.5)
     assert page.robot().body.speed == pytest.approx(0.25, abs=0.06)
     assert (page.phone()["pipeline"], page.phone()["mapping"]) == (pipeline, mapping)
 
@@ -292,13 +279,7 @@ def test_who_sits_there_next_steers_without_that_phone(monkeypatch):
 def answered(monkeypatch, **robot):
     """Times from a command to its reply [s], of a phone with the dissertation's pipeline."""
     page = PhonePage(monkeypatch, pattern="req-rep", **robot)
-    assert page.register()["ok"]
-    assert page.permit()["ok"]
-    assert page.calibrate(pipeline="dissertation", filter=None)["ok"]
-    page.held = HeldPhone(page)
-    page.held.tilt(10.3)
-    page.let(1.0)
-    assert page.do("start")[0]
+    page.drives_by_tilt(pipeline="dissertation", filter=None, then=0.0)
     for n in range(30):  # what does not change is not sent again
         page.held.tilt(8.0 + n % 2 * 4.0)
         page.let(1.0)

@@ -6,10 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 from helpers.console.simulated_phone import HeldPhone, PhonePage
+from helpers.processes.command_line import call
 
 from dva_sim.agents.tilt import Accelerometer, load_part
 from dva_sim.agents.tilt.accelerometer import GRAVITY
-from dva_sim.cli import call
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.motion import MotionSample, MotionWriter, read_motion, replayed
 from dva_sim.recordings.motion_figures import figures_of
@@ -116,26 +116,20 @@ def test_figures_are_those_of_the_part(at_rest):
     assert found.resolution_mg == pytest.approx(0.061, rel=0.01)
 
 
-def run(*words):
-    return call([*map(str, words)])
+def test_the_command_tells_figures_and_writes_a_part_that_can_be_named(at_rest, tmp_path):
+    assert "2950 samples in 6" in call("phone-log", at_rest).stdout
+    assert json.loads(call("phone-log", at_rest, "--json").stdout)["gaps"] == 1
+    words = ("phone-log", at_rest, "--part", tmp_path / "mine.yaml")
+    assert call(*words).returncode == 0
+    made, named = load_part(str(tmp_path / "mine.yaml")), load_part("mpu6050")
+    assert made.noise == pytest.approx(named.noise, rel=0.15)
+    assert call(*words).returncode != 0
 
 
-def test_the_command_tells_figures_and_writes_a_part_that_can_be_named(at_rest, tmp_path, capsys):
-    assert run("phone-log", at_rest) == 0
-    assert "2950 samples in 6" in capsys.readouterr().out
-    assert run("phone-log", at_rest, "--json") == 0
-    assert json.loads(capsys.readouterr().out)["gaps"] == 1
-    assert run("phone-log", at_rest, "--part", tmp_path / "mine.yaml") == 0
-    assert load_part(str(tmp_path / "mine.yaml")).noise == pytest.approx(
-        load_part("mpu6050").noise, rel=0.15
-    )
-    assert run("phone-log", at_rest, "--part", tmp_path / "mine.yaml") != 0
-
-
-def test_the_command_prints_commands(drive, tmp_path, capsys):
+def test_the_command_prints_commands(drive, tmp_path):
     drive(tmp_path)
-    assert run("phone-log", tmp_path / "motion-1.csv", "--commands", "--rate", "20") == 0
-    first, *rows = capsys.readouterr().out.splitlines()
+    told = call("phone-log", tmp_path / "motion-1.csv", "--commands", "--rate", "20")
+    first, *rows = told.stdout.splitlines()
     assert first.startswith("t_s,speed_mps")
     assert len(rows) > 20
 

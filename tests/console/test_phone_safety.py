@@ -4,7 +4,7 @@ import json
 import math
 
 import pytest
-from helpers.console.simulated_phone import HeldPhone, PhonePage
+from helpers.console.simulated_phone import PhonePage
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -18,32 +18,11 @@ def page(monkeypatch):
     return PhonePage(monkeypatch)
 
 
-def set_out(page, client="p1", robot=0):
-    """A phone that drives straight on."""
-    assert page.register(client, label=f"phone {client}")["ok"]
-    assert page.permit(robot, client=client)["ok"]
-    assert page.calibrate(client)["ok"]
-    held = HeldPhone(page, client)
-    held.tilt(10.3)
-    page.let(1.0)
-    assert page.do("start", client=client)[0]
-    page.let(3.0)
-    return held
-
-
 @pytest.fixture
 def driving(page):
-    page.held = set_out(page)
+    page.drives_by_tilt()
     assert page.robot().body.speed > 0.2
     return page
-
-
-def lift(page):
-    page.held.hand = False
-
-
-def turn(page):
-    page.held.orientation = 90
 
 
 def send_nonsense(page):
@@ -60,8 +39,8 @@ def send_the_past(page):
     ("end", "within", "why"),
     [
         (lambda page: page.held.put_away(), 0.5, "silent for 0.3 s"),
-        (lift, 0.1, "thumb was lifted"),
-        (turn, 0.1, "screen has turned"),
+        (lambda page: setattr(page.held, "hand", False), 0.1, "thumb was lifted"),
+        (lambda page: setattr(page.held, "orientation", 90), 0.1, "screen has turned"),
         (send_nonsense, 0.5, "silent"),
         (send_the_past, 0.5, "silent"),
         (lambda page: page.actions.take({"client": "p1", "do": "gone"}), 0.05, "hidden"),
@@ -86,7 +65,7 @@ def test_what_ends_a_drive_ends_it_at_once_and_for_good(driving, end, within, wh
 
 
 def test_who_was_stopped_starts_again_by_a_new_start_only(driving):
-    lift(driving)
+    driving.held.hand = False
     driving.let(2.5)
     driving.held.hand = True
     driving.let(1.0)
@@ -224,7 +203,7 @@ def test_any_calibration_is_one_or_refused(message):
 def test_no_stream_of_samples_breaks_the_world_or_leaves_its_limits(stream):
     with pytest.MonkeyPatch.context() as patch:
         page = PhonePage(patch)
-        set_out(page).put_away()
+        page.drives_by_tilt().put_away()
         for message in stream:
             page.actions.take({**message, "do": "samples", "client": "p1"})
             page.let(0.1)

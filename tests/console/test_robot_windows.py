@@ -143,10 +143,7 @@ def test_an_emergency_wins_over_the_hand_and_is_told_with_who_pressed_it(page):
 
 def test_latency_is_that_of_the_link_one_way_and_the_pictures_there_and_back(monkeypatch):
     page = opened(Page(monkeypatch, link__delay_s=0.1, guard__count=0, bystander__count=0))
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.want(0.3)
-    page.let(5.0)
+    page.sets_out(0.3, then=5.0)
     shown = window(page)
     assert shown["one_way"]["median_ms"] == pytest.approx(100, abs=5)
     assert shown["one_way"]["last_ms"] <= shown["one_way"]["largest_ms"]
@@ -210,10 +207,7 @@ def test_replies_that_are_dropped_end_in_time_outs_and_break_no_rule(page):
 
 
 def test_a_robot_that_freezes_in_a_drive_is_stopped_by_its_watchdog(page):
-    assert page.do("take", robots=[0])[0]
-    assert page.do("start")[0]
-    page.want(0.5)
-    page.let(2.0)
+    page.sets_out(0.5, then=2.0)
     page.do("fault", robot=0, what="freeze", on=True)
     page.let(1.0)
     assert page.robot().body.speed > 0.2

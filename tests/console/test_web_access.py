@@ -13,40 +13,14 @@ HERE = rules("127.0.0.1", 8123, tokens=TOKENS)
 EVERYWHERE = rules("0.0.0.0", 8123, ["Lab-PC.example"], TOKENS)
 
 
-@pytest.mark.parametrize(
-    "host",
-    [
-        "127.0.0.1:8123",
-        "localhost:8123",
-        "LOCALHOST:8123",
-        "[::1]:8123",
-        "127.0.0.1",
-        "localhost:9",
-    ],
-)
-def test_a_local_console_answers_to_the_names_of_this_machine(host):
-    assert HERE.refusal(Asked(host)) is None
-
-
-@pytest.mark.parametrize(
-    "host",
-    [
-        "evil.example:8123",
-        "localhost.evil.example",
-        "127.0.0.1.nip.io:8123",
-        "127.0.0.1@evil.example",
-        "10.0.0.7:8123",
-        "[::2]:8123",
-        "[::1",
-        "::1",
-        "localhost:8123:1",
-        "localhost:",
-        " localhost",
-        "",
-    ],
-)
-def test_it_answers_to_no_other_name(host):
-    assert HERE.refusal(Asked(host))[0] == 421
+def test_a_local_console_answers_to_the_names_of_this_machine_and_to_no_other():
+    for host in ("127.0.0.1", "localhost", "LOCALHOST", "[::1]"):
+        for port in ("", ":8123", ":9"):
+            assert HERE.refusal(Asked(host + port)) is None, host + port
+    others = ["evil.example:8123", "localhost.evil.example", "127.0.0.1.nip.io:8123", "", "::1"]
+    others += ["127.0.0.1@evil.example", "10.0.0.7:8123", "[::2]:8123", "[::1", " localhost"]
+    for host in (*others, "localhost:8123:1", "localhost:"):
+        assert HERE.refusal(Asked(host))[0] == 421, host
 
 
 def test_served_on_all_addresses_it_answers_to_addresses_and_given_names_only():

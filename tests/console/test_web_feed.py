@@ -24,6 +24,14 @@ def all_of(feed):
     return found
 
 
+def opened(*lines):
+    """A run of which so much was told, and a page that knows it."""
+    state = told(scene(), *lines)
+    feed = PageFeed(state, "c1")
+    all_of(feed)
+    return state, feed
+
+
 def test_a_page_begins_with_all_there_is():
     state = told(scene(), places(100, [0, 1, 2, 3, 4]), {"k": "events", "t": 100, "events": []})
     (snap,) = all_of(PageFeed(state, "c1"))
@@ -42,18 +50,14 @@ def test_a_page_that_opens_before_the_run_gets_the_scene_when_it_is_told():
 
 
 def test_only_who_moved_is_told():
-    state = told(scene(), places(0, [0, 1, 1, 0, 0], [1, 5, 5, 0, 0]))
-    feed = PageFeed(state, "c1")
-    all_of(feed)
+    state, feed = opened(places(0, [0, 1, 1, 0, 0], [1, 5, 5, 0, 0]))
     state.take(places(100, [0, 2, 1, 0, 0], [1, 5, 5, 0, 0]))
     (line,) = all_of(feed)
     assert (line["t"], line["p"]) == (100, [[0, 2, 1, 0, 0]])
 
 
 def test_a_page_that_slept_gets_all_who_moved_meanwhile_once():
-    state = told(scene(), places(0, [0, 0, 0, 0, 0], [1, 0, 0, 0, 0], [2, 0, 0, 0, 0]))
-    feed = PageFeed(state, "c1")
-    all_of(feed)
+    state, feed = opened(places(0, [0, 0, 0, 0, 0], [1, 0, 0, 0, 0], [2, 0, 0, 0, 0]))
     state.take(places(100, [0, 1, 0, 0, 0], [1, 0, 0, 0, 0], [2, 0, 0, 0, 0]))
     state.take(places(200, [0, 2, 0, 0, 0], [1, 9, 0, 0, 0]))
     (line,) = all_of(feed)
@@ -69,18 +73,14 @@ def test_the_same_text_serves_all_who_are_equally_far():
 
 
 def test_of_other_kinds_only_the_newest_is_told():
-    state = told(scene())
-    feed = PageFeed(state, "c1")
-    all_of(feed)
+    state, feed = opened()
     for n in range(5):
         state.take({"k": "rows", "t": n, "clock": {"factor": n}})
     assert [(m["k"], m["t"]) for m in all_of(feed)] == [("rows", 4)]
 
 
 def test_a_fast_kind_does_not_starve_the_others():
-    state = told(scene())
-    feed = PageFeed(state, "c1")
-    all_of(feed)
+    state, feed = opened()
     seen = set()
     for n in range(8):  # a slow page: one message each time, and all kinds are new each time
         state.take(places(n, [0, n, 0, 0, 0]))
@@ -92,9 +92,7 @@ def test_a_fast_kind_does_not_starve_the_others():
 
 
 def test_the_story_comes_whole_or_as_a_snapshot():
-    state = told(scene())
-    feed = PageFeed(state, "c1")
-    all_of(feed)
+    state, feed = opened()
     for n in range(3):
         state.take({"k": "story", "t": n, "what": str(n)})
     assert [m["what"] for m in all_of(feed)] == ["0", "1", "2"]

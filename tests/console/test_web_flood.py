@@ -1,13 +1,11 @@
 """Connections that ask for nothing keep nobody out: an emergency stop and a page get through."""
 
-import http.client
 import json
 import socket
 import ssl
 import subprocess
 import sys
 from contextlib import contextmanager, suppress
-from threading import Thread
 
 import pytest
 from helpers.console.served_console import serving_phones
@@ -39,33 +37,12 @@ def flooded(port, *words):
             process.wait(PATIENCE_S)
 
 
-def stop(served, port, tls):
-    """An emergency stop by a request on a connection of its own; status and answer."""
-
-    def simulate():
-        asked = served.next_asked("emergency")
-        served.say({"k": "done", "id": asked["id"], "ok": True, "text": "stopped"})
-
-    thread = Thread(target=simulate)
-    thread.start()
-    kind = http.client.HTTPSConnection if tls else http.client.HTTPConnection
-    more = {"context": ssl._create_unverified_context()} if tls else {}
-    connection = kind("127.0.0.1", port, timeout=PATIENCE_S, **more)
-    headers = {"Content-Type": "application/json", "Authorization": f"Bearer {served.drive}"}
-    connection.request("POST", "/api/emergency", "{}", headers)
-    answer = connection.getresponse()
-    found = answer.status, json.loads(answer.read())
-    connection.close()
-    thread.join()
-    return found
-
-
 @pytest.mark.system
 @pytest.mark.parametrize("tls", [False, True], ids=["the console's port", "the phones' port"])
 def test_under_a_flood_of_connections_a_stop_and_a_page_get_through(console, tls):
-    port = console.phones_port if tls else console.port
-    more = {"ssl": ssl._create_unverified_context()} if tls else {}
-    scheme = "wss" if tls else "ws"
+    port, scheme = (console.phones_port, "wss") if tls else (console.port, "ws")
+    context = ssl._create_unverified_context() if tls else None
+    more = {"ssl": context} if tls else {}
     headers = {"Authorization": f"Bearer {console.drive}"}
 
     def page():
@@ -73,8 +50,9 @@ def test_under_a_flood_of_connections_a_stop_and_a_page_get_through(console, tls
 
     with page() as before, flooded(port, *(["--tls"] if tls else [])):
         for _ in range(3):
-            status, answer = stop(console, port, tls)
-            assert (status, answer["ok"]) == (200, True)
+            words = ("/api/emergency", "POST", {}, console.drive, None, context)
+            answer, _ = console.answering("emergency", console.ask, *words)
+            assert (answer.status, answer.json["ok"]) == (200, True)
         with page() as late:
             assert json.loads(late.recv(PATIENCE_S))["k"] == "you"
         console.say({"k": "story", "t": 1, "who": "a", "what": "b", "kind": "event"})

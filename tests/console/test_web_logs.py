@@ -2,14 +2,13 @@
 
 import io
 import json
-import subprocess
-import sys
 import zipfile
 from urllib.parse import quote
 
 import pytest
 from helpers.console.message_log_lines import DVA, PHONE, ROBOT, asks, batch, line, said
 from helpers.console.served_console import serving
+from helpers.processes.command_line import call
 from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 from websockets.exceptions import ConnectionClosed
@@ -112,8 +111,7 @@ def test_the_file_of_a_log_holds_messages_that_pass_the_check(console, tmp_path)
         "000002-PermissionRequest-request.xml",
         "000005-GetDeviceList-request.xml",
     ]
-    command = [sys.executable, "-m", "dva_sim.cli", "check", *map(str, good)]
-    told = subprocess.run(command, capture_output=True, text=True)
+    told = call("check", *good)
     assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "7 files: 7 valid")
     assert (tmp_path / "refused" / "000003-GetDeviceList-request.xml").read_bytes() == BROKEN
     assert len((tmp_path / "log.csv").read_text().splitlines()) == 6

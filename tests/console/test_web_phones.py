@@ -3,7 +3,6 @@
 import http.client
 import json
 import ssl
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 
@@ -11,7 +10,6 @@ import pytest
 from helpers.console.served_console import Answer, Served, serving, serving_phones
 from helpers.processes.patience import PATIENCE_S
 from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
-from websockets.sync.client import connect
 
 from dva_sim.console.qr_code import half_blocks, svg
 from dva_sim.console.web.certificate_files import certificates
@@ -36,41 +34,18 @@ def trusting(served: Served) -> ssl.SSLContext:
 
 def ask(served, path, method="GET", body=None, token=None, host=None, **headers) -> Answer:
     """A request of a phone, by https."""
-    port = served.phones_port
-    connection = http.client.HTTPSConnection(
-        "127.0.0.1", port, timeout=PATIENCE_S, context=trusting(served)
-    )
-    sent = {name.replace("_", "-"): value for name, value in headers.items()}
-    sent["Host"] = host or f"127.0.0.1:{port}"
-    if token:
-        sent["Cookie"] = f"dva_sim_{port}={token}"
-    if body is not None:
-        sent["Content-Type"] = "application/json"
-    try:
-        connection.request(method, path, None if body is None else json.dumps(body), sent)
-        found = connection.getresponse()
-        return Answer(found.status, {k.lower(): v for k, v in found.getheaders()}, found.read())
-    finally:
-        connection.close()
+    return served.ask(path, method, body, token, host, trusting(served), **headers)
 
 
-def wss(served, path, token, origin=None):
+def wss(served, path, token, origin="own"):
     """A WebSocket of a phone.
 
     About one of 3,000 requests of this client is never sent over TLS, while its other thread begins
     to read; the server cuts such a silent connection, and another attempt is made.
     """
-    port = served.phones_port
     for _ in range(3):
         with suppress(InvalidMessage):
-            return connect(
-                f"wss://127.0.0.1:{port}{path}",
-                ssl=trusting(served),
-                origin=origin or f"https://127.0.0.1:{port}",
-                additional_headers={"Cookie": f"dva_sim_{port}={token}"},
-                compression=None,
-                max_size=None,
-            )
+            return served.socket(path, token, origin, trusting(served))
     raise AssertionError("no handshake in three attempts")
 
 
@@ -215,11 +190,9 @@ def test_an_emergency_of_a_phone_is_for_its_own_robot_unless_it_says_otherwise(c
 
 def test_an_emergency_goes_through_though_the_socket_of_its_page_is_gone(console):
     body = {"robots": [0], "key": "of-a-page-that-is-gone", "id": "late-1"}
-    with ThreadPoolExecutor(1) as other:
-        told = other.submit(ask, console, "/api/emergency", "POST", body, console.phone)
-        asked = console.next_asked("emergency")
-        console.say({"k": "done", "id": asked["id"], "ok": True, "text": "stops"})
-        assert told.result(PATIENCE_S).json["ok"]
+    words = (console, "/api/emergency", "POST", body, console.phone)
+    answer, asked = console.answering("emergency", ask, *words)
+    assert answer.json["ok"]
     assert (asked["client"], asked["robots"]) == ("program-phone", [0])
 
 

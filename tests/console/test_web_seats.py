@@ -1,7 +1,6 @@
 """A seat opens with its key alone: names are public, and a lesser token does nothing in it."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from helpers.console.served_console import serving
@@ -31,11 +30,9 @@ def act(console, token, action, ok=True, **about):
     """An action of a program: the answer, and what the simulation was asked."""
     arguments = about.pop("arguments", {})
     body = {"id": "a-1", "action": action, "arguments": arguments, **about}
-    with ThreadPoolExecutor(1) as other:
-        told = other.submit(console.ask, "/api/actions", "POST", body, token)
-        asked = console.next_asked(action)
-        console.say({"k": "done", "id": asked["id"], "ok": ok, "text": "done"})
-        return told.result(PATIENCE_S).json, asked
+    words = ("/api/actions", "POST", body, token)
+    answer, asked = console.answering(action, console.ask, *words, ok=ok)
+    return answer.json, asked
 
 
 def test_a_name_is_public_and_a_key_is_nowhere_but_with_its_owner(console, page):
@@ -60,7 +57,7 @@ def test_by_its_name_nobody_acts_in_the_seat_of_a_page(console, page, role, acti
         answer = console.ask("/api/actions", "POST", body, token)
         assert answer.status == 403
         assert "key" in answer.json["text"]
-    assert [line for line in console.asked_so_far() if line["do"] != "watch"] == []
+    assert console.acted() == []
 
 
 def test_a_lesser_token_does_nothing_in_a_seat_whose_key_it_has(console, page):
@@ -69,7 +66,7 @@ def test_a_lesser_token_does_nothing_in_a_seat_whose_key_it_has(console, page):
     with pytest.raises(InvalidStatus) as error:
         console.socket(f"/ws/drive?key={page.key}", console.drive)
     assert error.value.response.status_code == 403
-    assert [line for line in console.asked_so_far() if line["do"] != "watch"] == []
+    assert console.acted() == []
 
 
 def test_by_its_name_nobody_replaces_the_driving_socket_of_a_page(console, page):
@@ -80,18 +77,14 @@ def test_by_its_name_nobody_replaces_the_driving_socket_of_a_page(console, page)
     back = console.socket(f"/ws/state?client={page.client}&page=", console.supervise)
     assert json.loads(back.recv(PATIENCE_S))["client"] != page.client
     back.close()
-    assert [
-        line["do"] for line in console.asked_so_far() if line.get("client") == page.client
-    ] == []
+    assert page.client not in [line.get("client") for line in console.asked_so_far()]
 
 
 def test_an_emergency_with_a_foreign_name_stops_and_is_of_a_program_of_its_own_role(console, page):
     body = {"id": "e-1", "client": page.client}
-    with ThreadPoolExecutor(1) as other:
-        told = other.submit(console.ask, "/api/emergency", "POST", body, console.drive)
-        asked = console.next_asked("emergency")
-        console.say({"k": "done", "id": asked["id"], "ok": True, "text": "stopped"})
-        assert told.result(PATIENCE_S).json["ok"]
+    words = ("/api/emergency", "POST", body, console.drive)
+    answer, asked = console.answering("emergency", console.ask, *words)
+    assert answer.json["ok"]
     assert (asked["client"], asked["role"]) == ("program-drive", "drive")
 
 

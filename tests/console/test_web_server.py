@@ -8,7 +8,6 @@ import sys
 import time
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from threading import Thread
 
 import pytest
 from helpers.console.served_console import HOSTILE, Served, places, scene, serving
@@ -106,7 +105,7 @@ def test_a_foreign_page_reaches_nothing(free, origin):
         with pytest.raises(InvalidStatus) as error:
             free.socket(path, origin=origin)
         assert error.value.response.status_code == 403
-    assert [line["do"] for line in free.asked_so_far() if line["do"] != "watch"] == []
+    assert free.acted() == []
 
 
 def test_a_foreign_page_embeds_no_picture_where_browsers_say_who_asks(free):
@@ -142,7 +141,7 @@ def test_who_looks_cannot_act(console):
     assert console.ask("/api/actions", "POST", body, console.look).status == 403
     assert console.ask("/api/emergency", "POST", {}, console.look).status == 403
     assert console.ask("/api/state", token=console.look).status == 200
-    assert [line for line in console.asked_so_far() if line["do"] != "watch"] == []
+    assert console.acted() == []
 
 
 def test_every_answer_has_its_headers(console):
@@ -233,7 +232,7 @@ def test_a_body_that_makes_no_sense_is_refused_and_nothing_is_asked(console, bod
     answer = console.ask("/api/actions", "POST", body, console.drive)
     assert answer.status == status
     assert "\n" not in answer.json["text"]
-    assert [line for line in console.asked_so_far() if line["do"] != "watch"] == []
+    assert console.acted() == []
 
 
 def test_a_body_without_end_is_cut_off(console):
@@ -258,33 +257,20 @@ def test_headers_without_end_are_refused(console):
 
 
 def test_an_action_answers_when_the_simulation_has(console):
-    def simulate():
-        asked = console.next_asked("pattern")
-        by = {"client": "program-drive", "id": "program-drive/rest-1", "role": "drive"}
-        assert asked == {"do": "pattern", "robot": 1, "name": "req-rep", **by}
-        console.say({"k": "done", "id": asked["id"], "ok": False, "text": "BUSY since 0:12"})
-
-    thread = Thread(target=simulate)
-    thread.start()
     arguments = {"robot": "robot-2", "name": "req-rep"}
     body = {"id": "rest-1", "action": "pattern", "arguments": arguments}
-    answer = console.ask("/api/actions", "POST", body, console.drive)
-    thread.join()
-    assert answer.status == 200
-    assert answer.json == {"id": "rest-1", "ok": False, "text": "BUSY since 0:12"}
+    words, refused = ("/api/actions", "POST", body, console.drive), {"ok": False, "text": "BUSY"}
+    answer, asked = console.answering("pattern", console.ask, *words, **refused)
+    by = {"client": "program-drive", "id": "program-drive/rest-1", "role": "drive"}
+    assert asked == {"do": "pattern", "robot": 1, "name": "req-rep", **by}
+    assert (answer.status, answer.json) == (200, {"id": "rest-1", **refused})
 
 
 def test_without_an_answer_an_action_says_so(console):
     """A late answer is one that the web process gives itself."""
-
-    def simulate():
-        number = console.next_asked("emergency")["id"]
-        console.say({"k": "done", "id": number, "ok": False, "text": "", "late": True})
-
-    thread = Thread(target=simulate)
-    thread.start()
-    assert console.ask("/api/emergency", "POST", {}, console.drive).status == 504
-    thread.join()
+    words = ("/api/emergency", "POST", {}, console.drive)
+    answer, _ = console.answering("emergency", console.ask, *words, ok=False, late=True)
+    assert answer.status == 504
 
 
 def test_an_action_over_the_driving_socket_and_its_seat(console):

@@ -1,4 +1,4 @@
-"""What is known of the simulation, and what is asked of it: alive, hung, ended."""
+"""What is known of the simulation, and what is asked of it: alive, hung, ended, and who gets in."""
 
 import asyncio
 import json
@@ -7,8 +7,11 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 
 from helpers.console.served_console import scene
+from starlette.responses import Response
 
 from dva_sim.console.web import simulation as web_simulation
+from dva_sim.console.web.access import Role
+from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.simulation import MOST_PENDING, SILENCE, Simulation
 
 
@@ -152,3 +155,33 @@ def test_questions_without_an_answer_are_bounded_and_end_with_the_simulation():
         assert (told[-1]["id"], told[-1]["text"]) == ("after", "over")
 
     play(story)
+
+
+class Asking:
+    """A WebSocket that asks to be let in."""
+
+    def __init__(self, **query: str) -> None:
+        self.query_params = query
+        self.told: Response | None = None
+
+    async def send_denial_response(self, response: Response) -> None:
+        self.told = response
+
+    async def accept(self) -> None:
+        raise AssertionError("it was let in")
+
+
+def test_after_the_end_no_page_is_let_in_that_would_take_the_world_for_lost():
+    async def story() -> list[Response | None]:
+        hub = Hub(Simulation())
+        client = hub.clients.join(Role.DRIVE, "")
+        hub.simulation.why = "the console was ended"
+        hub.simulation.ended.set()
+        sees, drives = Asking(), Asking(key=client.key)
+        await hub.see(sees, Role.DRIVE)
+        await hub.drive(drives, Role.DRIVE)
+        return [sees.told, drives.told]
+
+    for told in asyncio.run(story()):
+        assert told is not None
+        assert (told.status_code, told.body) == (503, b"the console was ended")

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 import pytest
 from helpers.console.chromium import chromium
 from helpers.processes.patience import PATIENCE_S, becomes
-from playwright.sync_api import Browser, BrowserContext, Dialog, Page, expect
+from playwright.sync_api import Browser, BrowserContext, Dialog, Page, Response, expect
 
 ENDED = "ERR_INCOMPLETE_CHUNKED_ENCODING", "ERR_CONNECTION_REFUSED"  # with a page's world
 FAKE = Path(__file__).parents[1] / "fake_world.py"
@@ -124,6 +124,15 @@ class Visit:
         tab.goto(f"{address}#/{page}")
         expect(tab.locator("main.page:not(.waiting)")).to_be_visible()
         return tab
+
+    def weighs(self, address: str, role: Any, name: str) -> dict[str, int]:
+        """Bytes of all that a page loads until something that it shows is there."""
+        answers: list[Response] = []
+        tab = self.tab()
+        tab.on("response", lambda answer: answers.append(answer))  # as a bound method it fails
+        tab.goto(address)
+        expect(tab.get_by_role(role, name=name)).to_be_visible()
+        return {answer.url: len(answer.body()) for answer in answers if answer.status == 200}
 
     def tab(self) -> Page:
         """An empty page, whose errors are noted."""

@@ -52,6 +52,7 @@ def test_without_the_right_token_there_is_a_page_of_words(fake, visits, query):
 
 SOCKET = """url => new Promise(done => { const s = new WebSocket(url);
   s.onopen = () => done('open'); s.onerror = () => done('refused'); })"""
+FETCH = "url => fetch(url).then(() => 'read', () => 'refused')"
 POST = """url => fetch(url, {method: 'POST', credentials: 'include',
   headers: {'Content-Type': 'application/json'}, body: '{"id": "x", "robots": "all"}'})
   .then(a => a.status, () => 'refused')"""
@@ -66,8 +67,7 @@ def test_a_foreign_page_reaches_nothing_though_the_browser_has_the_cookie(fake, 
 
     assert page.evaluate(SOCKET, f"{socket}ws/state") == "refused"
     assert page.evaluate(POST, f"{world.base}api/emergency") in ("refused", 401, 403)
-    assert page.evaluate("u => fetch(u).then(() => 'read', () => 'refused')",
-                         f"{world.base}api/state") == "refused"  # fmt: skip
+    assert page.evaluate(FETCH, f"{world.base}api/state") == "refused"
 
 
 def test_a_page_says_so_when_the_world_has_ended(own_world, browser):

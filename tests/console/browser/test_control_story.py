@@ -1,15 +1,11 @@
 """The program itself: an event is acknowledged, a robot sent, taken over, driven, confirmed."""
 
-import re
 import signal
-from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 
-import pytest
+from helpers.console.console_program import started
 from helpers.console.keyboard_driver import NEAR_FIRE, Driver
 from helpers.processes.patience import PATIENCE_S, becomes
-from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import Page, expect
 
 from dva_sim.protocol.mistakes import check_message
@@ -18,6 +14,7 @@ from dva_sim.recordings.reading import read_recording
 
 DELAY_S = 0.25
 NEAR_M = 2.5  # of the fire: there it can be seen
+ASKS = ("--set", "dispatch.mode=ask_first", *NEAR_FIRE)  # the policy
 # What goes by in this order, each as a part of a message.
 MESSAGES = (
     *(b"<GetProposal>", b"<Acknowledge>", b"<Assign>", b"<Revoke>", b"<Assign>"),
@@ -36,19 +33,6 @@ ROWS = (
 )
 
 
-@pytest.fixture
-def programs(tmp_path: Path) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path)
-
-
-def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
-    """A console in which the policy asks first, and its address."""
-    asks = ("--set", "dispatch.mode=ask_first", *NEAR_FIRE)
-    console = programs.start("console", "--no-open", "--port", "0", *asks, *words)
-    console.wait_to_say("Console:")
-    return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
-
-
 def fire_in_hand(page: Page) -> None:
     """Wait for the fire, and for what the policy proposes."""
     table = page.get_by_role("table", name="Events")
@@ -65,7 +49,7 @@ def in_order(wanted: tuple[str, ...] | tuple[bytes, ...], said: list[str] | list
     for one in wanted:
         found = (n for n, text in enumerate(said) if n > at and one in text)
         at = next(found, -1)
-        assert at >= 0, f"{one!r} is missing in its place"
+        assert at >= 0, one
 
 
 def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confirmed(
@@ -74,7 +58,7 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
     record, audit = tmp_path / "story.mcap", tmp_path / "audit.sqlite"
     words = ["--record", record, "--audit", audit, "--set", f"link.delay_s={DELAY_S}"]
     words += ["--set", "operator.count=2"]  # one of them a person, the other one simulated
-    console, address = started(programs, *words)
+    console, address = started(programs, *ASKS, *words)
     page = visit.open(address, "events")
     base = address.partition("?")[0]
     fire_in_hand(page)
@@ -119,7 +103,7 @@ def test_a_fire_is_acknowledged_sent_to_taken_over_reached_over_250_ms_and_confi
 
 def test_people_decide_over_real_links_too(tmp_path, visit, programs):
     audit = tmp_path / "audit.sqlite"
-    console, address = started(programs, "--links", "real", "--audit", audit)
+    console, address = started(programs, *ASKS, "--links", "real", "--audit", audit)
     page = visit.open(address, "events")
     fire_in_hand(page)
 

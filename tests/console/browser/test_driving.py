@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 from helpers.processes.patience import becomes
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 WORLD = ("--robots", "3", "--people", "4", "--site", "office-block")
 
@@ -17,8 +17,7 @@ def page(fake, shared) -> Iterator[Page]:
     listen(page)
     take(page)
     yield page
-    page.get_by_role("button", name="Release control").click()
-    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+    release(page)
 
 
 def listen(page: Page) -> None:
@@ -35,8 +34,28 @@ def listen(page: Page) -> None:
 def take(page: Page) -> None:
     """Take control and start."""
     page.get_by_role("button", name="Take control").click()
+    start(page)
+
+
+def start(page: Page) -> None:
     page.get_by_role("button", name="Start", exact=True).click()
     expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+
+
+def release(page: Page) -> None:
+    page.get_by_role("button", name="Release control").click()
+    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+
+
+def dragged(page: Page, slider: Locator) -> tuple[float, float, float]:
+    """A pointer holds a slider in its middle: its left end, its width, its height on the page."""
+    box = slider.bounding_box()
+    assert box
+    x, width, y = box["x"], box["width"], box["y"] + box["height"] / 2
+    page.mouse.move(x + 0.5 * width, y)
+    page.mouse.down()
+    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    return x, width, y
 
 
 def inputs(page: Page) -> list[dict[str, object]]:
@@ -119,8 +138,7 @@ def test_a_new_press_drives_again_after_an_interruption(page):
         assert becomes(lambda: inputs(page))
         page.evaluate("window.dispatchEvent(new Event('blur'))")
     expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
-    page.get_by_role("button", name="Start", exact=True).click()
-    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    start(page)
     with held(page, "ArrowUp"):
         assert becomes(lambda: inputs(page)[-1]["held"] is True)
 
@@ -151,12 +169,7 @@ def test_the_stick_steers_while_a_pointer_holds_it(page):
 
 def test_a_slider_springs_back_when_the_pointer_lets_it_go(page):
     slider = page.get_by_role("slider", name="Speed")
-    box = slider.bounding_box()
-    assert box
-
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + box["height"] / 2)
-    page.mouse.down()
-    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    dragged(page, slider)
     assert inputs(page)[-1]["speed"] == pytest.approx(0.5, abs=0.05)
     page.mouse.up()
     assert becomes(lambda: inputs(page)[-1]["held"] is False)
@@ -196,8 +209,7 @@ def test_a_second_key_does_not_wait_for_the_next_turn_to_send(fake, visit):
 
     assert [(line["speed"], line["turn"]) for line in inputs(page)] == [(1, 0), (1, 1)]
     page.clock.resume()
-    page.get_by_role("button", name="Release control").click()
-    expect(page.get_by_role("button", name="Take control")).to_be_enabled()
+    release(page)
 
 
 PADS = "pad => { window.pad = pad; navigator.getGamepads = () => [window.pad]; }"
@@ -243,8 +255,7 @@ def test_emergency_stop_and_its_key_stop_all_robots(page):
         assert answer.value.json()["ok"]
         assert '"all"' in (answer.value.request.post_data or "")
         expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
-        page.get_by_role("button", name="Start", exact=True).click()
-        expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+        start(page)
 
 
 @pytest.mark.parametrize("end", ["key", "button", "stop"])
@@ -259,8 +270,7 @@ def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page, e
         expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
         expect(page.get_by_role("slider", name="Turn rate")).to_have_value("0")
         count = len(inputs(page))
-        page.get_by_role("button", name="Start", exact=True).click()
-        expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+        start(page)
         page.keyboard.down("ArrowLeft")  # the repeat of a key that is still down
         page.wait_for_timeout(200)
         assert [line for line in inputs(page)[count:] if line["held"]] == []
@@ -270,22 +280,16 @@ def test_a_key_held_since_before_a_stop_does_not_drive_at_the_next_start(page, e
 
 def test_a_slider_dragged_since_before_a_stop_stays_at_zero_until_it_is_let_go(page):
     slider = page.get_by_role("slider", name="Speed")
-    box = slider.bounding_box()
-    assert box
-    x, y = box["x"], box["y"] + box["height"] / 2
-
-    page.mouse.move(x + 0.5 * box["width"], y)
-    page.mouse.down()
-    assert becomes(lambda: inputs(page) and inputs(page)[-1]["held"])
+    x, width, y = dragged(page, slider)
     page.keyboard.press("Shift+Escape")
     expect(page.get_by_role("status", name="Mode")).to_have_text("Idle")
     count = len(inputs(page))
-    page.mouse.move(x + 0.7 * box["width"], y)
-    page.mouse.move(x + 0.9 * box["width"], y)
+    page.mouse.move(x + 0.7 * width, y)
+    page.mouse.move(x + 0.9 * width, y)
     expect(slider).to_have_value("0")
     assert [line for line in inputs(page)[count:] if line["held"]] == []
     page.mouse.up()
-    slider.click(position={"x": 0.5 * box["width"], "y": box["height"] / 2})
+    slider.click()
     assert becomes(lambda: any(line["held"] for line in inputs(page)[count:]))
 
 

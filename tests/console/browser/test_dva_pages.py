@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import zmq
 from helpers.console.accessibility import faults
+from helpers.console.console_program import started
 from helpers.console.keyboard_driver import FIRE
 from helpers.network.free_ports import free_port
 from helpers.processes.patience import PATIENCE_S
@@ -33,18 +34,6 @@ SLOW = 250 * PATIENCE_S
 
 WORLD = ("--robots", "3", "--people", "4", "--site", "office-block")
 QUICK = "--set", "request.timeout_s=0.5"
-
-
-@pytest.fixture
-def programs(tmp_path: Path) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path)
-
-
-def started(programs: Programs, *words: str) -> tuple[Program, str]:
-    """A console, and its address."""
-    console = programs.start("console", "--no-open", "--port", "0", *words)
-    console.wait_to_say("Console:")
-    return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
 
 
 class Peer:

@@ -17,7 +17,7 @@ def world(fake):
 @pytest.fixture
 def page(world, visits):
     tab = guard_at(world, visits(**SCREEN))
-    join(tab, "guard-1")
+    tap(tab, "guard-1")
     yield tab
     tab.get_by_role("button", name="Leave").tap()
     expect(tab.get_by_role("heading", name="Who are you?")).to_be_visible()
@@ -29,10 +29,6 @@ def guard_at(world, visit) -> Page:
     tab.goto(world.phone.replace("/phone?", "/guard?"))
     expect(tab.get_by_role("heading", name="Who are you?")).to_be_visible()
     return tab
-
-
-def join(page: Page, label: str) -> None:
-    page.get_by_role("button", name=label, exact=True).tap()
 
 
 def tap(page: Page, name: str) -> None:
@@ -58,12 +54,8 @@ def test_an_order_is_accepted_and_followed_to_its_end(page):
     expect(order).to_contain_text("You: confirmed.")
     tap(page, "Contained")
     expect(order).to_contain_text("No order")
-    assert [line["what"] for line in said(page, "guard_say")] == [
-        "departed",
-        "arrived",
-        "confirmed",
-        "contained",
-    ]
+    steps = ["departed", "arrived", "confirmed", "contained"]
+    assert [line["what"] for line in said(page, "guard_say")] == steps
     assert said(page, "guard_answer")[0]["accept"] is True
 
 
@@ -104,9 +96,9 @@ def test_a_tap_on_the_map_tells_where_one_is(page):
 
 def test_who_is_taken_is_not_given_twice(page, world, visits):
     other = guard_at(world, visits(**SCREEN))
-    join(other, "guard-1")
+    tap(other, "guard-1")
     expect(other.get_by_role("alert")).to_contain_text("guard-1 is taken")
-    join(other, "guard-2")
+    tap(other, "guard-2")
     expect(other.get_by_role("heading", name="guard-2")).to_be_visible()
     tap(other, "Leave")
 
@@ -126,7 +118,7 @@ def test_the_place_by_satellite_counts_where_the_site_lies_there(world, visits, 
     _, ymin, _, _ = site["extent_m"]
     place["latitude"] += (ymin + 5) / 111_195 if there else 1.0
     visit.context.set_geolocation(place)
-    join(page, "guard-2")
+    tap(page, "guard-2")
     tap(page, "By satellite")
     if there:
         assert becomes(lambda: said(page, "guard_place"))

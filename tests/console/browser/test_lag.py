@@ -2,6 +2,7 @@
 
 import json
 import re
+from typing import Any
 
 import pytest
 from helpers.processes.patience import becomes
@@ -10,20 +11,25 @@ from playwright.sync_api import Page, WebSocketRoute, expect
 SMALL = ("--robots", "2", "--people", "3", "--site", "office-block")
 
 
-def change(page: Page, rewrite) -> None:
-    """Let every line of the state pass through a function first."""
+def sockets_of(page: Page, name: str, change: Any = lambda text: text, asked: Any = str) -> list:
+    """The sockets that a page opens; each line is changed first, one that becomes None is lost."""
+    sockets: list[WebSocketRoute] = []
 
     def route(socket: WebSocketRoute) -> None:
         server = socket.connect_to_server()
-        server.on_message(lambda text: socket.send(json.dumps(rewrite(json.loads(text)))))
+        sockets.append(socket)
+        server.on_message(lambda text: None if (new := change(text)) is None else socket.send(new))
+        socket.on_message(lambda text: (asked(str(text)), server.send(text)))
 
-    page.route_web_socket("**/ws/state*", route)
+    page.route_web_socket(f"**/ws/{name}*", route)
+    return sockets
 
 
-def lagging(line: dict[str, object]) -> dict[str, object]:
+def lagging(text: str) -> str:
+    line = json.loads(text)
     if line["k"] == "rows":
         line["clock"] |= {"lag_s": 0.43, "held_by_lag": True}
-    return line
+    return json.dumps(line)
 
 
 @pytest.fixture
@@ -32,7 +38,7 @@ def page(visit) -> Page:
 
 
 def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page):
-    change(page, lagging)
+    sockets_of(page, "state", lagging)
     page.goto(f"{fake(*SMALL).drive}#/drive")
 
     warning = page.locator(".warnings")
@@ -43,15 +49,8 @@ def test_a_world_that_lags_holds_robots_and_the_page_says_why(fake, page):
 
 
 def test_silence_makes_the_page_look_old(fake, page):
-    heard: list[WebSocketRoute] = []
     silent: list[bool] = []
-
-    def route(socket: WebSocketRoute) -> None:
-        server = socket.connect_to_server()
-        heard.append(socket)
-        server.on_message(lambda text: None if silent else socket.send(text))
-
-    page.route_web_socket("**/ws/state*", route)
+    sockets_of(page, "state", lambda text: None if silent else text)
     page.goto(f"{fake(*SMALL).drive}#/map")
     expect(page.locator(".age")).to_have_text(re.compile(r"^data \d+\.\d s old$"))
     silent.append(True)
@@ -61,22 +60,15 @@ def test_silence_makes_the_page_look_old(fake, page):
 
 
 def test_a_hole_in_what_was_heard_is_filled_by_asking_anew(fake, page):
-    asked: list[str] = []
+    asked, skipped = list[str](), list[str]()
 
-    def route(socket: WebSocketRoute) -> None:
-        server = socket.connect_to_server()
-        skipped: list[str] = []
+    def hole(text: str) -> str | None:
+        if json.loads(text)["s"] <= 20 or skipped:
+            return text
+        skipped.append(text)
+        return None
 
-        def hear(text: str) -> None:
-            if json.loads(text)["s"] > 20 and not skipped:
-                skipped.append(text)
-            else:
-                socket.send(text)
-
-        server.on_message(hear)
-        socket.on_message(lambda text: (asked.append(str(text)), server.send(text)))
-
-    page.route_web_socket("**/ws/state*", route)
+    sockets_of(page, "state", hole, asked.append)
     page.goto(f"{fake(*SMALL).drive}#/map")
 
     assert becomes(lambda: (page.wait_for_timeout(50), any("resync" in text for text in asked))[1])
@@ -84,14 +76,7 @@ def test_a_hole_in_what_was_heard_is_filled_by_asking_anew(fake, page):
 
 
 def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page):
-    sockets: list[WebSocketRoute] = []
-
-    def route(socket: WebSocketRoute) -> None:
-        server = socket.connect_to_server()
-        server.on_message(lambda text: socket.send(text))
-        sockets.append(socket)
-
-    page.route_web_socket("**/ws/state*", route)
+    sockets = sockets_of(page, "state")
     page.goto(f"{fake(*SMALL).drive}#/map")
     expect(page.get_by_role("region", name="Map")).to_be_visible()
     who = page.evaluate("sessionStorage.getItem('dva-sim-client')")
@@ -103,14 +88,7 @@ def test_a_lost_socket_is_opened_again_under_the_same_name(fake, page):
 
 
 def test_nothing_can_be_asked_for_until_the_socket_for_driving_is_open(fake, page):
-    sockets: list[WebSocketRoute] = []
-
-    def route(socket: WebSocketRoute) -> None:
-        server = socket.connect_to_server()
-        server.on_message(lambda text: socket.send(text))
-        sockets.append(socket)
-
-    page.route_web_socket("**/ws/drive*", route)
+    sockets = sockets_of(page, "drive")
     page.goto(f"{fake(*SMALL).drive}#/drive")
     button = page.get_by_role("button", name="Take control")
     expect(button).to_be_enabled()

@@ -2,7 +2,7 @@
 
 import pytest
 from helpers.console.accessibility import faults
-from playwright.sync_api import Response, expect
+from playwright.sync_api import expect
 
 WORLD = ("--robots", "3", "--people", "6")
 PAGES = {
@@ -67,6 +67,11 @@ def test_nothing_is_wider_than_the_screen(fake, shared, width):
         assert stop["height"] >= 36, name
 
 
+IN_SIGHT = """e => { const {left, right, top, bottom} = e.getBoundingClientRect();
+  return [[left, top], [right, top], [left, bottom], [right, bottom]].every(([x, y]) => e.contains(
+    document.elementFromPoint(x + (x < right ? 9 : -9), y + (y < bottom ? 9 : -9)))); }"""
+
+
 def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, shared):
     page = shared(fake(*WORLD).drive, "drive", width=360, height=640)
     page.get_by_role("button", name="Take the tour").click()
@@ -77,13 +82,7 @@ def test_on_a_small_screen_the_bar_has_two_rows_and_lies_below_nothing(fake, sha
     assert helps
     assert colours
     assert helps["y"] == colours["y"]
-    stop = page.get_by_role("button", name="Emergency stop")
-    assert stop.evaluate(
-        """e => { const {left, right, top, bottom} = e.getBoundingClientRect();
-        return [[left, top], [right, top], [left, bottom], [right, bottom]].every(([x, y]) =>
-          e.contains(document.elementFromPoint(x + (x < right ? 9 : -9), y + (y < bottom ? 9 : -9)))
-        ); }"""
-    )
+    assert page.get_by_role("button", name="Emergency stop").evaluate(IN_SIGHT)
     page.get_by_role("button", name="End the tour").click()
 
 
@@ -145,12 +144,7 @@ def test_a_robot_is_taken_and_released_by_keys(fake, shared):
 
 
 def test_the_page_weighs_less_than_700_kb_and_asks_nobody_else(fake, visit):
-    answers: list[Response] = []
-    page = visit.context.new_page()
-    page.on("response", lambda answer: answers.append(answer))  # as a bound method it fails
-    page.goto(f"{fake(*WORLD).drive}#/map")
-    expect(page.get_by_role("region", name="Map")).to_be_visible()
-    weights = {answer.url: len(answer.body()) for answer in answers if answer.status == 200}
+    weights = visit.weighs(f"{fake(*WORLD).drive}#/map", "region", "Map")
 
     assert all(url.startswith(fake(*WORLD).base) for url in weights)
     assert any("leaflet.js" in url for url in weights)

@@ -5,7 +5,7 @@ from typing import Any
 
 from helpers.console.accessibility import faults
 from helpers.console.browser_phone import Hand
-from playwright.sync_api import Page, Response, expect
+from playwright.sync_api import Page, expect
 
 WORLD = ("--phones", "--robots", "3", "--people", "4", "--site", "office-block")
 SIZES = {"smallest": (320, 568), "across": (740, 360), "tablet": (820, 1180)}
@@ -20,9 +20,7 @@ def screens(hand: Hand) -> list[tuple[str, Callable[[], None]]]:
         return lambda: hand.go(name)
 
     def cockpit() -> None:
-        hand.register()
-        hand.take("robot-2")
-        expect(hand.page.get_by_text("is in your hands")).to_be_visible()
+        hand.hold("robot-2")
         hand.calibrate()
         hand.go("Teleoperation")
         expect(hand.status("Radius")).to_be_visible()
@@ -110,12 +108,7 @@ def test_public_names_are_there(fake, visits):
 
 def test_a_phones_pages_weigh_less_than_200_kb_and_ask_nobody_else(fake, visits):
     world = fake(*WORLD)
-    answers: list[Response] = []
-    page = visits(360, 740).tab()
-    page.on("response", lambda answer: answers.append(answer))
-    page.goto(world.phone)
-    expect(page.get_by_role("link", name="Authentication")).to_be_visible()
-    weights = {answer.url: len(answer.body()) for answer in answers if answer.status == 200}
+    weights = visits(360, 740).weighs(world.phone, "link", "Authentication")
 
     assert all(url.startswith(world.base) for url in weights)
     assert not any("leaflet" in url or "uplot" in url for url in weights)

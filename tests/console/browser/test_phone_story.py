@@ -63,7 +63,7 @@ def test_a_phone_registers_drives_by_tilt_and_is_a_row(visits, programs, tmp_pat
     hand.go("Teleoperation")
     start(hand)
     hand.tilt(FORWARDS)
-    expect(hand.status("Speed")).to_have_text("Speed: 0.20m/s")
+    hand.speed("0.20")
     assert becomes(lambda: hand.page.evaluate(STATE)["robots"][0]["set_speed_mps"] > 0.1)
     hand.page.wait_for_timeout(2000)
     hand.swipe(200)

@@ -3,12 +3,13 @@
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 from helpers.console.accessibility import faults
+from helpers.console.console_program import started
 from helpers.processes.patience import becomes
-from helpers.processes.programs import Programs, all_gone_after
+from helpers.processes.programs import all_gone_after
+from helpers.wording import unnamed
 from playwright.sync_api import Page, expect
 
 REGIONS = "Log", "Side view", "Top view", "Manual control", "Latency", "Camera"
@@ -16,32 +17,17 @@ QUIET = "--set", "guard.count=0", "--set", "bystander.count=0", "--set", "operat
 
 
 @pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path_factory.mktemp("consoles"))
-
-
-@pytest.fixture
-def own_programs(tmp_path: Path) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path)
-
-
-@pytest.fixture(scope="module")
-def addresses(programs: Programs) -> tuple[str, str]:
+def addresses(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[str]]:
     """Of a console on modelled links, for driving and for looking."""
-    return started(programs)
+    for programs in all_gone_after(tmp_path_factory.mktemp("consoles")):
+        console, drive = started(programs, *QUIET)
+        console.wait_to_say("Look only:")
+        yield [drive, *re.findall(r"^Look only: +(\S+)$", console.said, re.MULTILINE)]
 
 
 @pytest.fixture
-def console(addresses: tuple[str, str]) -> str:
+def console(addresses: list[str]) -> str:
     return addresses[0]
-
-
-def started(programs: Programs, *words: str) -> tuple[str, str]:
-    """A console's addresses."""
-    program = programs.start("console", "--no-open", "--port", "0", *QUIET, *words)
-    program.wait_to_say("Console:", "Look only:")
-    drive, look = re.findall(r"^(?:Console|Look only): +(\S+)$", program.said, re.MULTILINE)
-    return drive, look
 
 
 @pytest.fixture
@@ -133,7 +119,7 @@ def test_a_hand_turns_the_wheels_by_speed_and_turn_rate_and_letting_go_stops(ope
             expect(page.get_by_role("region", name="Side view")).to_contain_text("0.50 m/s")
             expect(page.get_by_role("region", name="Side view")).to_contain_text("5.00 rad/s")
             expect(page.get_by_role("region", name="Top view")).to_contain_text("-30°")
-            assert "0.50 m/s, wheels 5.00 rad/s" in side(page)
+            assert unnamed(side(page), "0.50 m/s", "5.00 rad/s") == []
             assert becomes(lambda: spokes(page) != before)
             expect(page.get_by_role("status", name="Reason")).to_contain_text("moves")
         expect(page.get_by_role("region", name="Side view")).to_contain_text("0.00 m/s")
@@ -252,8 +238,8 @@ def test_who_may_look_only_sees_all_and_changes_nothing(visit, addresses):
     expect(page.get_by_text("This address may only look.")).to_be_visible()
 
 
-def test_over_real_links_all_windows_are_the_same(own_programs, visit):
-    address, _ = started(own_programs, "--links", "real")
+def test_over_real_links_all_windows_are_the_same(programs, visit):
+    _, address = started(programs, *QUIET, "--links", "real")
     page = windows_of(visit.open(address, "robots/robot-1"))
     for region in REGIONS:
         expect(page.get_by_role("region", name=region, exact=True)).to_have_count(1)
@@ -266,8 +252,8 @@ def test_over_real_links_all_windows_are_the_same(own_programs, visit):
     expect(page.get_by_role("table", name="Messages")).to_contain_text("SetTeleOp")
 
 
-def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(own_programs, visit):
-    address, _ = started(own_programs, "--set", "robot.profile=pibot")
+def test_a_model_car_shows_its_motor_in_per_cent_and_three_ways_to_steer(programs, visit):
+    _, address = started(programs, *QUIET, "--set", "robot.profile=pibot")
     page = windows_of(visit.open(address, "robots/robot-1"))
     with in_hand(page), held(page, "ArrowUp"):
         expect(page.get_by_role("region", name="Side view")).to_contain_text("motor 100 % PWM")

@@ -1,30 +1,15 @@
-"""The program itself: a drive over 500 ms to the fire, whose recording holds; a real link."""
+"""The program itself: a drive over 500 ms to a fire, a real link, the camera of a live run."""
 
 import re
 import signal
-from collections.abc import Iterator
-from pathlib import Path
 
-import pytest
+from helpers.console.console_program import started
 from helpers.console.keyboard_driver import NEAR_FIRE, Driver
 from helpers.processes.patience import PATIENCE_S, becomes
-from helpers.processes.programs import Program, Programs, all_gone_after
 from playwright.sync_api import expect
 
 DELAY_S = 0.5
 NEAR_M = 2.5  # of the fire: there it can be seen
-
-
-@pytest.fixture
-def programs(tmp_path: Path) -> Iterator[Programs]:
-    yield from all_gone_after(tmp_path)
-
-
-def started(programs: Programs, *words: str | Path) -> tuple[Program, str]:
-    """A console, and its address."""
-    console = programs.start("console", "--no-open", "--port", "0", *words)
-    console.wait_to_say("Console:")
-    return console, re.findall(r"^Console: +(\S+)", console.said, re.MULTILINE)[0]
 
 
 def test_of_a_real_link_nothing_can_be_chosen_but_the_robots_computers(visit, programs):
@@ -67,3 +52,14 @@ def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(tmp_path, visit, pr
     assert console.ends() == 0
     checked = programs.start("check", record)
     assert checked.ends() == 0, checked.complained
+
+
+def test_an_image_element_shows_what_a_robot_of_a_live_run_sees(programs, browser):
+    run = programs.start("live", "drive-to-event", "--camera-port", "0")
+    run.wait_to_say("shows pictures of the robots at http://")
+    url = re.search(r"at (http://127\.0\.0\.1:\d+/camera/)LABEL", run.said)
+    assert url is not None
+    page = browser.new_page()
+    page.set_content(f'<img src="{url[1]}robot-1.mjpg">', wait_until="commit")
+    page.wait_for_function("document.images[0].naturalWidth === 320")
+    page.close()

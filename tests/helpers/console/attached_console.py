@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.console.simulated_phone import PhonePage
+from helpers.console.simulated_phone import FIRE, PhonePage
 
 from dva_sim.console.attached.actions import AttachedActions
 from dva_sim.console.attached.links import AttachedLinks
@@ -88,10 +88,7 @@ class AttachedPage:
 
     def until(self, seen: Any, within: float = 120.0) -> None:
         """Let time go by until something is so."""
-        end = self.world.world.clock.now + within
-        while not seen():
-            assert self.world.world.clock.now < end, f"not so within {within} s"
-            self.let(0.1)
+        self.world.until(seen, within)
 
     def written(self) -> list[AuditRow]:
         """The rows of the audit log, which ends by that."""
@@ -104,8 +101,7 @@ def attached(
     monkeypatch: pytest.MonkeyPatch, folder: Path, role: str = "supervise", **changes: Any
 ) -> Iterator[AttachedPage]:
     """An attached console that has heard of a fire; the policy asks first."""
-    fire = [{"kind": "fire", "room": "North office", "at_s": 2, "latest_s": 2, "reported": True}]
-    usual = {"bystander__count": 0, "events": fire, "dispatch__mode": "ask_first"}
+    usual = {"bystander__count": 0, "events": FIRE, "dispatch__mode": "ask_first"}
     world = PhonePage(monkeypatch, client="w1", **usual | changes)
     page = AttachedPage(world, folder / "audit.sqlite", role)
     page.until(page.events)

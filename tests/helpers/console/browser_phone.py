@@ -104,13 +104,29 @@ class Hand:
 
     def drive(self, robot: str = "robot-1", label: str = "my phone") -> None:
         """Everything up to a robot that listens."""
+        self.hold(robot, label)
+        self.calibrate()
+        self.go("Teleoperation")
+        self.start()
+
+    def hold(self, robot: str = "robot-1", label: str = "my phone") -> None:
+        """Be given a robot."""
         self.register(label)
         self.take(robot)
         expect(self.page.get_by_text("is in your hands")).to_be_visible()
-        self.calibrate()
-        self.go("Teleoperation")
+
+    def start(self) -> None:
         self.tap("Start")
-        expect(self.page.get_by_role("button", name="Stop", exact=True)).to_be_enabled()
+        self.is_driving()
+
+    def is_driving(self, driving: bool = True) -> None:
+        """Wait until it drives, or drives no more."""
+        name = "Stop" if driving else "Start"
+        expect(self.page.get_by_role("button", name=name, exact=True)).to_be_enabled()
+
+    def speed(self, mps: str) -> None:
+        """It tells so much."""
+        expect(self.status("Speed")).to_have_text(f"Speed: {mps}m/s")
 
     def leave(self) -> None:
         """Give the robot back, for the next test."""

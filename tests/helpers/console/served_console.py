@@ -7,13 +7,15 @@ import http.client
 import json
 import os
 import select
-import signal
 import socket
+import ssl
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
@@ -120,6 +122,18 @@ class Served:
         found, self._asked = self._asked, []
         return found
 
+    def acted(self) -> list[Line]:
+        """The same without what pages look at."""
+        return [line for line in self.asked_so_far() if line["do"] != "watch"]
+
+    def answering(self, kind: str, ask: Callable[..., Answer], *words: Any, **done: Any) -> Any:
+        """Let somebody ask, and do it in the simulation: the answer, and what was asked there."""
+        with ThreadPoolExecutor(1) as other:
+            told = other.submit(ask, *words)
+            asked = self.next_asked(kind)
+            self.say({"k": "done", "id": asked["id"], "ok": True, "text": "done"} | done)
+            return told.result(PATIENCE_S), asked
+
     def show(self, robot: int, number: int, jpeg: bytes, captured: int = 0) -> None:
         """Draw a picture, as the process would that draws."""
         self.pictures.sendall(pack(Picture(robot, number, captured, captured + 50, jpeg)))
@@ -137,15 +151,20 @@ class Served:
         body: Any = None,
         token: str | None = None,
         host: str | None = None,
+        tls: ssl.SSLContext | None = None,
         **headers: str,
     ) -> Answer:
-        """A request, as rude as wanted; header names have `_` for `-`."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE_S)
+        """A request, as rude as wanted, by https at the port for phones; names have `_` for `-`."""
+        port, kind = self.port, partial(http.client.HTTPConnection, timeout=PATIENCE_S)
+        if tls is not None:
+            port = self.phones_port
+            kind = partial(http.client.HTTPSConnection, timeout=PATIENCE_S, context=tls)
+        connection = kind("127.0.0.1", port)
         data = body if isinstance(body, bytes | None) else json.dumps(body).encode()
         sent = {name.replace("_", "-"): value for name, value in headers.items()}
-        sent["Host"] = host or f"127.0.0.1:{self.port}"
+        sent["Host"] = host or f"127.0.0.1:{port}"
         if token:
-            sent["Cookie"] = f"dva_sim_{self.port}={token}"
+            sent["Cookie"] = f"dva_sim_{port}={token}"
         if data is not None:
             sent.setdefault("Content-Type", "application/json")
         try:
@@ -156,15 +175,19 @@ class Served:
             connection.close()
 
     def socket(
-        self, path: str, token: str | None = None, origin: str | None = "own", **more: Any
+        self,
+        path: str,
+        token: str | None = None,
+        origin: str = "own",
+        tls: ssl.SSLContext | None = None,
     ) -> ClientConnection:
-        """A WebSocket of a page."""
-        own = f"http://127.0.0.1:{self.port}"
-        headers = {"Cookie": f"dva_sim_{self.port}={token}"} if token else {}
+        """A WebSocket of a page, or of a phone."""
+        port, s = (self.phones_port, "s") if tls else (self.port, "")
         connection = connect(
-            f"ws://127.0.0.1:{self.port}{path}",
-            origin=own if origin == "own" else origin,  # type: ignore[arg-type]
-            additional_headers=headers | more,
+            f"ws{s}://127.0.0.1:{port}{path}",
+            ssl=tls,
+            origin=f"http{s}://127.0.0.1:{port}" if origin == "own" else origin,  # type: ignore[arg-type]
+            additional_headers={"Cookie": f"dva_sim_{port}={token}"} if token else {},
             open_timeout=PATIENCE_S,
             compression=None,
             max_size=None,
@@ -250,9 +273,3 @@ def serving_phones(folder: Path) -> Iterator[Served]:
 
 def _token(address: str) -> str:
     return str(address).partition("?token=")[2]
-
-
-def killed(process: subprocess.Popen[bytes]) -> None:
-    """End a process the hard way."""
-    process.send_signal(signal.SIGKILL)
-    process.wait(PATIENCE_S)

@@ -77,6 +77,14 @@ class Page:
             self.let(0.01)
         raise AssertionError(f"{what}: no answer within {within} s")
 
+    def sets_out(self, speed=None, turn=0.0, robots=(0,), then=0.0):
+        """Take robots, start, and want something for a while."""
+        assert self.do("take", robots=list(robots))[0]
+        assert self.do("start")[0]
+        if speed is not None:
+            self.want(speed, turn)
+        self.let(then)
+
     def want(self, speed, turn=0.0):
         """Hold on, and want this from now on."""
         self.wanted = {"speed": speed, "turn": turn, "held": True}
@@ -86,6 +94,13 @@ class Page:
 
     def let(self, seconds):
         self.world.clock.run(self.world.clock.now + seconds)
+
+    def until(self, seen, within=60.0, step=0.1):
+        """Let time go by until something is so."""
+        end = self.world.clock.now + within
+        while not seen():
+            assert self.world.clock.now < end, f"not so within {within} s"
+            self.let(step)
 
     def told(self, kind):
         return [line for line in self.lines if line["k"] == kind]

@@ -8,6 +8,7 @@ from helpers.console.simulated_console import Page
 from dva_sim.agents.tilt import Accelerometer, Hand, load_part
 from dva_sim.agents.tilt.device_axes import to_device_axes
 
+FIRE = [{"kind": "fire", "room": "North office", "at_s": 2, "latest_s": 2, "reported": True}]
 CALIBRATION = {
     "reference_mps2": [0.0, 0.0, 9.80665],
     "speed_step_mps2": 0.35,
@@ -99,6 +100,18 @@ class PhonePage(Page):
     def calibrate(self, client=None, **other):
         """Calibrate."""
         return self.ask("phone_calibrate", client=client, **CALIBRATION | other)
+
+    def drives_by_tilt(self, client=None, robot=0, then=3.0, **calibration):
+        """Everything up to a robot that goes straight on; the phone in the hand."""
+        assert self.register(client, label=f"phone {client or self.client}")["ok"]
+        assert self.permit(robot, client=client)["ok"]
+        assert self.calibrate(client, **calibration)["ok"]
+        self.held = HeldPhone(self, client or self.client)
+        self.held.tilt(10.3)  # five levels of 0.35 m/s^2
+        self.let(1.0)
+        assert self.do("start", client=client)[0]
+        self.let(then)
+        return self.held
 
     def ask(self, what, /, client=None, **about):
         """An action, and its whole answer."""
