@@ -148,10 +148,10 @@ def test_as_columns_it_names_its_units(before):
 @pytest.mark.parametrize(
     ("measure", "by", "problem"),
     [
-        ("speed_mps", [], "measure 'speed_mps' is not in both; runs: drive_time_s"),
-        ("tracks.speed_mps", [], "is not in both; tracks: t_s, x_m"),
-        ("outcome", [], "outcome is in words; ask for a share"),
-        ("drive_time_s", ["phone"], "factor 'phone' is not common to both; common: pattern"),
+        ("speed_mps", [], "'speed_mps' .*: drive_time_s"),
+        ("tracks.speed_mps", [], "tracks: t_s, x_m"),
+        ("outcome", [], "outcome is in words"),
+        ("drive_time_s", ["phone"], "'phone' .*common: pattern"),
     ],
 )
 def test_what_cannot_be_compared_is_told_with_what_can(before, measure, by, problem):

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from helpers.studies.small_study import cheap, study_in
+from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.compare import Comparison, judge
 from dva_sim.experiments.analysis.fail_conditions import Bound, parse
@@ -60,15 +61,10 @@ def comparison(sides):
         ("share(confirmed) < 95 %", Bound(0.95, "absolute")),
         ("share(confirmed) < -2%", Bound(-0.02, "more")),
         ("max(jams) >= 1e2", Bound(100.0, "absolute")),
-        ("mean(contact_impulse_n_s) > +1 N", None),
     ],
 )
 def test_a_bound_is_a_factor_a_difference_or_a_value_in_the_unit_of_the_measure(text, bound):
-    if bound is None:
-        with pytest.raises(ConfigError, match="unit 'N' does not fit; units: N s"):
-            parse(text)
-    else:
-        assert parse(text).bound == bound
+    assert parse(text).bound == bound
 
 
 def test_a_condition_is_read_word_by_word():
@@ -88,44 +84,32 @@ def test_a_share_can_be_of_a_word(word):
 
 
 @pytest.mark.parametrize(
-    ("text", "column"),
+    ("text", "column", "names"),
     [
-        ("average(response_s) > 3", 1),
-        ("p95(response_s > 1.05x", 16),
-        ("p95(response_s) > 3 m", 21),
-        ("  max(jams) ; 1", 13),
-        ("p95(response_s)  ", 18),
+        ("", 1, ["statistic"]),
+        ("p95", 4, ["'('"]),
+        ("p95(response_s)  ", 18, ["'>='"]),
+        ("p95 response_s > 3", 5, ["'('", "'response_s'"]),
+        ("p95(response_s > 1.05x", 16, ["')'", "'>'"]),
+        ("p0(response_s) > 3", 1, ["'p0'", "mean, median, min"]),
+        ("average(response_s) > 3", 1, ["'average'"]),
+        ("p95(response_s) = 3", 17, ["'='"]),
+        ("p95(response_s) == 3", 17, ["'>='", "'<='", "'=='"]),
+        ("p95(response_s) > fast", 19, ["number", "'fast'"]),
+        ("p95(response_s) > 3 m", 21, ["'m'", "s, ms, min, h"]),
+        ("p95(response_s) > +1.05x", 24, ["'x'"]),
+        ("p95(response_s) > 3 s s", 23, ["'s'"]),
+        ("p95(response_s) per > 3", 21, ["factor", "'>'"]),
+        ("__import__('os').system('ls') > 1", 1, ["'__import__'"]),
+        ("  max(jams) ; 1", 13, ["';'"]),
+        ("max(jams) > 1; max(contacts) > 1", 14, ["';'"]),
+        ("mean(contact_impulse_n_s) > +1 N", 32, ["'N'", "N s"]),
     ],
 )
-def test_a_mistake_is_told_with_its_place(text, column):
-    with pytest.raises(ConfigError, match=f", column {column}: "):
+def test_a_mistake_is_told_in_a_line_with_its_place_and_what_was_expected(text, column, names):
+    with pytest.raises(ConfigError, match=f", column {column}: ") as told:
         parse(text)
-
-
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("", "expected a statistic, and then it ends"),
-        ("p95", r"expected '\(', and then it ends"),
-        ("p95 response_s > 3", r"expected '\(', not 'response_s'"),
-        ("p95(response_s > 1.05x", r"expected '\)', not '>'"),
-        ("p0(response_s) > 3", "statistic 'p0' is unknown; known: mean, median, min"),
-        ("average(response_s) > 3", "'average' is unknown"),
-        ("p95(response_s) = 3", "'=' has no meaning here"),
-        ("p95(response_s) == 3", "expected '>' or '>=' or '<' or '<=', not '=='"),
-        ("p95(response_s) > fast", "expected a number, not 'fast'"),
-        ("p95(response_s) > 3 m", "unit 'm' does not fit; units: s, ms, min, h"),
-        ("p95(response_s) > +1.05x", "unit 'x' does not fit"),
-        ("p95(response_s) > 3 s s", "'s' is too much"),
-        ("p95(response_s) per > 3", "expected a factor or cell, not '>'"),
-        ("__import__('os').system('ls') > 1", r"'__import__' is unknown"),
-        ("max(jams) > 1; max(contacts) > 1", "';' has no meaning here"),
-    ],
-)
-def test_a_mistake_is_told_with_what_was_expected(text, problem):
-    with pytest.raises(ConfigError, match=problem) as told:
-        parse(text)
-    assert f"--fail-if {text!r}" in str(told.value)
+    assert unnamed(told.value, f"--fail-if {text!r}", *names) == []
     assert "\n" not in str(told.value)
 
 
@@ -163,7 +147,8 @@ def test_a_group_of_cells_can_fail_where_the_whole_does_not(comparison):
     each = comparison.judge("mean(drive_time_s) per pattern > +6 s")
     assert {v.levels[0][1] for v in each if v.holds} == {"req-rep"}
     assert {v.levels[0][1] for v in each if not v.holds} == {"latest-wins"}
-    assert len(comparison.judge("mean(drive_time_s) per cell > +6 s")) == 8
+    condition = "mean(drive_time_s) per cell > +6 s"
+    assert len(comparison.judge(condition)) == 8
 
 
 @pytest.mark.parametrize(
@@ -215,7 +200,7 @@ def never_arrives(job):
 
 def test_runs_that_crashed_in_the_second_folder_do_not_pass(beside):
     comparison = Comparison(*beside(crashes))
-    with pytest.raises(ConfigError, match=r"drive 8 runs .* failed"):
+    with pytest.raises(ConfigError, match="drive 8 runs"):
         comparison.judge("p95(drive_time_s) > 1.05x")
     drive = comparison.judge("missing(drive_time_s) > 0 %")[0]
     assert (drive.first, drive.second, drive.holds) == (0.0, 1 / 3, True)
@@ -233,10 +218,10 @@ def test_pairs_with_a_value_on_both_sides_are_held_against_each_other(beside):
 @pytest.mark.parametrize(
     ("condition", "problem"),
     [
-        ("mean(round_trip_s) > 1.05x", "no run of the second folder has a value"),
-        ("mean(speed_mps) > 1", "measure 'speed_mps' is not in both"),
+        ("mean(round_trip_s) > 1.05x", "second folder"),
+        ("mean(speed_mps) > 1", "'speed_mps'"),
         ("mean(outcome) > 1", "outcome is in words"),
-        ("mean(drive_time_s) per phone > 1", "factor 'phone' is not common to both"),
+        ("mean(drive_time_s) per phone > 1", "'phone'"),
     ],
 )
 def test_what_cannot_be_decided_does_not_pass(comparison, condition, problem):

@@ -12,6 +12,7 @@ from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.predictions import Cadence
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.answer_table import spread_table
 from dva_sim.experiments.report.figures.budget import DelayBudget
 from dva_sim.experiments.report.figures.contrast import AnswerFigure
 from dva_sim.experiments.report.figures.effect import CommandRate, Differences, _band
@@ -45,6 +46,18 @@ def view():
     runs = synthetic_results.columns(synthetic_results.drive_rows(2, 1))
     part = RunGrid(runs, "drive", [PATTERN, DELAY, PROFILE])
     return StudyView(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
+
+
+def test_the_table_of_spreads_holds_both_sides_and_the_effect_at_every_stop():
+    runs = synthetic_results.columns(synthetic_results.drive_rows(6, 3))
+    part = RunGrid(runs, "drive", [PATTERN, DELAY, PROFILE])
+    contrast = ("req-rep", "latest-wins")
+    view = StudyView(part, "drive_time_s", PATTERN, DELAY, contrast, {"profile": "default"})
+    rows = spread_table(view).rows
+    assert len(rows) == 3 * 6
+    assert {row[0] for row in rows[-3:]} == {"1\N{NO-BREAK SPACE}s"}
+    lines = ["REQ/REP", "latest-wins PUB/SUB", "REQ/REP − latest-wins PUB/SUB"]
+    assert [row[1] for row in rows[-3:]] == lines
 
 
 def test_lock_step_falls_behind_where_round_trip_and_processing_fill_the_period():

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from helpers.studies.small_study import REPEATED, STUDY, study_in, write_study
+from helpers.studies.small_study import REPEATED, STUDY, complaint, study_in
+from helpers.wording import unnamed
 
 from dva_sim.experiments.study import cell_grid, stopping
 from dva_sim.experiments.study.cell_grid import REFERENCE
-from dva_sim.experiments.study.loading import load_study
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.statistics import mean_interval
 
 STOP = (
@@ -124,13 +123,10 @@ def test_a_contrast_is_paired_so_what_a_person_brings_along_does_not_count(tmp_p
         return 100 * job.person + 10 * job.trial + effect + 0.01 * noisy(job)
 
     rows = rows_of(study, persons_differ_patterns_hardly, 6)
-    assert (stopping.half_widths(study, study.stop, rows) < 0.1).all()
+    found = stopping.half_widths(study, study.stop, rows)
+    assert found.shape == (2,)  # at every level that the contrast runs over
+    assert (found < 0.1).all()
     assert stopping.is_enough(study, rows)
-
-
-def test_a_contrast_has_a_width_at_every_level_it_runs_over(tmp_path):
-    study = study_in(tmp_path, text=STUDY + ON_ANSWER)
-    assert stopping.half_widths(study, study.stop, rows_of(study, noisy, 6)).shape == (2,)
 
 
 def test_with_one_person_or_without_values_nothing_is_enough(tmp_path):
@@ -147,34 +143,23 @@ def test_failed_runs_are_left_out(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("stop", "told"),
+    ("stop", "place", "names"),
     [
-        ("{half_width: 1, batch_persons: 2, most_persons: 9}", "22:1: stop: should name a compar"),
-        (
-            "{half_width: 1, comparison: answer, part: drive, batch_persons: 2, most_persons: 9}",
-            "22:1: stop: should name a comparison, or a measure and its part",
-        ),
-        (
-            "{half_width: 1, comparison: other, batch_persons: 2, most_persons: 9}",
-            "22:23: 'other' is not a comparison; there are: answer",
-        ),
-        (
-            "{half_width: 1, comparison: answer, batch_persons: 2, most_persons: 2}",
-            "22:61: most_persons should be at least the first batch, persons: 3",
-        ),
-        (
-            "{half_width: 1, part: drove, measure: contacts, batch_persons: 2, most_persons: 9}",
-            "22:23: stop.part 'drove' is not a part; did you mean 'drive'?",
-        ),
-        (
-            "{half_width: 1, part: drive, measure: time_s, batch_persons: 2, most_persons: 9}",
-            "22:36: measure 'time_s' is unknown",
-        ),
-        ("{half_width: 0, comparison: answer, batch_persons: 1, most_persons: 9}", "22:8: stop."),
+        ("half_width: 1", "22:1", ["comparison", "measure", "part"]),
+        ("half_width: 1, comparison: answer, part: drive", "22:1", ["comparison", "part"]),
+        ("half_width: 1, comparison: other", "22:23", ["'other'", "answer"]),
+        ("half_width: 1, part: drove, measure: contacts", "22:23", ["'drove'", "'drive'"]),
+        ("half_width: 1, part: drive, measure: time_s", "22:36", ["'time_s'"]),
+        ("half_width: 0, comparison: answer", "22:8", ["stop."]),
     ],
 )
-def test_a_rule_that_makes_no_sense_is_refused_where_it_stands(tmp_path, stop, told):
-    path = write_study(tmp_path, STUDY + f"stop: {stop}\n")
-    with pytest.raises(ConfigError) as caught:
-        cell_grid.cells(load_study(path))
-    assert str(caught.value).startswith(f"{path}:{told}")
+def test_a_rule_that_makes_no_sense_is_refused_where_it_stands(tmp_path, stop, place, names):
+    rest = "batch_persons: 2, most_persons: 9"
+    told = complaint(tmp_path, STUDY + f"stop: {{{stop}, {rest}}}\n")
+    assert told.startswith(f"study.yaml:{place}: ")
+    assert unnamed(told, *names) == []
+
+
+def test_the_most_persons_are_not_fewer_than_the_first_batch(tmp_path):
+    told = complaint(tmp_path, STUDY + ON_ANSWER.replace("most_persons: 8", "most_persons: 2"))
+    assert unnamed(told, "study.yaml:22:63: most_persons", "persons: 3") == []

@@ -13,9 +13,11 @@ from pathlib import Path
 
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.models import Tables
 
 STUDY = """\
@@ -82,6 +84,16 @@ def write_study(folder: Path, text: str = STUDY) -> Path:
 
 def study_in(folder: Path, *settings: str, text: str = STUDY) -> Study:
     return load_study(write_study(folder, text), settings)
+
+
+def complaint(folder: Path, text: str, *settings: str, version: str | None = None) -> str:
+    """What a study that cannot be is refused with, but for its folder."""
+    path = write_study(folder, text)
+    try:
+        cell_grid.jobs(load_study(path, settings, version=version))
+    except ConfigError as error:
+        return str(error).replace(f"{folder}/", "")
+    raise AssertionError("it is not refused")
 
 
 def cheap(job: StudyJob) -> Tables:
