@@ -6,6 +6,7 @@ import re
 
 import pytest
 from helpers.paths import ROOT
+from helpers.processes.command_line import ended as say
 from helpers.studies.report_text import blank_pictures
 from helpers.studies.small_study import cheap, study_in, unlucky
 from helpers.wording import unnamed
@@ -14,18 +15,6 @@ from dva_sim.cli import call, names
 from dva_sim.experiments.execution.dry_run import _Tried
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.kernel.errors import ExitCode
-
-
-@pytest.fixture
-def say(capsys):
-    """Calls the program here: its exit code, its output, and its complaint."""
-
-    def run(*words):
-        code = call([str(word) for word in words])
-        said = capsys.readouterr()
-        return code, said.out, said.err
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -47,18 +36,18 @@ def one_fails(job):
 # --- list and plugins ------------------------------------------------------------------
 
 
-def test_a_list_has_a_line_for_each_name_with_what_it_is(say):
+def test_a_list_has_a_line_for_each_name_with_what_it_is():
     code, out, _ = say("list")
     lines = out.splitlines()
     assert code == 0
-    for line in ("fire-drill +Two robots, two guards", "min_eta +Oldest task", "latest-wins +Publ"):
-        assert any(re.match(f"  {line}", told) for told in lines)
+    for name in ("fire-drill", "min_eta", "latest-wins", "caparica", "servrobot", "pursuit"):
+        assert any(re.match(f"  {name} +\\w", told) for told in lines)
     everything = names.everything()
     assert len(lines) == sum(len(found) + 2 for found in everything.values()) - 1
     assert all(entry.description for found in everything.values() for entry in found)
 
 
-def test_a_list_of_one_kind_or_none_that_there_is(say):
+def test_a_list_of_one_kind_or_none_that_there_is():
     assert say("list", "sites")[1].splitlines()[0] == "sites"
     assert "fire-drill" not in say("list", "sites")[1]
     code, out, err = say("list", "scenario")
@@ -89,7 +78,7 @@ def test_every_kind_that_is_listed_can_be_completed():
     assert names.kinds() == list(names.everything())
 
 
-def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
+def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points():
     out = say("plugins")[1]
     names_of_pages = ("agents/README", "protocol/README", "worlds/HAZARDS", "experiments/README")
     pages = [ROOT / f"{name}.md" for name in names_of_pages]
@@ -105,7 +94,7 @@ def test_plugins_are_told_by_kind_with_the_group_of_their_entry_points(say):
 # --- JSON ------------------------------------------------------------------------------
 
 
-def test_lists_and_plugins_as_json_have_stable_keys(say):
+def test_lists_and_plugins_as_json_have_stable_keys():
     _, out, err = say("list", "--json")
     found = json.loads(out)
     assert err == ""
@@ -134,7 +123,7 @@ def keys_in(data):
     return {*data, *keys_in(list(own.values()))}
 
 
-def test_results_as_json_have_the_keys_that_the_page_promises(say, folders):
+def test_results_as_json_have_the_keys_that_the_page_promises(folders):
     results, failed = folders
     shown = json.loads(say("show", results, "--json")[1])
     assert keys_on_the_page("show FOLDER --json") <= keys_in(shown)
@@ -143,9 +132,8 @@ def test_results_as_json_have_the_keys_that_the_page_promises(say, folders):
     assert shown["answer"]["finding"]["differences"][0].keys() == {"level", "mean", "low", "high"}
 
     table = json.loads(say("show", results, "--table", "runs", "--rows", 3, "--json")[1])
-    assert table.keys() == keys_on_the_page("show FOLDER --table NAME --json") - {
-        *("name", "unit", "meaning"),
-    }
+    promised = keys_on_the_page("show FOLDER --table NAME --json")
+    assert table.keys() == promised - {"name", "unit", "meaning"}
     assert (table["rows"], len(table["data"])) == (42, 3)
     assert list(table["data"][0]) == [column["name"] for column in table["columns"]]
 
@@ -154,13 +142,12 @@ def test_results_as_json_have_the_keys_that_the_page_promises(say, folders):
     assert columns["tables"]["runs"][0]["name"] == "part"
 
     compared = json.loads(say("compare", results, failed, "--json")[1])
-    assert keys_on_the_page("compare A B --json") - {"condition", "groups", "bound"} <= {
-        *keys_in(compared),
-    }
+    gates = {"condition", "groups", "bound"}
+    assert keys_on_the_page("compare A B --json") - gates <= keys_in(compared)
     assert compared["b"]["failed"] == 1
 
 
-def test_a_gate_fails_in_json_as_it_does_in_words(say, folders):
+def test_a_gate_fails_in_json_as_it_does_in_words(folders):
     results, _ = folders
     code, out, err = say("compare", results, results, "--fail-if", "max(contacts) > 0", "--json")
     (gate,) = json.loads(out)["gates"]
@@ -169,7 +156,7 @@ def test_a_gate_fails_in_json_as_it_does_in_words(say, folders):
     assert gate["groups"][0].keys() == {"part", "levels", "a", "b", "bound", "failed"}
 
 
-def test_a_mistake_leaves_nothing_on_standard_output_for_a_program_to_trip_over(say, tmp_path):
+def test_a_mistake_leaves_nothing_on_standard_output_for_a_program_to_trip_over(tmp_path):
     code, out, err = say("show", tmp_path, "--json")
     assert (code, out) == (2, "")
     assert err.startswith("error: ")
@@ -179,7 +166,7 @@ def test_a_mistake_leaves_nothing_on_standard_output_for_a_program_to_trip_over(
 # --- less and more ---------------------------------------------------------------------
 
 
-def test_an_episode_is_quiet_as_usual_or_tells_every_measure(say):
+def test_an_episode_is_quiet_as_usual_or_tells_every_measure():
     words = ("episode", "drive-to-event", "--set", "horizon_s=3")
     assert say(*words, "-q") == (0, "", "")
     usual, more = say(*words)[1], say(*words, "-v")[1]
@@ -188,7 +175,7 @@ def test_an_episode_is_quiet_as_usual_or_tells_every_measure(say):
     assert re.search(r"\ntraffic_bytes +\d+ B +\w", more)
 
 
-def test_a_report_is_quiet_or_tells_its_files(say, folders):
+def test_a_report_is_quiet_or_tells_its_files(folders):
     results, _ = folders
     with blank_pictures():
         assert say("report", results, "--quiet") == (0, "", "")
@@ -196,7 +183,7 @@ def test_a_report_is_quiet_or_tells_its_files(say, folders):
     assert re.search(r"tables/runs\.parquet: [\d,]+ bytes\n", told)
 
 
-def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypatch):
+def test_a_dry_run_tells_every_configuration_if_asked_to(tmp_path, monkeypatch):
     monkeypatch.setattr("dva_sim.experiments.execution.dry_run._tried", lambda *_: _Tried({}))
     path = study_in(tmp_path).file
     out = say("run", path, "--dry-run", "-v", "-o", tmp_path / "out")[1]
@@ -204,7 +191,7 @@ def test_a_dry_run_tells_every_configuration_if_asked_to(say, tmp_path, monkeypa
     assert say("run", path, "--dry-run", "-q", "-o", tmp_path / "out") == (0, "", "")
 
 
-def test_runs_that_failed_are_told_on_standard_error_however_quiet(say, tmp_path, monkeypatch):
+def test_runs_that_failed_are_told_on_standard_error_however_quiet(tmp_path, monkeypatch):
     monkeypatch.setattr("dva_sim.experiments.execution.runner.run_job", one_fails)
     path = study_in(tmp_path).file
     with blank_pictures():

@@ -22,19 +22,14 @@ def test_durations_are_said_as_people_would(seconds, words):
     assert duration(seconds) == words
 
 
-def test_the_rate_counts_what_this_session_made_not_what_was_done_before():
-    clock = iter([100.0, 110.0, 130.0])
-    pace = RunPace(lambda: next(clock))
-    assert pace.line(600, 1000) == "600/1000 runs"
-    assert pace.line(620, 1000) == "620/1000 runs, 2.0 runs/s, 3 min left"
-    assert pace.line(1000, 1000) == "1000/1000 runs, 13.3 runs/s"
-
-
-def test_slow_runs_are_counted_by_the_minute():
-    clock = iter([0.0, 120.0])
-    pace = RunPace(lambda: next(clock))
+def test_the_rate_counts_what_this_session_made_not_what_was_done_before_slow_runs_by_the_minute():
+    pace = RunPace(iter([0.0, 120.0]).__next__)
     pace.line(0, 10)
-    assert pace.line(3, 10) == "3/10 runs, 1.5 runs/min, 5 min left"
+    assert pace.line(3, 10).split(", ") == ["3/10 runs", "1.5 runs/min", "5 min left"]
+    pace = RunPace(iter([100.0, 110.0, 130.0]).__next__)
+    assert pace.line(600, 1000) == "600/1000 runs"
+    assert pace.line(620, 1000).split(", ") == ["620/1000 runs", "2.0 runs/s", "3 min left"]
+    assert pace.line(1000, 1000) == "1000/1000 runs, 13.3 runs/s"
 
 
 def test_a_dry_run_of_a_fresh_folder_tries_some_runs_and_keeps_none(tmp_path):
@@ -74,37 +69,23 @@ def test_a_run_that_fails_when_tried_is_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("plan", "words"),
+    ("plan", "names"),
     [
-        (DryRun(42, 42, 9, 1, 2, 0.0, 0, ""), "nothing is left to run"),
-        (
-            DryRun(42, 0, 9, 1, 1, 300.0, 5, ""),
-            "about 5 min to go with 1 process, judged by 5 runs tried now",
-        ),
-        (
-            DryRun(42, 7, 9, 1, 2, 30.0, 0, ""),
-            "about 30 s to go with 2 processes, judged by the runs done already",
-        ),
-        (
-            DryRun(42, 0, 9, 1, 2, 7200.0, 1, "", is_least=True),
-            "more than 2 h 0 min to go with 2 processes, judged by 1 run tried now; the last "
-            "was stopped before its end",
-        ),
-        (
-            DryRun(42, 0, 9, 1, 2, 30.0, 4, "", failed="ValueError: no"),
-            "about 30 s to go with 2 processes, judged by 4 runs tried now; a run that was tried "
-            "failed: ValueError: no",
-        ),
+        ((42, 42, 9, 1, 2, 0.0, 0, ""), ["nothing is left"]),
+        ((42, 0, 9, 1, 1, 300.0, 5, ""), ["about 5 min", "1 process,", "5 runs tried now"]),
+        ((42, 7, 9, 1, 2, 30.0, 0, ""), ["about 30 s", "2 processes,", "done already"]),
+        ((42, 0, 9, 1, 2, 7200.0, 1, "", True), ["more than 2 h 0 min", "1 run tried", "stopped"]),
+        ((42, 0, 9, 1, 2, 30.0, 4, "", False, "ValueError: no"), ["4 runs", "failed: ValueError"]),
     ],
 )
-def test_an_estimate_says_what_it_rests_on(plan, words):
-    assert study_runs._time(plan) == words
+def test_an_estimate_says_what_it_rests_on(plan, names):
+    assert unnamed(study_runs._time(DryRun(*plan)), *names) == []
 
 
 def test_a_plan_says_that_a_study_may_stop_early():
     plan = DryRun(42, 7, 9, 4, 2, 30.0, 0, "")
     told = study_runs._plan(plan, Path("out"))
-    assert unnamed(told, "at most 42 runs in 9", "up to 4 rounds", "7 of them", "into out") == []
+    assert unnamed(told, "at most 42 runs", " 9 ", "up to 4 rounds", "7 of them", "into out") == []
 
 
 def test_a_probe_spreads_over_the_design():
@@ -126,7 +107,7 @@ def test_what_is_stopped_names_the_command_that_goes_on(tmp_path, monkeypatch, c
     assert code == 130
     *_, what, how = capsys.readouterr().out.splitlines()
     assert "7 of 42 runs" in what
-    assert how.endswith("dva-sim run 'my study.yaml' --set seed=3")
+    assert unnamed(how, "dva-sim run 'my study.yaml'", "--set seed=3") == []
 
 
 def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(tmp_path, monkeypatch):
@@ -134,5 +115,5 @@ def test_ctrl_c_while_tables_are_written_says_that_all_runs_are_done(tmp_path, m
         raise KeyboardInterrupt
 
     monkeypatch.setattr("dva_sim.experiments.execution.runner.write_tables", stop)
-    with pytest.raises(KeyboardInterrupt, match="after 42 of 42 runs"):
+    with pytest.raises(KeyboardInterrupt, match="42 of 42 runs"):
         run_study(kit.study_in(tmp_path), tmp_path / "out", jobs=1, episode=kit.cheap)

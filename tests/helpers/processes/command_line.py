@@ -25,6 +25,12 @@ def call(*words: str | Path, cwd: Path | None = None, said: str = "") -> Complet
     return CompletedProcess(words, code, *(_text(stream) for stream in (out, errors)))
 
 
+def ended(*words: str | Path, cwd: Path | None = None) -> tuple[int, str, str]:
+    """The exit code of `dva-sim WORDS`, its output, and its complaint."""
+    done = call(*words, cwd=cwd)
+    return done.returncode, done.stdout, done.stderr
+
+
 @contextlib.contextmanager
 def _terminal(out: io.TextIOWrapper, errors: io.TextIOWrapper, said: str) -> Iterator[None]:
     typed = io.TextIOWrapper(io.BytesIO(said.encode()), "utf-8")
