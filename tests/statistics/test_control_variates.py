@@ -70,16 +70,12 @@ def test_a_covariate_given_twice_counts_once():
     assert adjusted(values, np.repeat(known, 2, axis=0)) == pytest.approx(adjusted(values, known))
 
 
-def test_a_person_whom_a_covariate_describes_alone_leaves_all_as_it_is():
+def test_no_covariate_and_one_that_describes_a_single_person_leave_all_as_it_is():
     values, _ = persons(30)
     alone = np.zeros((1, 30, 1))
     alone[0, 3, 0] = 1.0
-    assert np.array_equal(adjusted(values, alone), values)
-
-
-def test_without_covariates_values_stay_as_they_are():
-    values, _ = persons(30)
-    assert np.array_equal(adjusted(values, np.empty((0, 30, 1))), values)
+    for known in (alone, np.empty((0, 30, 1))):
+        assert np.array_equal(adjusted(values, known), values)
 
 
 def test_how_far_a_mean_is_off_zero_is_counted_in_standard_errors():

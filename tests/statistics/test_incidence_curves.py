@@ -7,23 +7,6 @@ from dva_sim.statistics import CUT, first_of, incidence
 CONFIRMED, ESCALATED = 1, 2
 
 
-def kaplan_meier(time, met):
-    """Share that nothing has happened to, by the product over those at risk."""
-    left, steps = 1.0, []
-    for now in sorted(set(time[met])):
-        left *= 1 - (time[met] == now).sum() / (time >= now).sum()
-        steps.append(left)
-    return np.array(steps)
-
-
-def test_with_one_cause_the_incidence_is_one_minus_kaplan_meier():
-    rng = np.random.default_rng(1)
-    ends, cuts = rng.exponential(60, 200).round(), rng.exponential(90, 200).round()
-    time, met = np.minimum(ends, cuts), ends <= cuts
-    curve = incidence(time, met.astype(int), 1)
-    np.testing.assert_allclose(curve.shares[0], 1 - kaplan_meier(time, met), atol=1e-12)
-
-
 def test_freireich_patients_on_6_mp_relapse_as_the_textbooks_say():
     # Weeks to relapse of 21 patients: E. J. Freireich et al., Blood 21 (1963), 699-716.
     relapsed = [6, 6, 6, 7, 10, 13, 16, 22, 23]
@@ -52,18 +35,6 @@ def test_with_cuts_two_causes_add_up_as_computed_by_hand():
     curve = incidence([10, 15, 20, 30], [CONFIRMED, CUT, ESCALATED, CONFIRMED], 2)
     np.testing.assert_allclose(curve.shares[0], [1 / 4, 1 / 4, 5 / 8])
     np.testing.assert_allclose(curve.shares[1], [0, 3 / 8, 3 / 8])
-
-
-def test_with_independent_exponential_causes_the_incidence_is_the_one_of_the_books():
-    # Rates 1/60 and 1/120 per second: F1(t) = 2/3 (1 - exp(-t/40)); cut off at a rate of 1/200.
-    rng = np.random.default_rng(2)
-    n = 40_000
-    time, cause = first_of(
-        [rng.exponential(60, n), rng.exponential(120, n)], rng.exponential(200, n)
-    )
-    at = np.array([20.0, 60.0, 150.0])
-    found = incidence(time, cause, 2).at(at, 1)
-    np.testing.assert_allclose(found, 2 / 3 * (1 - np.exp(-at / 40)), atol=0.01)
 
 
 def test_the_restricted_mean_counts_the_limit_for_who_never_comes():
