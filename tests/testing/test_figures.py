@@ -1,7 +1,5 @@
 """What every figure promises: kept by those that are shipped, missed by the bad ones."""
 
-import csv
-import io
 import itertools
 
 import numpy as np
@@ -64,6 +62,18 @@ def broad(self, ax, values):
 drawings = itertools.count()
 
 
+def lime(self, ax, values):
+    ax.plot(values, values, "o", color="lime")
+
+
+def now_and_then(self, ax, values):
+    Plain.mark(self, ax, values[: len(values) - next(drawings) % 2])
+
+
+def speechless(self, figure, caption, numbers):
+    return Plain.finish(self, figure, "", numbers)
+
+
 def careless(self, view, reading):
     from matplotlib import pyplot
 
@@ -94,30 +104,14 @@ class Refusing(Plain):
     ("bad", "promise", "told"),
     [
         (but(written=lambda self, values: values[1:]), figures.NUMBERS, "along y by a line"),
-        (
-            but(mark=lambda self, ax, values: ax.plot(values, values, "o", color="lime")),
-            figures.COLOUR,
-            "#00ff00 of a Line2D",
-        ),
+        (but(mark=lime), figures.COLOUR, "#00ff00 of a Line2D"),
         (but(mark=small_words), figures.SMALL, "'drive time' in 5.0 pt"),
         (but(mark=broad), figures.SMALL, "6 pt"),
-        (
-            but(mark=lambda self, ax, y: Plain.mark(self, ax, y[: len(y) - next(drawings) % 2])),
-            figures.CHANGES,
-            "other bytes",
-        ),
+        (but(mark=now_and_then), figures.CHANGES, "other bytes"),
         (but(draw=careless), figures.OPEN, "panels()"),
         (but(draw=meddling), figures.TOUCHES, "read-only"),
-        (
-            but(draw=lambda self, view, reading: reading.table("events")["outcome"][0]),
-            figures.EMPTY,
-            "KeyError",
-        ),
-        (
-            but(finish=lambda self, figure, _, numbers: Plain.finish(self, figure, "", numbers)),
-            figures.UNSAID,
-            "caption ''",
-        ),
+        (but(draw=lambda self, _, r: r.table("events")["outcome"][0]), figures.EMPTY, "KeyError"),
+        (but(finish=speechless), figures.UNSAID, "caption ''"),
         (but(tables=("runs", "nowhere")), figures.NEVER, "runs, nowhere"),
         (Misnamed, figures.NAME, "'other' for 'plain'"),
     ],
@@ -176,10 +170,3 @@ def test_every_figure_that_is_shipped_keeps_its_promises(figure):
     if figure.name in COMPUTED:
         promises -= {figures.NUMBERS}
     assert promises == ({figures.NEVER} if figure.name in OF_OTHER_DESIGNS else set()), outcome
-
-
-def test_rows_of_a_figure_can_be_read_as_a_table():
-    numbers = Numbers()
-    numbers.add({"pattern": "req-rep"}, {"t_s": [1.0, 2.0]})
-    rows = list(csv.DictReader(io.StringIO(numbers.csv().decode())))
-    assert rows == [{"pattern": "req-rep", "t_s": "1"}, {"pattern": "req-rep", "t_s": "2"}]

