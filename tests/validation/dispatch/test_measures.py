@@ -8,7 +8,7 @@ import pytest
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.shift import build, simulate_timed
-from dva_sim.validation.dispatch.estimation import controls, estimate, inputs
+from dva_sim.validation.dispatch.estimation import controls, inputs
 from dva_sim.validation.dispatch.measures import (
     Batches,
     Sample,
@@ -217,40 +217,6 @@ def test_controls_have_mean_zero(changes, names):
     for name in totals[0]:
         values = np.array([total[name] for total in totals])
         assert abs(values.mean()) < 3.5 * values.std() / math.sqrt(30), name
-
-
-def a_plain_queue(rng, servers=3, rate=2.4, until=1200.0):
-    """What a run of the shipped case of three guards would show, from a recursion."""
-    times = np.cumsum(rng.exponential(1 / rate, int(1.2 * rate * until)))
-    times = times[times <= until]
-    looks = rng.exponential(1.0, len(times))
-    start = times + many_servers(times, looks, servers)
-    never, nobody = np.full(len(times), NAN), np.zeros(len(times), int)
-    ended = np.array(["confirmed"] * len(times))
-    units, guards = ("a", "b", "c"), ("guard",) * servers
-    end = start + looks
-    heads = (("fire",), units, guards, guards, 0, 0, 200.0, until, nobody, nobody, ended)
-    return Sample(*heads, times, start, start, end, never, never, end, nobody, start, end)
-
-
-@pytest.mark.soak
-def test_the_waits_of_three_guards_are_estimated_without_bias_and_with_honest_errors():
-    look, between = RANDOM | {"mean_s": 1.0}, RANDOM | {"mean_s": 1 / 2.4}
-    team = [{"name": "guard", "count": 3, "look": look}]
-    scenario = build({"model": "timed", "responders": team, "demand": [{"between": between}]})
-    off = []
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        cut = [Batches(a_plain_queue(rng), 10) for _ in range(12)]
-        tops, bottoms = (
-            np.concatenate(s) for s in zip(*(sums("wait_s", b) for b in cut), strict=True)
-        )
-        luck = [np.column_stack(list(controls(b, scenario).values())) for b in cut]
-        found = estimate(tops, bottoms, np.concatenate(luck))
-        assert found.error < 0.5 * found.plain_error
-        off.append((found.value - 1.078652) / found.error)
-    assert abs(np.mean(off)) < 3 / math.sqrt(40)
-    assert 0.7 < np.std(off) < 1.35
 
 
 def test_what_was_put_in_is_counted_beside_what_was_expected():

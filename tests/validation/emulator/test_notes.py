@@ -1,3 +1,4 @@
+import json
 import sys
 
 import pytest
@@ -6,7 +7,7 @@ from helpers.processes import patience
 from dva_sim.validation.network.emulator.programs import NoteKind, Notes
 
 A_PROCESS_NOTES_AND_ENDS = """
-import os
+import json, os
 from dva_sim.validation.network.emulator.programs import NoteKind, Notes
 notes = Notes(10)
 if os.fork() == 0:
@@ -14,7 +15,7 @@ if os.fork() == 0:
     notes.add(NoteKind.APPLIED, 3, 2.25)
     os._exit(0)
 os.wait()
-print(notes.read())
+print(json.dumps(notes.read()))
 """
 
 
@@ -22,7 +23,7 @@ def test_notes_of_a_process_are_read_after_it_ended():
     told = patience.run(
         [sys.executable, "-c", A_PROCESS_NOTES_AND_ENDS], capture_output=True, text=True, check=True
     )
-    assert told.stdout == "[(4, 0, 1.5), (8, 3, 2.25)]\n"
+    assert json.loads(told.stdout) == [[4, 0, 1.5], [8, 3, 2.25]]
 
 
 def test_there_is_no_note_without_room():

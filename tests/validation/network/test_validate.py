@@ -5,7 +5,6 @@ import csv
 import pytest
 
 from dva_sim.cli import validation
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.validation.network import comparison, result_page
 from dva_sim.validation.network.comparison import NetworkSetting, compare
 from dva_sim.validation.network.reference import load_plan, load_runs
@@ -107,12 +106,3 @@ def test_a_mechanism_that_is_left_out_has_its_line(runs, monkeypatch):
     found = compare(grouped(one), NetworkSetting(quick=True, ablate=True))
     left_out = {name for name, *_ in result_page.ablation(found)}
     assert {"nothing", "datagrams", "tail-loss probe", "RACK"} <= left_out
-
-
-def test_options_of_others_are_refused():
-    with pytest.raises(ConfigError, match=r"--strategy .*`validate operators`"):
-        validation.validate("network", strategy="adaptive")
-    with pytest.raises(ConfigError, match="--ablate, --live and --measure"):
-        validation.validate("dispatch", ablate=True)
-    with pytest.raises(ConfigError, match="dispatch, operators or network"):
-        validation.validate("sockets")
