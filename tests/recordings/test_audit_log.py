@@ -21,6 +21,7 @@ from dva_sim.recordings.audit_log import (
     AuditEntry,
     AuditLog,
     AuditWriteError,
+    Verified,
     plain_row,
     read_rows,
     row_of,
@@ -45,6 +46,12 @@ def log(tmp_path: Path) -> Path:
         written.append([entry(action, event=1, details={"proposed": "robot-1"})])
     written.close()
     return path
+
+
+def place_of(found: Verified, words: str) -> tuple[int, bool]:
+    """The row that is wrong, and whether it is told in these words."""
+    assert found.problem is not None
+    return found.problem.number, words in found.problem.text
 
 
 def by_hand(path: Path, *commands: str) -> None:
@@ -98,10 +105,8 @@ def test_what_was_done_by_hand_is_found_at_the_first_row_that_is_wrong(log, faul
     commands, number, words = PLANTED[fault]
     by_hand(log, *commands)
 
-    problem = verify(log).problem
-    assert problem is not None
-    assert (problem.number, words in problem.text) == (number, True), problem
-    with pytest.raises(ConfigError, match="no audit log to go on with"):
+    assert place_of(verify(log), words) == (number, True)
+    with pytest.raises(ConfigError, match="no audit log"):
         AuditLog(log)
 
 
@@ -115,9 +120,7 @@ def test_a_row_put_in_whose_hash_is_right_does_not_follow_the_one_before(log):
             f"INSERT INTO audit ({names}) VALUES ({', '.join('?' * len(row))})", [*row.values()]
         )
 
-    problem = verify(log).problem
-    assert problem is not None
-    assert (problem.number, "does not follow row 2" in problem.text) == (3, True)
+    assert place_of(verify(log), "row 2") == (3, True)
 
 
 def test_an_end_that_was_cut_with_its_count_leaves_a_doubt_and_another_last_hash(log):
@@ -216,18 +219,16 @@ def test_rows_that_were_kept_elsewhere_are_followed_from_wherever_they_begin(log
         (left_out, 3, "is missing"),
         ([{"number": 1}], 1, "is not whole"),
     ):
-        problem = verify_plain(rows).problem
-        assert problem is not None
-        assert (problem.number, words in problem.text) == (number, True)
+        assert place_of(verify_plain(rows), words) == (number, True)
 
 
 def test_a_file_that_is_something_else_is_left_as_it_is(tmp_path):
     path = tmp_path / "audit.sqlite"
-    path.write_text("not a log, but somebody's notes")
+    path.write_text("notes")
 
     with pytest.raises(ConfigError, match="is no audit log"):
         AuditLog(path)
-    assert path.read_text() == "not a log, but somebody's notes"
+    assert path.read_text() == "notes"
 
 
 @pytest.mark.parametrize("make", [Path.touch, lambda path: None])

@@ -71,9 +71,10 @@ def test_raw_messages_are_those_of_the_protocol():
     assert {m.Registration, m.SetTeleOp, m.Heartbeat} <= {type(body) for body in bodies}
 
 
-def test_times_are_kept_to_the_microsecond():
+def test_times_are_kept_to_the_microsecond_and_what_never_comes_is_null():
     assert messages.nanoseconds(12.000001) == 12_000_001_000
     assert messages.stamp(12.000001) == {"sec": 12, "nsec": 1000}
+    assert (messages.finite(math.inf), messages.finite(2.5)) == (None, 2.5)
 
 
 def test_a_heading_survives_as_a_quaternion():
@@ -88,11 +89,6 @@ def test_of_somebody_who_stands_still_a_pose_a_second_is_told():
     ]
     times = [p.time for p in sparse(track)]
     assert times == [0.0, 1.0, *(k / 10 for k in range(20, 31)), 4.0, 5.0, 6.0]
-
-
-def test_what_never_comes_is_null():
-    assert messages.finite(math.inf) is None
-    assert messages.finite(2.5) == 2.5
 
 
 def _strict(schema):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.paths import ROOT
+from helpers.wording import unnamed
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
@@ -108,19 +109,12 @@ def test_an_ffmpeg_that_fails_is_one_line_and_no_half_film(
     ffmpeg_that(tmp_path, monkeypatch, script)
     folder = tmp_path / "out"
     folder.mkdir()
-    with pytest.raises(ConfigError, match=said) as error:
-        write_film(film, folder / "film.mp4")
-    assert len(str(error.value).splitlines()) == 1
-    assert list(folder.iterdir()) == []
-
-
-def test_a_film_that_fails_leaves_the_old_one_alone(film, tmp_path, monkeypatch):
-    ffmpeg_that(tmp_path, monkeypatch, "exit 1")
-    old = tmp_path / "film.mp4"
-    old.write_bytes(b"old")
-    with pytest.raises(ConfigError):
-        write_film(film, old)
-    assert old.read_bytes() == b"old"
+    (folder / "old.mp4").write_bytes(b"old")
+    for name in ("film.mp4", "old.mp4"):
+        with pytest.raises(ConfigError, match=said) as error:
+            write_film(film, folder / name)
+        assert len(str(error.value).splitlines()) == 1
+    assert [(path.name, path.read_bytes()) for path in folder.iterdir()] == [("old.mp4", b"old")]
 
 
 def test_without_any_ffmpeg_one_is_told_what_to_install_before_the_run(tmp_path, monkeypatch):
@@ -128,13 +122,6 @@ def test_without_any_ffmpeg_one_is_told_what_to_install_before_the_run(tmp_path,
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ConfigError, match=r"'dva-sim\[video\]', or .* ffmpeg"):
         Wanted(video=tmp_path / "film.mp4")
-
-
-def test_two_runs_side_by_side_share_the_width_and_differ(drive):
-    other = run_of(**{"horizon_s": 30, "link.delay_s": 0.5, "pattern": "req-rep"})
-    picture = Film([drive, other]).at(25.0)
-    half = picture.shape[1] // 2
-    assert not np.array_equal(picture[:, :half], picture[:, half : 2 * half])
 
 
 # --- how a film ends -----------------------------------------------------------------------
@@ -186,10 +173,7 @@ def test_below_each_map_stands_how_its_run_ended_from_then_on_and_not_before(fil
     film = films[False]
     told = [scene_lines(ax) for ax in film.figure.axes[:2]]
     film.at(11.9)
-    assert [ended.get_text() for _, ended in told] == [
-        "not confirmed within 20 s",
-        "not confirmed within 12 s",
-    ]
+    assert [ended.get_text()[-4:] for _, ended in told] == ["20 s", "12 s"]
     before, after = film.at(11.9), film.at(12.0)
     assert pixels_of(halves(before)[1], style.FAILED) == 0
     assert pixels_of(halves(after)[1], style.FAILED) > 1000
@@ -375,7 +359,7 @@ def test_the_picture_a_camera_takes_changes_as_the_robot_moves(drive):
     moments, started = Moments(drive), drive.recorder.drives[0].started
     first, later = moments.eye("robot-1", started), moments.eye("robot-1", started + 8)
     assert np.abs(first.astype(int) - later).mean() > 5
-    with pytest.raises(ConfigError, match="'robot-9' is unknown; known: robot-1"):
+    with pytest.raises(ConfigError, match=r"'robot-9' .*: robot-1"):
         moments.eye("robot-9", 1.0)
 
 
@@ -404,20 +388,9 @@ def test_a_still_of_two_runs_shows_the_moment_when_the_first_one_is_done(race):
     assert best_time([late]) == 20.0
     figure = still([late, early], best_time([late, early]))
     told = [line.get_text() for ax in figure.axes for line in scene_lines(ax) if line.get_visible()]
-    assert told == ["still under way, confirmed at 19.5 s", "confirmed at 11.2 s, 8.2 s ahead"]
+    assert unnamed(told[0], "still under way", "19.5 s") == []
+    assert unnamed(told[1], "11.2 s", "8.2 s ahead") == []
     assert [ax.get_title(loc="right") for ax in figure.axes] == ["11.2 s", "11.2 s"]
-
-
-def test_a_still_shows_the_moment_asked_for(drive, tmp_path):
-    late, early = (still([drive], time) for time in (29.0, 1.0))
-    assert late.axes[0].get_title(loc="right") == "29.0 s"
-    for name, figure in (("late", late), ("early", early)):
-        figure.savefig(tmp_path / f"{name}.png", dpi=40)
-    pictures = [
-        np.asarray(Image.open(tmp_path / f"{n}.png")).astype(int) for n in ("late", "early")
-    ]
-    assert pictures[0].shape == pictures[1].shape
-    assert np.abs(pictures[0] - pictures[1]).max() > 100
 
 
 def test_everything_wanted_is_written_and_named(drive, tmp_path):
@@ -472,7 +445,7 @@ def test_what_no_run_of_a_scenario_has_is_said_before_the_run(options, said, tmp
 
 def test_a_moment_after_the_end_is_refused(drive, tmp_path):
     wanted = Wanted(still=tmp_path / "a.png", at="99")
-    with pytest.raises(ConfigError, match=r"--at 99 .* 30 s"):
+    with pytest.raises(ConfigError, match=r"--at 99 .*30 s"):
         list(wanted.write([drive]))
 
 

@@ -84,7 +84,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path):
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, before[1]))
     try:
-        with pytest.raises(DvaSimError, match=r"run\.mcap .*: File too large"):
+        with pytest.raises(DvaSimError, match=r"run\.mcap .*File too large"):
             write_recording(drive(), path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -160,12 +160,6 @@ def test_how_everything_ended_comes_back(opened, name):
     assert len(endings) == len(RUNS[name]().incidents) > 0
 
 
-def test_of_a_file_cut_short_nobody_knows_how_it_ended(folder, tmp_path):
-    whole = (folder / "drive.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(whole[: int(0.7 * len(whole))])
-    assert read_recording(tmp_path / "cut.mcap").playback.endings == []
-
-
 def test_the_site_and_its_hazards_are_the_same(opened):
     now, then = opened["drill"].playback, drill()
     assert np.array_equal(now.site.grid.cells, then.site.grid.cells)
@@ -233,6 +227,7 @@ def test_of_a_file_cut_short_all_that_is_there_is_read(folder, tmp_path, share):
     opened = read_recording(tmp_path / "cut.mcap")
     until = opened.playback.duration
     assert not opened.is_whole
+    assert opened.playback.endings == []  # nobody knows
     assert 0 < until < opened.lasted == 60.0
     told = [m[1:] for m in evacuation().recorder.timeline if m.time < until]
     assert [m[1:] for m in opened.playback.recorder.timeline][: len(told)] == told
@@ -240,12 +235,6 @@ def test_of_a_file_cut_short_all_that_is_there_is_read(folder, tmp_path, share):
     ends = {n: t[-1].time for n, t in opened.playback.recorder.tracks.items()}
     assert there
     assert all(ends[name] == until for name in there)
-
-
-def test_a_file_cut_before_the_run_begins_says_so(folder, tmp_path):
-    (tmp_path / "cut.mcap").write_bytes((folder / "drive.mcap").read_bytes()[:200])
-    with pytest.raises(ConfigError, match="cut short before"):
-        read_recording(tmp_path / "cut.mcap")
 
 
 @pytest.mark.system
@@ -268,28 +257,25 @@ def test_a_damaged_file_ends_in_one_line(folder, opened, tmp_path):
     assert all("\n" not in line and "bad.mcap: " in line for line in told)
 
 
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        (b"", "cut short before"),
-        (b"<xml>not at all</xml>" * 10, "is not a recording"),
-    ],
-)
-def test_another_file_is_told_from_a_recording(tmp_path, content, problem):
-    (tmp_path / "other.mcap").write_bytes(content)
-    with pytest.raises(ConfigError, match=problem):
-        read_recording(tmp_path / "other.mcap")
-
-
-def test_a_file_that_is_not_there_is_told(tmp_path):
-    with pytest.raises(ConfigError, match="No such file"):
-        read_recording(tmp_path / "none.mcap")
+def test_a_file_that_is_none_another_or_cut_before_the_run_begins_is_told(folder, tmp_path):
+    contents = {
+        "cut short before": (folder / "drive.mcap").read_bytes()[:200],
+        "cut short": b"",
+        "not a recording": b"<xml>not at all</xml>" * 10,
+        "No such file": None,
+    }
+    for number, (problem, content) in enumerate(contents.items()):
+        file = tmp_path / f"{number}.mcap"
+        if content is not None:
+            file.write_bytes(content)
+        with pytest.raises(ConfigError, match=problem):
+            read_recording(file)
 
 
 def test_a_recording_of_a_later_form_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "FORMAT", 2)
     write_recording(drive(), tmp_path / "later.mcap")
-    with pytest.raises(ConfigError, match=f"dva-sim {__version__} .* form 2 is later"):
+    with pytest.raises(ConfigError, match=f"dva-sim {__version__} .*form 2 "):
         read_recording(tmp_path / "later.mcap")
 
 

