@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.studies.small_study import cheap, study_in
+from helpers.wording import unnamed
 
 import dva_sim
 from dva_sim.experiments.execution.runner import run_study
@@ -44,17 +45,13 @@ def test_results_and_what_comes_of_them_fit_a_screen(results, of, told):
     assert len(shown.splitlines()) <= LINES
 
 
-def test_an_episode_tells_its_first_measures_and_its_tables():
+def test_an_episode_tells_its_first_measures_its_tables_and_what_is_not_by_default():
     episode = dva_sim.episode("drive-to-event", set={"horizon_s": 2})
     shown = repr(episode)
-    assert shown.startswith("Episode of a full scenario, seed 1\nmeasures: confirmed no, ")
-    assert shown.splitlines()[-1].startswith("tables: runs (1), events (1)")
-    assert len(shown) <= CHARACTERS
-
-
-def test_a_configuration_shows_what_is_otherwise_than_by_default():
-    episode = dva_sim.episode("drive-to-event", set={"horizon_s": 2})
-    shown = repr(episode.scenario)
-    assert "horizon_s=2" in shown
-    assert "camera" not in shown
-    assert len(shown) <= CHARACTERS
+    first, measures, *_, tables = shown.splitlines()
+    assert unnamed(first, "Episode", "full", "seed 1") == []
+    assert unnamed(measures, "measures: ", "confirmed no, ") == []
+    assert unnamed(tables, "tables: ", "runs (1)", "events (1)") == []
+    configured = repr(episode.scenario)
+    assert unnamed(configured, "horizon_s=2", "camera") == ["camera"]
+    assert max(len(shown), len(configured)) <= CHARACTERS

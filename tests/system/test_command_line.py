@@ -122,17 +122,13 @@ def test_the_program_itself_ends_a_mistake_with_one_line_and_exit_code_2(tmp_pat
     [
         (["run", "req-rep-vs-pubsub"], "did you mean 'req-rep-vs-pub-sub'?"),
         (["run", "bad.yaml"], "bad.yaml:5:5: unknown key 'parts.drive.refrence'"),
-        (["run", "quicker.yaml", "--set", "link.delay_s=-1"], "at least 0"),
         (["run", "quicker.yaml", "--set", "link.delay_ms=1"], "did you mean 'delay_s'?"),
         (["run", "quicker.yaml", "--set", "link.trace_up=no.up"], "no.up: trace cannot be"),
         (["run", "quicker.yaml", "--set", "link.trace_up=bad.up"], "bad.up:2:1: should be"),
-        (["run", "quicker.yaml", "--set", "site.map=no.yaml"], "'no.yaml' not found"),
-        (["run", "quicker.yaml", "--set", "watchdog"], "should be key=value"),
         (["report", "."], "holds no finished results"),
-        (["episode", "drive-to-event", "--video", "film.avi"], "should end in .gif or .mp4"),
+        (["episode", "drive-to-event", "--video", "film.avi"], ".gif or .mp4"),
         (["episode", "drive-to-event", "--side-by-side", "a,b"], "should name two of"),
         (["episode", "fire"], "scenario 'fire' not found"),
-        (["episode", "drive-to-event", "--set", "events=[{kind: fire, room: Attic}]"], "no room"),
         (["episode", "inside.yaml"], "inside.yaml:2:1: unknown key 'robots'"),
     ],
 )
@@ -163,13 +159,6 @@ def test_an_episode_tells_its_story_and_shows_it(tmp_path):
     assert unnamed(told.stdout, *story) == []
     with Image.open(tmp_path / "both.png") as picture:
         assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 100
-
-
-def test_everything_that_can_be_named_is_listed(tmp_path):
-    listed = call("list", cwd=tmp_path).stdout
-    shipped = ("req-rep-vs-pub-sub", "fire-drill", "caparica", "dissertation", "servrobot")
-    plugins = ("min_eta", "pursuit", "oracle", "median20-copy", "latest-wins")
-    assert unnamed(listed, *shipped, *plugins) == []
 
 
 def test_a_map_and_a_cellular_trace_of_ones_own_carry_a_whole_study(tmp_path):

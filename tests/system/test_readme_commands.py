@@ -15,6 +15,7 @@ import pytest
 import typer
 from helpers.paths import ROOT
 from helpers.studies.small_study import cheap, study_in
+from helpers.wording import unnamed
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -70,7 +71,7 @@ class Seen(NamedTuple):
 
     def time_of(self, what: str) -> float:
         """When a line of the story was told [s]."""
-        (time,) = re.findall(rf"([\d.]+) s  .*{re.escape(what)}", self.text)
+        (time,) = re.findall(rf"([\d.]+) s  .*{what}", self.text)
         return float(time)
 
 
@@ -129,7 +130,8 @@ def a_film(seen: Seen) -> None:
 
 def both_robots_at_the_fire(seen: Seen) -> None:
     """The film: the side that was first waits for the other, and says by how much it was ahead."""
-    assert re.search(r"latest-wins PUB/SUB +confirmed at 127.3 s, 107 s ahead", seen.text)
+    (told,) = re.findall(r"latest-wins PUB/SUB +(confirmed .*)", seen.text)
+    assert told.split(", ") == ["confirmed at 127.3 s", "107 s ahead"]
     with Image.open("one-second-away.gif") as film:
         assert film.width == 840
         film.seek(film.n_frames - 1)  # type: ignore[attr-defined]
@@ -159,11 +161,9 @@ def a_corridor_with_smoke_and_people(seen: Seen) -> None:
 
 
 def a_robot_that_drives_alone(seen: Seen) -> None:
-    assert "is now in mode Mission" in seen.text
-    assert "Teleoperation" not in seen.text
+    said = ("mode Mission", "Teleoperation", "confirmed by robot-2", "given up")
+    assert unnamed(seen.text, *said) == ["Teleoperation", "given up"]
     assert "operator-1  confirmed" in re.sub(r" {2,}", "  ", seen.text)
-    assert "confirmed by robot-2" in seen.text
-    assert "given up" not in seen.text
 
 
 def a_slow_car_that_arrives(seen: Seen) -> None:
@@ -176,9 +176,9 @@ def a_slow_car_that_arrives(seen: Seen) -> None:
 
 def robots_on_their_rounds_and_one_on_its_way(seen: Seen) -> None:
     drawn("night.png")(seen)
-    assert seen.time_of("robot-2     is now in mode Mission") < 215
-    assert seen.time_of("shall send robot-3 to event 2") < 215
-    assert "event 2 (fire) is on scene" not in seen.text  # the run was ended at that moment
+    assert seen.time_of("robot-2 .*mode Mission") < 215
+    assert seen.time_of("robot-3 to event 2") < 215
+    assert "(fire) is on scene" not in seen.text  # the run was ended at that moment
 
 
 def four_things_done(seen: Seen) -> None:
@@ -251,20 +251,24 @@ class Expected:
     """What one should see of a command.
 
     Attributes:
-        look: Looks for the point that the page makes with it; None if it is only parsed.
+        look: Looks for the point that the page makes with it.
         more: Words added, so that it takes less time.
         given: Makes what the command needs.
         dear: Whether it takes more than a few seconds.
     """
 
-    look: Look | None
+    look: Look
     more: tuple[str, ...] = ()
     given: Callable[[], object] = lambda: None
     dear: bool = False
 
 
-NOT_HERE = Expected(None)  # minutes, another machine, or a network of its own: tried elsewhere
-TARGET = Expected(None)  # of make
+# Of make; or of minutes, another machine, or a network of its own: only parsed, tried elsewhere.
+ELSEWHERE = (
+    *("make ", "dva-sim console", "dva-sim replay drill.mcap --console", "dva-sim robot"),
+    *("dva-sim run req-rep-vs-pub-sub --scheduler", "dva-sim validate ", "dva-sim check link"),
+    "dva-sim live drive-to-event",
+)
 MAIN = "REQ/REP or PUB/SUB for driving a robot by tilt"
 
 
@@ -275,24 +279,11 @@ def until(seconds: float) -> tuple[str, str]:
 DRY = ("--dry-run", *until(10))  # planned by a few short runs
 
 EXPECTED = {
-    "make demo": TARGET,
-    "make test": TARGET,
-    "make test-all": TARGET,
-    "make setup": TARGET,
-    "make check": TARGET,
-    "make bench": TARGET,
     "dva-sim episode drive-to-event --seed 2 --set link.delay_s=1 --side-by-side "
     "req-rep,latest-wins --inset --video one-second-away.gif": Expected(
         both_robots_at_the_fire, dear=True
     ),
     # Using it
-    "dva-sim console": NOT_HERE,  # tests/console has what one sees of it
-    "dva-sim console --links real": NOT_HERE,
-    "dva-sim console --phones": NOT_HERE,
-    "dva-sim console -o results/mine": NOT_HERE,
-    "dva-sim console --results results/mine": NOT_HERE,
-    "dva-sim replay drill.mcap --console": NOT_HERE,
-    "dva-sim robot": NOT_HERE,
     "dva-sim list": Expected(
         told("req-rep-vs-pub-sub", "fire-drill", "caparica", "servrobot", "hazard_team")
     ),
@@ -302,7 +293,6 @@ EXPECTED = {
     "dva-sim run req-rep-vs-pub-sub --quick": Expected(
         told(MAIN, "264 runs in 13 configurations", " to go with "), DRY
     ),
-    "dva-sim run req-rep-vs-pub-sub --scheduler tcp://HOST:8786": NOT_HERE,
     "dva-sim run req-rep-vs-pub-sub --set persons=4 --set replications=2 --jobs 2 -o small": (
         Expected(planned(MAIN), DRY, dear=True)
     ),
@@ -337,7 +327,6 @@ EXPECTED = {
     "dva-sim run dispatch-policies": Expected(
         planned("Who should go?"), ("--dry-run", *until(4300)), dear=True
     ),
-    "dva-sim validate dispatch -o evidence": NOT_HERE,
     "dva-sim check policy agents/policies/patrol.py:Patrol": Expected(told("1 policy: 1 valid")),
     "dva-sim episode fire-drill --set dispatch.policy=agents/policies/patrol.py:Patrol": Expected(
         told("fire: confirmed by guard-1"), until(120)
@@ -376,7 +365,6 @@ EXPECTED = {
     "dva-sim episode tasks/fitts-tilt --still trial.png": Expected(
         both(told("100 % done", "bit/s"), drawn("trial.png", 1260)), ("--set", "trials=1")
     ),
-    "dva-sim validate operators -o evidence": NOT_HERE,
     "dva-sim run absolute-vs-differential": Expected(
         planned("Should tilting set the turn rate"), DRY, dear=True
     ),
@@ -387,20 +375,9 @@ EXPECTED = {
     "dva-sim run what-delays-a-command": Expected(planned("What delays a command"), DRY, dear=True),
     "dva-sim episode drive-to-event --set link.loss=0.05 --set link.delay_s=0.1 "
     "--set pattern=req-rep": Expected(told("req-rep, 100 ms each way", "confirmed by robot-1")),
-    "dva-sim validate network --quick": NOT_HERE,
-    "dva-sim validate network --live --quick": NOT_HERE,
     # In real time, over sockets
-    "dva-sim live drive-to-event": NOT_HERE,
     "dva-sim live drive-to-event --operators scripted": Expected(four_things_done, dear=True),
-    "dva-sim live drive-to-event --set pattern=req-rep --record run.mcap": NOT_HERE,
-    "dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600": NOT_HERE,
-    "dva-sim live drive-to-event --only world --dva 192.168.1.10:5600 --host 192.168.1.20": (
-        NOT_HERE
-    ),
-    "dva-sim live drive-to-event --only operator --dva 192.168.1.10:5600 --host 192.168.1.30 "
-    "--number 1": NOT_HERE,
     "dva-sim keys keys drive-to-event": Expected(keys_for_all),
-    "dva-sim live drive-to-event --keys keys": NOT_HERE,
     # Is this file right?
     "dva-sim check message.xml my-study.yaml worlds/*.yaml": Expected(
         told("message.xml: message: valid", "my-study.yaml: study: valid", "6 files: 6 valid"),
@@ -408,7 +385,6 @@ EXPECTED = {
     ),
     "dva-sim check - < message.xml": Expected(told("-: message: valid"), given=a_message),
     "dva-sim schema scenario > scenario.schema.json": Expected(told("horizon_s", "$schema")),
-    "dva-sim check link": NOT_HERE,
 }
 
 
@@ -416,9 +392,9 @@ EXPECTED = {
 
 
 def test_it_is_said_of_every_command_what_one_should_see_and_of_no_other():
-    missing, gone = set(commands()) - set(EXPECTED), set(EXPECTED) - set(commands())
-    assert not missing, f"say in EXPECTED what one should see of {sorted(missing)}"
-    assert not gone, f"no longer on the page: {sorted(gone)}"
+    elsewhere = {command for command in commands() if command.startswith(ELSEWHERE)}
+    assert set(commands()) == {*EXPECTED, *elsewhere - set(EXPECTED)}
+    assert [words for words in ELSEWHERE if not any(c.startswith(words) for c in elsewhere)] == []
 
 
 @pytest.mark.parametrize("command", [c for c in commands() if c.startswith("dva-sim ")])
@@ -439,7 +415,6 @@ def test_every_target_is_one_that_make_knows(target):
 RUNNABLE = [
     pytest.param(command, marks=[pytest.mark.system] if expected.dear else [])
     for command, expected in EXPECTED.items()
-    if expected.look is not None
 ]
 
 
@@ -455,7 +430,6 @@ def test_one_sees_what_the_page_says(command, tmp_path, monkeypatch):
     piped = Path("message.xml").read_bytes() if " < " in command else None
     ended = CliRunner().invoke(app, [*words_of(command), *expected.more], input=piped)
     assert ended.exception is None or isinstance(ended.exception, SystemExit), ended.exception
-    assert expected.look is not None
     expected.look(Seen(ended.output, ended.exit_code))
 
 

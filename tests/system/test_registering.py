@@ -50,7 +50,8 @@ def test_a_study_is_registered_run_and_told_apart_from_what_was_only_tried(tmp_p
         ran = call("run", "mine.yaml", "--pilot", "2", "--jobs", "1", cwd=tmp_path)
     assert ran.returncode == 0
     pilot = status_of(tmp_path / "results" / "mine-pilot")
-    assert (pilot["kind"], pilot["why"][0]) == ("exploratory", "a pilot of 2 persons")  # type: ignore[index]
+    assert pilot["kind"] == "exploratory"
+    assert unnamed(pilot["why"], "pilot", "2 persons") == []
 
     study.write_text(STUDY.replace("direction: above", "direction: below"))
     refused = call("run", "mine.yaml", "--jobs", "1", cwd=tmp_path)

@@ -5,6 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import pymunk
 import pytest
@@ -55,6 +56,13 @@ def say(
     """Let the DVA send a robot something, which its book says, too."""
     enter(run.dva.desk, robot, body)
     run.dva.device.ask(robot, body, then, session=session)
+
+
+def heard(run: Run, topic: str) -> list[Any]:
+    """What a robot publishes there, from now on."""
+    told: list[Any] = []
+    run.network.subscribe(DVA, ROBOT, topic, lambda data: told.append(decode(data).body))
+    return told
 
 
 def place(run: Run, x: float, y: float) -> m.Position:
@@ -136,22 +144,17 @@ def test_bad_bytes_are_answered_and_change_nothing():
 
 def test_a_sensor_is_read_at_the_frequency_asked_for_while_it_is_permitted():
     run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Chemistry lab"}])
-    values: list[m.SensorValue] = []
-
-    def hear(data: bytes) -> None:
-        body = decode(data).body
-        assert isinstance(body, m.SensorValue)
-        values.append(body)
-
-    run.network.subscribe(DVA, ROBOT, sensor_topic("heat_flux", DVA), hear)
+    values = heard(run, sensor_topic("heat_flux", DVA))
     told = send(run, 1.0, m.GetSensorInfo(), session=0)
+    by_id = send(run, 1.2, m.GetSensorInfo(ROBOT), session=0)
     early = send(run, 1.5, m.DevSub("heat_flux", 2.0))
     send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("heat_flux",)))
     late = send(run, 3.0, m.DevSub("heat_flux", 2.0))
     over = send(run, 23.0, m.PermissionRevocation(ROBOT, DVA, 5))
     run.clock.run(40.0)
-    assert isinstance(told[0].content, m.SensorInfo)
-    assert m.Sensor("heat_flux", "kW/m2") in told[0].content.sensors
+    for reply in (*told, *by_id):
+        assert isinstance(reply.content, m.SensorInfo)
+        assert m.Sensor("heat_flux", "kW/m2") in reply.content.sensors
     assert [r.code for r in (*early, *late, *over)] == [m.NOT_PERMITTED, m.OK, m.OK]
     assert len(values) in (39, 40, 41)
     assert {value.unit for value in values} == {"kW/m2"}
@@ -217,24 +220,11 @@ def test_a_published_command_to_another_robot_is_counted_and_not_obeyed():
     assert robot.refused == 0
 
 
-def told_of_mission(run: Run) -> list[m.MissionStatus]:
-    """What a robot publishes of its missions, from now on."""
-    told: list[m.MissionStatus] = []
-
-    def hear(data: bytes) -> None:
-        body = decode(data).body
-        assert isinstance(body, m.MissionStatus)
-        told.append(body)
-
-    run.network.subscribe(DVA, ROBOT, MISSION, hear)
-    return told
-
-
 def test_a_patrol_is_cancelled_and_the_robot_goes_home():
     run = staged()
     robot = run.field.robots[ROBOT]
     base = robot.body.pose()
-    told = told_of_mission(run)
+    told = heard(run, MISSION)
     beat = (place(run, 12.0, 12.0), place(run, 18.0, 12.0))
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     began = send(run, 12.0, m.Patrol(beat, 0))
@@ -264,7 +254,7 @@ def test_a_patrol_is_cancelled_and_the_robot_goes_home():
 
 def test_an_emergency_during_a_patrol_ends_it_and_says_so():
     run = staged()
-    told = told_of_mission(run)
+    told = heard(run, MISSION)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     send(run, 12.0, m.Patrol((place(run, 12.0, 12.0), place(run, 18.0, 12.0)), 0))
     send(run, 40.0, m.Emergency(), session=0)
@@ -282,7 +272,7 @@ def test_a_robot_inspects_an_event_and_waits_before_it():
     run = staged(events=[{"kind": "fire", "at_s": 5, "room": "Workshop"}], access=nobody_drives)
     robot = run.field.robots[ROBOT]
     fire = run.field.incidents[0].hazard.position
-    told = told_of_mission(run)
+    told = heard(run, MISSION)
     send(run, 10.0, m.PermissionGrant(DVA, "missions", 5))
     send(run, 12.0, m.Inspect(3, "fire", place(run, *fire)))
     run.clock.run(110.0)
@@ -295,14 +285,7 @@ def test_a_robot_inspects_an_event_and_waits_before_it():
 def test_a_lidar_is_subscribed_to_and_sees_the_walls_of_its_bay():
     run = staged(**{"robot.sensors": [{"name": "lidar", "noise": 0.0, "rate_hz": 10}]})
     robot = run.field.robots[ROBOT]
-    scans: list[m.SensorValue] = []
-
-    def hear(data: bytes) -> None:
-        body = decode(data).body
-        assert isinstance(body, m.SensorValue)
-        scans.append(body)
-
-    run.network.subscribe(DVA, ROBOT, sensor_topic("lidar", DVA), hear)
+    scans = heard(run, sensor_topic("lidar", DVA))
     send(run, 2.0, m.PermissionGrant(DVA, "sensors", 5, None, ("lidar",)))
     too_often = send(run, 3.0, m.DevSub("lidar", 20.0))
     told = send(run, 4.0, m.DevSub("lidar", 5.0))
@@ -524,10 +507,3 @@ def test_more_than_a_few_waiting_messages_of_a_connection_are_answered_busy():
         counted["refused unread: of a peer that sends no messages"],
     )
     assert busy + unread + codes[m.OK] == 200
-
-
-def test_a_robot_says_which_sensors_it_has_itself_when_it_is_asked_by_its_id():
-    run = staged()
-    told = send(run, 1.0, m.GetSensorInfo(ROBOT), session=0)
-    run.clock.run(2.0)
-    assert isinstance(told[0].content, m.SensorInfo)
