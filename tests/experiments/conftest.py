@@ -7,6 +7,7 @@ import pytest
 from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.results.results import Results
 
 
 @pytest.fixture(scope="session")
@@ -14,6 +15,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A results folder to read, made in one process without interruption."""
     folder = tmp_path_factory.mktemp("small")
     return run_study(kit.study_in(folder), folder / "out", jobs=1, episode=kit.cheap)
+
+
+@pytest.fixture(scope="session")
+def results(finished: Path) -> Results:
+    """What Python sees of it."""
+    return Results.load(finished)
 
 
 @pytest.fixture(scope="session")

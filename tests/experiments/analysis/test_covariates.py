@@ -11,7 +11,6 @@ from helpers.studies.small_study import STUDY, study_in
 from dva_sim.experiments.analysis.study_view import covariates_of, finding_of, view_of
 from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study import cell_grid, stopping
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.parts import multiplied
@@ -60,7 +59,7 @@ def test_a_covariate_whose_mean_cannot_be_zero_is_left_out_and_told(tmp_path):
 def reading(tmp_path: Path, table: list[dict[str, Any]]) -> Reading:
     whole = synthetic_results.manifest(30, 1)
     whole["study"] = study("caution_off")
-    return Reading(Results.load(synthetic_results.write(tmp_path / "r", {"runs": table}, whole)))
+    return synthetic_results.reading(tmp_path / "r", table, whole)
 
 
 def remark(found: Reading) -> str:

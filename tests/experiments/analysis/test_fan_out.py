@@ -9,6 +9,7 @@ import pytest
 from dva_sim.experiments.analysis.fan_out import Need, need_of, settled_per_person
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.validation.dispatch import exact
 
 
 def test_one_robot_alone_is_served_at_once_by_either_theory():
@@ -33,16 +34,9 @@ def test_with_very_many_robots_the_operator_is_never_idle():
     assert Need(50.0, 10.0).rate_with_waiting(100) == pytest.approx(0.1)
 
 
-def test_a_queue_with_a_finite_source_is_as_when_it_is_played():
-    """Six robots, exponential times, one operator: 20,000 s played event by event."""
-    need, rng, robots = Need(30.0, 10.0), np.random.default_rng(5), 6
-    ready, free, served, now = rng.exponential(30.0, robots), 0.0, 0, 0.0
-    while now < 200_000.0:
-        number = int(ready.argmin())
-        now = free = max(free, ready[number]) + rng.exponential(10.0)
-        ready[number] = now + rng.exponential(30.0)
-        served += 1
-    assert need.rate_with_waiting(robots) == pytest.approx(served / now, rel=0.02)
+def test_a_queue_with_a_finite_source_is_that_of_queueing_theory():
+    rate = exact.finite_source(6, 1, 30.0, 10.0)["utilisation"] / 10.0
+    assert Need(30.0, 10.0).rate_with_waiting(6) == pytest.approx(rate)
 
 
 class Kept(Results):

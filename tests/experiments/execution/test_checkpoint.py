@@ -47,7 +47,7 @@ def test_a_success_takes_the_place_of_a_failure_but_not_the_reverse(tmp_path):
 
 def test_a_journal_of_another_study_is_refused(tmp_path):
     Checkpoint(tmp_path, "mine").__exit__(None, None, None)
-    with pytest.raises(ConfigError, match=r"another study \(mine, not yours\)"):
+    with pytest.raises(ConfigError, match="mine, not yours"):
         Checkpoint(tmp_path, "yours")
 
 

@@ -32,10 +32,9 @@ def dask(tmp_path: Path) -> Iterator[DaskCluster]:
         yield started
 
 
-def test_a_worker_killed_half_way_loses_and_doubles_nothing(tmp_path, dask, monkeypatch):
+def test_a_worker_killed_half_way_loses_and_doubles_nothing(tmp_path, plain, dask, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study = kit.study_in(tmp_path)
-    plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
     for _ in range(2):
         dask.add_worker()
 
@@ -56,11 +55,10 @@ def test_a_worker_killed_half_way_loses_and_doubles_nothing(tmp_path, dask, monk
 
 
 def test_a_scheduler_killed_half_way_ends_in_one_line_and_another_goes_on(
-    tmp_path, dask, monkeypatch, capfd
+    tmp_path, plain, dask, monkeypatch, capfd
 ):
     monkeypatch.chdir(tmp_path)
     study = kit.study_in(tmp_path)
-    plain = kit.files(run_study(study, tmp_path / "plain", jobs=1, episode=kit.cheap))
     dask.add_worker()
     seen: list[int] = []
 
@@ -86,11 +84,11 @@ def test_a_cluster_nobody_works_or_answers_in_is_told(dask, monkeypatch):
     with dask_cluster.DaskCluster(dask.address) as place:
         place.look_after(is_idle=True)
         monkeypatch.setattr(dask_cluster, "_WORKERS_S", 0.0)
-        with pytest.raises(WorkersLost, match=r"no workers .* 0 s: .* 'dask w"):
+        with pytest.raises(WorkersLost, match=r"no workers .*'dask w"):
             place.look_after(is_idle=True)
         monkeypatch.setattr(dask_cluster, "_CONNECT_S", 0.2)
         dask.scheduler.send_signal(signal.SIGSTOP)
-        with pytest.raises(WorkersLost, match=r"not answered for 0 s"):
+        with pytest.raises(WorkersLost, match="not answered"):
             place.look_after(is_idle=True)
         place.look_after(is_idle=False)  # something has come meanwhile
         dask.scheduler.send_signal(signal.SIGCONT)
@@ -101,7 +99,7 @@ def test_a_worker_with_another_profile_near_it_is_refused(tmp_path, dask):
     phones.mkdir(parents=True)
     (phones / "default.yaml").write_text("filter: none\n")
     dask.add_worker(cwd=tmp_path / "elsewhere")
-    with pytest.raises(DvaSimError, match=r"tcp://.* fingerprint \w+ \(here \w+\)"):
+    with pytest.raises(DvaSimError, match=r"tcp://.* fingerprint \w+ "):
         run_study(
             kit.study_in(tmp_path), tmp_path / "out", scheduler=dask.address, episode=kit.cheap
         )

@@ -1,5 +1,6 @@
 """How runs are handed out."""
 
+import gc
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future
@@ -10,7 +11,7 @@ from typing import Any
 from helpers.studies import small_study as kit
 
 from dva_sim.experiments.execution import scheduling
-from dva_sim.experiments.execution.executors import Workers
+from dva_sim.experiments.execution.executors import LocalProcesses, Workers
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import StudyJob
 
@@ -85,3 +86,10 @@ def test_a_seed_whose_runs_take_long_is_parted(tmp_path, monkeypatch):
     monkeypatch.setattr(scheduling, "_SEED_S", 0.0125)
     monkeypatch.setattr(scheduling, "_CHUNK_S", 0.005)
     assert max(map(len, handed_out(tmp_path, persons=2, episode=kit.busy))) <= 2
+
+
+def test_workers_look_for_garbage_rarely_and_this_process_as_before():
+    before = gc.get_threshold()
+    with LocalProcesses(1).executor(1, len) as pool:
+        assert pool.submit(gc.get_threshold).result()[0] == 20_000
+    assert gc.get_threshold() == before

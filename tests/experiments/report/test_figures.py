@@ -8,7 +8,6 @@ from helpers.studies.report_text import blank_pictures
 from helpers.wording import unnamed
 from matplotlib.figure import Figure
 
-from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.predictions import Cadence
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
@@ -39,6 +38,13 @@ PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
 PROFILE = Factor("profile", ("default", "dissertation"))
 blank = blank_pictures()  # for figures that are asked for their numbers, words and axes
 NOTHING_ELSE = SimpleNamespace(scenario_of=lambda part: {"command": "unknown"})
+
+
+def with_columns(view, **columns):
+    """The same runs, but for some columns, and none of them a reference."""
+    plain = {"is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    part = RunGrid(view.part.treated | plain | columns, "drive", view.part.factors)
+    return replace(view, part=part)
 
 
 @pytest.fixture(scope="module")
@@ -80,10 +86,8 @@ def test_a_boundary_outside_the_levels_has_no_place(delay):
 
 @blank
 def test_a_panel_where_no_run_went_on_takes_nothing_from_the_others(view):
-    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
-    rate = np.where(runs["profile"] == "default", 8.0, np.nan)
-    part = RunGrid(runs | {"command_rate_hz": rate}, "drive", view.part.factors)
-    both = StudyView(part, "drive_time_s", PATTERN, DELAY, None, {})
+    rate = np.where(view.part.treated["profile"] == "default", 8.0, np.nan)
+    both = with_columns(replace(view, within={}), command_rate_hz=rate)
     assert [panel["profile"] for panel in both.shown] == ["default", "dissertation"]
     with styled():
         assert CommandRate().draw(both, NOTHING_ELSE) is not None
@@ -199,14 +203,11 @@ def test_nobody_who_never_came_has_a_panel_and_one_fate_needs_no_picture(view):
 
 @blank
 def test_bars_of_a_lower_panel_are_not_cut_by_the_first(view):
-    columns = ("delay_uplink_s", "delay_downlink_s")
-    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    runs, columns = view.part.treated, ("delay_uplink_s", "delay_downlink_s")
     longer = np.where(runs["profile"] == "dissertation", 3.0, 1.0)
-    part = RunGrid(
-        runs | {name: runs[name] * longer for name in columns}, "drive", view.part.factors
-    )
+    longer_there = with_columns(view, **{name: runs[name] * longer for name in columns})
     with styled():
-        drawn = DelayBudget().draw(replace(view, part=part), NOTHING_ELSE)
+        drawn = DelayBudget().draw(longer_there, NOTHING_ELSE)
     longest = max(ax.get_xlim()[1] for ax in drawn.figure.axes)
     rows = [row.split(",") for row in drawn.csv.decode().splitlines()]
     stages = [i for i, name in enumerate(rows[0]) if name.startswith("delay_")]
@@ -234,22 +235,20 @@ def two_factor_view(effect):
 
 
 @blank
-def test_the_heat_map_draws_the_line_where_the_effect_turns_round():
+@pytest.mark.parametrize(
+    ("effect", "told"),
+    [
+        (lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait, "Thick line"),
+        (lambda ratio, wait: 30.0 + wait, "zero nowhere"),
+    ],
+)
+def test_the_heat_map_draws_the_line_where_the_effect_turns_round_if_it_does(effect, told):
     with styled():
-        drawn = HeatMap().draw(
-            two_factor_view(lambda ratio, wait: 10 * np.log2(ratio) - 0.5 * wait), NOTHING_ELSE
-        )
-    assert "Thick line" in drawn.caption
+        drawn = HeatMap().draw(two_factor_view(effect), NOTHING_ELSE)
+    assert told in drawn.caption
     rows = drawn.csv.decode().splitlines()
     assert rows[0] == "wait_s,ratio,mean_s,band_low_s,band_high_s"
     assert len(rows) == 1 + 12
-
-
-@blank
-def test_a_heat_map_without_a_change_of_sign_has_no_line():
-    with styled():
-        drawn = HeatMap().draw(two_factor_view(lambda ratio, wait: 30.0 + wait), NOTHING_ELSE)
-    assert "zero nowhere" in drawn.caption
 
 
 def test_a_second_factor_of_two_levels_needs_no_heat_map(view):
@@ -319,12 +318,11 @@ def overlapping(figure, texts):
 
 @blank
 def test_who_does_not_drive_has_no_delay_budget(view):
-    runs = {**view.part.treated, "is_reference": np.zeros(len(view.part.treated["part"]), bool)}
+    runs = view.part.treated
     guards = runs["pattern"] == "pub-sub"
     stages = {k: np.where(guards, np.nan, v) for k, v in runs.items() if k.startswith("delay_")}
-    part = RunGrid(runs | stages, "drive", view.part.factors)
     with styled():
-        figure = DelayBudget().draw(replace(view, part=part), NOTHING_ELSE).figure
+        figure = DelayBudget().draw(with_columns(view, **stages), NOTHING_ELSE).figure
     titles = [ax.get_title("left").rpartition(", ")[2] for ax in figure.axes]
     assert titles == ["REQ/REP", "latest-wins"] * 2
 
@@ -369,24 +367,11 @@ def test_eleven_points_are_too_few_for_a_trend():
 # --- the figure that answers -------------------------------------------------------------------
 
 
-def answered(over="link.delay_s", levels=(0.0, 0.5, 1.0), means=(0.0, 5.0, 9.0), **changes):
-    """A finding of 8 persons, with a band of 2 s on either side."""
-    mean = np.array(means)
-    found = Finding(
-        measure="drive_time_s",
-        in_excess=False,
-        factor="pattern",
-        first="req-rep",
-        second="latest-wins",
-        over=over,
-        levels=levels,
-        within={},
-        mean=mean,
-        low=mean - 2.0,
-        high=mean + 2.0,
-        persons=8,
-    )
-    return replace(found, **changes)
+ANSWER = {"levels": (0.0, 0.5, 1.0), "within": {}, "in_excess": False, "persons": 8}
+
+
+def answered(means=(0.0, 5.0, 9.0), **changes):
+    return synthetic_results.finding(means, 2.0, **(ANSWER | {"smallest_effect": None} | changes))
 
 
 def drawn_answer(found):
@@ -408,7 +393,7 @@ def test_the_figure_that_answers_shows_the_band_and_fills_what_differs_from_zero
 
 @blank
 def test_a_contrast_that_runs_over_nothing_has_one_mark():
-    drawn = drawn_answer(answered("", (None,), (3.0,)))
+    drawn = drawn_answer(answered((3.0,), over="", levels=(None,)))
     assert [text.get_text() for text in drawn.figure.axes[0].texts] == ["+3.0"]
     assert "band" not in drawn.caption
 

@@ -122,5 +122,5 @@ def test_a_study_that_names_a_figure_that_there_is_none_of_fails_before_it_runs(
 def test_the_worked_example_is_drawn_of_a_study(results):
     assert RISK.is_file()
     text = words_of(results, figures=load_figures(["risk.py:Risk"]))
-    assert "How often it took longer" in text
+    assert "How often" in text
     shutil.rmtree(results / "figures")

@@ -3,8 +3,6 @@ from helpers.studies import synthetic_results
 from helpers.wording import unnamed
 
 from dva_sim.experiments.report.method import remarks
-from dva_sim.experiments.report.summary import Reading
-from dva_sim.experiments.results.results import Results
 
 PERSONS = 4
 
@@ -14,7 +12,7 @@ def reading(tmp_path, study=None, **facts):
     whole = synthetic_results.manifest(6, 2, **facts)
     whole["study"] |= study or {}
     rows = [r for r in synthetic_results.drive_rows(PERSONS, 2) if r["profile"] != "dissertation"]
-    return Reading(Results.load(synthetic_results.write(tmp_path / "r", {"runs": rows}, whole)))
+    return synthetic_results.reading(tmp_path / "r", rows, whole)
 
 
 def test_the_persons_are_those_that_were_run(tmp_path):
@@ -22,44 +20,36 @@ def test_the_persons_are_those_that_were_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "why", "words"),
+    ("key", "why", "names"),
     [
-        ("stop", "enough", "4 (stopped after 2 of 6 batches: every interval"),
-        ("budget_s", "budget", "4 (stopped after 2 of 6 batches: the time"),
-        ("stop", None, "4 (all 6 batches"),
+        ("stop", "enough", ["4 (", "2 of 6 batches", "interval"]),
+        ("budget_s", "budget", ["4 (", "2 of 6 batches", "time"]),
+        ("stop", None, ["4 (", "all 6 batches"]),
     ],
 )
-def test_what_decided_the_number_of_persons_is_told(tmp_path, key, why, words):
+def test_what_decided_the_number_of_persons_is_told(tmp_path, key, why, names):
     stopped = {"rounds": 2, "of": 6, "why": why}
     told = remarks(reading(tmp_path, {key: {"half_width": 1.0}}, stopped=stopped))[0]
-    assert f"Simulated persons: {words}" in told
+    assert unnamed(told, *names) == []
 
 
 def test_parts_with_trials_of_their_own_are_told_apart(tmp_path):
     parts = {"drive": {"replications": 5}, "story": {"replications": None}}
     told = remarks(reading(tmp_path, {"parts": parts}))[0]
-    assert "5 in drive, 2 in story" in told
+    assert unnamed(told, "5 in drive", "2 in story") == []
 
 
 @pytest.mark.parametrize(
-    ("versions", "words"),
+    ("versions", "names"),
     [
-        (
-            {"dva-sim": "0.7.0", "fingerprint": "ab12", "commit": "0123456789abcdef"},
-            "Made with dva-sim 0.7.0, simulating code ab12, commit 0123456789ab.",
-        ),
-        (
-            {"dva-sim": "0.7.0", "commit": "0123456789abcdef", "dirty": True},
-            "Made with dva-sim 0.7.0, commit 0123456789ab with changes that are not committed.",
-        ),
-        (
-            {"dva-sim": "0.7.0", "commit": None, "dirty": None},
-            "Made with dva-sim 0.7.0; its commit is not known: it did not run from a checkout.",
-        ),
+        ({"fingerprint": "ab12", "commit": "0123456789abcdef"}, ["ab12", "commit 0123456789ab."]),
+        ({"commit": "0123456789abcdef", "dirty": True}, ["0123456789ab ", "not committed"]),
+        ({"commit": None, "dirty": None}, ["commit is not known"]),
     ],
 )
-def test_the_program_is_told_and_what_is_not_known_of_it(tmp_path, versions, words):
-    assert remarks(reading(tmp_path, versions=versions))[-1] == words
+def test_the_program_is_told_and_what_is_not_known_of_it(tmp_path, versions, names):
+    told = remarks(reading(tmp_path, versions={"dva-sim": "0.7.0"} | versions))[-1]
+    assert unnamed(told, "dva-sim 0.7.0", *names) == []
 
 
 def test_tests_are_told_where_there_are_any(tmp_path):

@@ -76,20 +76,18 @@ def test_earlier_registrations_are_told(runs):
 
 
 @pytest.mark.parametrize(
-    ("design", "words"),
+    ("design", "names"),
     [
-        (
-            {"saltelli": 64, "ranges": {"link.jitter_s": {"low": 0, "high": 1}}},
-            "64 points of Saltelli's sample, with what lies between them over jitter; "
-            "messaging pattern (2 levels)",
-        ),
-        ({"zip": ["pattern"]}, "one after another: messaging pattern (2 levels)"),
-        ({"csv": "rows.csv", "rows": "0a1b"}, "rows of a list: messaging pattern (2 levels)"),
+        ({"saltelli": 64, "ranges": {"link.jitter_s": {"low": 0, "high": 1}}}, ["64", "Saltelli"]),
+        ({"zip": ["pattern"]}, ["one after another"]),
+        ({"csv": "rows.csv", "rows": "0a1b"}, ["rows of a list"]),
     ],
 )
-def test_the_design_is_told_in_words(runs, design, words):
+def test_the_design_is_told_in_words(runs, design, names):
     plan = PLAN | {"factors": {"pattern": PATTERNS}, "design": design}
-    assert rows_of(runs, plan=plan)["design"][0] == words
+    told = rows_of(runs, plan=plan)["design"][0]
+    assert unnamed(told, *names, "messaging pattern (2 levels)") == []
+    assert ("jitter" in told) == ("ranges" in design)
 
 
 def test_without_any_run_no_hypothesis_came_out():

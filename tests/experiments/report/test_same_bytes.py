@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from helpers.processes.patience import PATIENCE_S
 from helpers.studies import synthetic_results
-from helpers.studies.small_study import SHIFT
 
 import dva_sim
 from dva_sim.kernel.measure import names_of
-from dva_sim.simulation.shift import build, measures, simulate_timed
 from dva_sim.simulation.transport.measures import RUN_COLUMNS
 
 pytestmark = pytest.mark.soak
@@ -80,21 +78,7 @@ def points(folder):
 
 def shifts(folder):
     """Three policies at two loads, two shifts of an hour each."""
-    tables = {"runs": [], "events": []}
-    policies, rates = ["random", "nearest_idle", "min_eta"], [1, 3]
-    for policy, rate, shift in itertools.product(policies, rates, range(2)):
-        changes = {"dispatch.policy": policy, "intensity": rate}
-        made = measures.tables(simulate_timed(build(SHIFT, changes), shift))
-        design = {"part": "shift", "person": shift, "trial": 0, "seed": shift, "cell": 0}
-        for name, rows in tables.items():
-            rows += [design | changes | {"is_reference": False} | row for row in made[name]]
-    study = {"question": "Who should go?", "persons": 2, "replications": 1}
-    study["factors"] = {"dispatch.policy": policies, "intensity": rates}
-    study["answer"] = {"part": "shift", "measure": "response_mean_s", "factor": "dispatch.policy"}
-    study["answer"] |= {"contrast": ["random", "min_eta"], "over": "intensity"}
-    scenario = build(SHIFT).model_dump(mode="json")
-    facts = {"study": study, "scenarios": {"shift": scenario}, "set": []}
-    return synthetic_results.write(folder, tables, facts)
+    return synthetic_results.write_shifts(folder, 2)
 
 
 def contest(folder):

@@ -1,58 +1,27 @@
-import itertools
 import re
 
 import numpy as np
 import pytest
 from helpers.studies import synthetic_results
 from helpers.studies.report_text import blank_pictures, words
-from helpers.studies.small_study import SHIFT
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.shift_effects import pooled
 from dva_sim.experiments.report.report import write_report
-from dva_sim.simulation.shift import build, measures, simulate_timed
 
 pytestmark = pytest.mark.system
-
-POLICIES = ["random", "nearest_idle", "min_eta"]
-RATES = [1, 3]
-FACTS = {
-    "study": {
-        "question": "Who should go?",
-        "persons": 3,
-        "replications": 1,
-        "factors": {"dispatch.policy": POLICIES, "intensity": RATES},
-        "answer": {
-            "part": "shift",
-            "measure": "response_mean_s",
-            "factor": "dispatch.policy",
-            "contrast": ["random", "min_eta"],
-            "over": "intensity",
-            "smallest_effect_s": 5.0,
-        },
-    },
-    "scenarios": {"shift": build(SHIFT).model_dump(mode="json")},
-    "set": [],
-}
 
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
-    tables = {"runs": [], "events": []}
-    for policy, rate, shift in itertools.product(POLICIES, RATES, range(3)):
-        changes = {"dispatch.policy": policy, "intensity": rate}
-        made = measures.tables(simulate_timed(build(SHIFT, changes), shift))
-        design = {"part": "shift", "person": shift, "trial": 0, "seed": shift}
-        for name, rows in tables.items():
-            rows += [design | changes | {"is_reference": False} | row for row in made[name]]
     folder = tmp_path_factory.mktemp("study") / "results"
     with blank_pictures():
-        return write_report(synthetic_results.write(folder, tables, FACTS))
+        return write_report(synthetic_results.write_shifts(folder, 3))
 
 
 def test_the_answer_names_both_sides_of_the_trade(report):
     text = words(report)
-    assert re.search(r"at a load of 0\.\d+|at any load tried", text)
+    assert re.search(r"load of 0\.\d+|any load tried", text)
     assert unnamed(text, "people stand in danger", "Shifts: 3 simulated") == []
     assert "simulated person" not in text
 

@@ -54,7 +54,7 @@ def test_a_policy_that_always_fails_is_compared_with_nothing(study, tmp_path):
     with blank_pictures():
         ran = call("run", study, "-o", out, "--jobs", "1")
     assert ran.returncode == ExitCode.RUNS_FAILED
-    assert "part shift a class of yours" in ran.stderr
+    assert "part shift" in ran.stderr
     reading = Reading(Results.load(out))
     assert reading.finding is None
     assert reading.answer.lead.startswith("The answer is withheld")

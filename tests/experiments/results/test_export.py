@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from dva_sim.experiments.results.export import export
-from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError
-
-
-@pytest.fixture(scope="module")
-def results(finished):
-    return Results.load(finished)
 
 
 def rows_of(path):
@@ -72,12 +66,12 @@ def test_one_file_in_the_way_leaves_all_unwritten(results, tmp_path):
 @pytest.mark.parametrize(
     ("name", "tables", "form", "problem"),
     [
-        ("all", ["flights"], None, "no table 'flights'; tables: runs, tracks"),
-        ("all", [], "xls", "--format 'xls' should be csv or parquet"),
-        ("one.csv", ["runs", "tracks"], None, "give a folder for several"),
-        ("one.csv", [], "parquet", "is one csv file"),
-        ("x.xlsx", [], None, r"x\.xlsx should end in \.csv or \.parquet; a folder for all"),
-        ("x.json", ["runs"], "csv", r"x\.json should end in \.csv or \.parquet"),
+        ("all", ["flights"], None, "'flights'; tables: runs, tracks"),
+        ("all", [], "xls", "--format 'xls' .*csv or parquet"),
+        ("one.csv", ["runs", "tracks"], None, "give a folder"),
+        ("one.csv", [], "parquet", "one csv file"),
+        ("x.xlsx", [], None, r"x\.xlsx .*\.csv or \.parquet; a folder"),
+        ("x.json", ["runs"], "csv", r"x\.json .*\.csv or \.parquet"),
     ],
 )
 def test_a_mistake_is_told_with_what_would_be_right(results, tmp_path, name, tables, form, problem):

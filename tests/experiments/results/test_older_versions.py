@@ -38,17 +38,19 @@ def test_older_results_are_loaded(older):
     assert "No difference" in results.answer.lead
 
 
-def test_older_results_are_shown(older):
-    done = call("show", older)
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("show .", "dva-sim 0.7.0"),
+        ("show .", "No difference"),
+        ("show . --columns", "somebody is on scene"),
+        ("replay recordings/drive-0-0-0.mcap", "dva-sim 0.7.0"),
+    ],
+)
+def test_older_results_and_recordings_are_shown(older, command, told):
+    done = call(*command.split(), cwd=older)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "dva-sim 0.7.0" in done.stdout
-    assert dva_sim.load(older).answer.lead.split(".")[0] in done.stdout
-
-
-def test_the_columns_of_older_results_are_explained(older):
-    done = call("show", older, "--columns")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "somebody is on scene" in done.stdout
+    assert told in done.stdout
 
 
 @pytest.mark.system  # draws
@@ -72,7 +74,7 @@ def test_older_results_are_exported(older, tmp_path):
 def test_an_older_unfinished_study_is_shown_as_far_as_it_is(unfinished):
     done = call("show", unfinished)
     assert done.returncode == 0
-    assert "Partial: 4 of 4 runs" in done.stdout
+    assert unnamed(done.stdout, "Partial:", "4 of 4") == []
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -88,9 +90,3 @@ def test_an_older_study_is_not_gone_on_with_by_another_program(older, finished):
 def test_an_older_recording_is_played(older):
     played = dva_sim.replay(older / "recordings" / "drive-0-0-0.mcap")
     assert played.measures["drive_time_s"] == pytest.approx(CONFIRMED_S["req-rep"][0])
-
-
-def test_an_older_recording_is_told(older):
-    done = call("replay", older / "recordings" / "drive-0-0-0.mcap")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "simulated by dva-sim 0.7.0" in done.stdout

@@ -14,11 +14,6 @@ from dva_sim.experiments.results.results import Frame, Results
 from dva_sim.kernel.errors import ConfigError
 
 
-@pytest.fixture(scope="module")
-def results(finished):
-    return Results.load(finished)
-
-
 def test_runs_come_as_columns_of_the_same_length(results):
     assert results.runs.rows == 42
     assert set(results.runs["part"]) == {"drive", "story"}
@@ -95,6 +90,8 @@ def test_a_study_that_is_not_finished_is_told_as_such(tmp_path):
 def test_a_folder_of_something_else_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="holds no finished results"):
         Results.load(tmp_path)
+    with pytest.raises(ConfigError, match="is not a folder"):
+        Results.load(tmp_path / "nowhere")
     (tmp_path / "manifest.json").write_text(json.dumps({"name": "a web page"}))
     with pytest.raises(ConfigError, match="not the manifest"):
         Results.load(tmp_path)

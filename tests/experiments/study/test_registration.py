@@ -1,6 +1,6 @@
 """Registered studies: new luck, nothing changed unseen, and every liberty named."""
 
-import json
+import re
 from pathlib import Path
 
 import pytest
@@ -130,7 +130,7 @@ def test_a_pilot_is_exploratory_and_sees_nothing_of_the_study_or_its_confirmatio
     path = registered(tmp_path)
     pilot = load_study(path, pilot=2)
     assert pilot.status.kind == "exploratory"
-    assert pilot.status.why[0] == "a pilot of 2 persons"
+    assert unnamed(pilot.status.why[0], "pilot", "2 persons") == []
     seeds = {job.seed for job in cell_grid.jobs(pilot)}
     assert seeds.isdisjoint(job.seed for job in cell_grid.jobs(load_study(path)))
     beside(path).unlink()
@@ -143,8 +143,8 @@ STOPPING = "stop: {comparison: answer, half_width: 1, batch_persons: 1, most_per
 @pytest.mark.parametrize(
     ("more", "reason", "reproducible"),
     [
-        (STOPPING, "how many persons are simulated depends on the results", True),
-        ("budget_s: 60\n", "how many persons are simulated depends on the clock, 60 s", False),
+        (STOPPING, "depends on the results", True),
+        ("budget_s: 60\n", "depends on the clock, 60 s", False),
     ],
 )
 def test_a_size_left_open_is_exploratory_and_cannot_be_registered(
@@ -152,37 +152,31 @@ def test_a_size_left_open_is_exploratory_and_cannot_be_registered(
 ):
     study = study_in(tmp_path, text=CLAIMED + more)
     assert study.status.kind == "exploratory"
-    assert study.status.why == (reason,)
+    assert [reason in why for why in study.status.why] == [True]
     assert study.status.reproducible is reproducible
-    with pytest.raises(ConfigError, match=r"study.yaml:24:1: .* leave '.*' out"):
+    with pytest.raises(ConfigError, match=r"study.yaml:24:1: .* leave '"):
         register(study)
 
 
-def test_an_edited_registration_is_found(tmp_path):
+@pytest.mark.parametrize(
+    ("old", "new", "kind", "names"),
+    [
+        ('"margin": 1.0', '"margin": 0.0', "exploratory", ["edited", "hash"]),
+        (r'hash: "\w+"', f'hash: "{"0" * 64}"', "exploratory", []),
+        ('study: "study"', 'study: "lucky"', "confirmatory", []),
+    ],
+)
+def test_an_edited_registration_is_found_and_a_name_of_ones_own_buys_no_other_seed(
+    tmp_path, old, new, kind, names
+):
     path = registered(tmp_path)
-    file = beside(path)
-    file.write_text(file.read_text().replace('"margin": 1.0', '"margin": 0.0'))
-    path.write_text(CLAIMED.replace("margin: 1.0", "margin: 0.0"))
-    status = load_study(path).status
-    assert status.kind == "exploratory"
-    assert unnamed(status.why, "edited", "hash") == []
-
-
-def test_a_registration_with_a_hash_of_ones_own_choice_is_found(tmp_path):
-    path = registered(tmp_path)
-    file = beside(path)
-    found = load_registration(load_yaml(file)).hash
-    file.write_text(file.read_text().replace(found, "0" * 64))
-    assert load_study(path).status.kind == "exploratory"
-
-
-def test_a_name_of_ones_own_choice_buys_no_other_seed(tmp_path):
-    path = registered(tmp_path)
-    file = beside(path)
-    before = load_study(path).seed
-    file.write_text(file.read_text().replace('study: "study"', 'study: "lucky"'))
-    assert load_study(path).status.kind == "confirmatory"
-    assert load_study(path).seed == before
+    before, text = load_study(path).seed, beside(path).read_text()
+    assert re.search(old, text)
+    beside(path).write_text(re.sub(old, new, text))
+    path.write_text(CLAIMED.replace("margin: 1.0", "margin: 0.0") if names else CLAIMED)
+    study = load_study(path)
+    assert (study.status.kind, unnamed(study.status.why, *names)) == (kind, [])
+    assert study.seed == (before if kind == "confirmatory" else 3)
 
 
 def test_what_was_registered_is_not_confirmed_by_fewer_runs(tmp_path):
@@ -190,7 +184,7 @@ def test_what_was_registered_is_not_confirmed_by_fewer_runs(tmp_path):
     broken = {"status": status, "failures": [{"error": "ValueError: no"}]}
     found = status_of(broken)
     assert (found.kind, found.reproducible) == ("exploratory", True)
-    assert found.why[0].startswith("1 of the registered runs")
+    assert unnamed(found.why[0], "1 of", "registered runs") == []
     assert status_of(broken | {"failures": []}).kind == "confirmatory"
 
 
@@ -205,9 +199,7 @@ def test_another_program_is_told_and_changes_nothing_else(tmp_path, monkeypatch)
     monkeypatch.setattr(registration, "fingerprint", lambda: "another")
     status = load_study(path).status
     assert status.kind == "confirmatory"
-    (remark,) = status.why
-    assert remark.startswith("the program is another")
-    assert remark.endswith("another)")
+    assert unnamed(*status.why, "program", "another)") == []
 
 
 def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypatch):
@@ -219,9 +211,7 @@ def test_other_code_that_judges_is_told_whenever_verdicts_are(tmp_path, monkeypa
     )
     told = status_of(manifest)
     assert told.kind == "confirmatory"
-    (remark,) = told.why
-    assert remark.startswith("what judges its hypotheses")
-    assert remark.endswith("now another)")
+    assert unnamed(*told.why, "judges", "now another)") == []
 
 
 def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):
@@ -240,11 +230,12 @@ def test_registering_anew_has_to_be_meant_and_is_told(tmp_path):
 
 
 def test_the_same_study_makes_the_same_registration(tmp_path):
-    bytes_ = []
+    made = set()
     for name in ("here", "there"):
         (tmp_path / name).mkdir()
-        bytes_.append(beside(registered(tmp_path / name, REPEATED + CLAIMED[len(STUDY) :])))
-    assert bytes_[0].read_bytes() == bytes_[1].read_bytes()
+        path = registered(tmp_path / name, REPEATED + CLAIMED[len(STUDY) :])
+        made.add(beside(path).read_bytes())
+    assert len(made) == 1
 
 
 def test_nothing_is_registered_without_a_hypothesis(tmp_path):
@@ -261,9 +252,8 @@ def test_the_larger_version_is_registered_on_its_own(tmp_path):
     assert unnamed(status.why, "6 persons", "not 3") == []
 
 
-@pytest.mark.parametrize("design_", ["{latin_hypercube: 4, ranges: {link.loss: [0, 0.1]}}"])
-def test_points_of_a_registered_design_follow_from_the_registration(tmp_path, design_):
-    text = CLAIMED + f"design: {design_}\n"
+def test_points_of_a_registered_design_follow_from_the_registration(tmp_path):
+    text = CLAIMED + "design: {latin_hypercube: 4, ranges: {link.loss: [0, 0.1]}}\n"
     before = [dict(cell.levels) for cell in cell_grid.cells(study_in(tmp_path, text=text))]
     study = load_study(registered(tmp_path, text))
     assert study.status.kind == "confirmatory"
@@ -301,8 +291,3 @@ def test_a_registration_is_no_study_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "study" in resources.available("experiments")
     assert "study.registration" not in resources.available("experiments")
-
-
-def test_the_status_can_stand_in_a_manifest(tmp_path):
-    status = load_study(registered(tmp_path)).status.model_dump(mode="json")
-    assert json.loads(json.dumps(status)) == status

@@ -6,10 +6,17 @@ effect the caller knows, so that tests can say what a report must find.
 
 import itertools
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from helpers.studies.small_study import SHIFT
+
+from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.results import Results
 
 PATTERNS = ["req-rep", "pub-sub", "latest-wins"]
 DELAYS = [0.0, 0.05, 0.1, 0.25, 0.5, 1.0]
@@ -192,6 +199,27 @@ def columns(rows: Rows) -> dict[str, Any]:
     return {key: np.array([row.get(key, np.nan) for row in rows]) for key in keys}
 
 
+def finding(mean: Sequence[float], half_width: Any = 1.0, **changes: Any) -> Finding:
+    """A finding whose band is `half_width` [s] wide on either side."""
+    middle = np.array(mean, dtype=float)
+    whole = Finding(
+        measure="drive_time_s",
+        in_excess=True,
+        factor="pattern",
+        first="req-rep",
+        second="latest-wins",
+        over="link.delay_s",
+        levels=DELAYS,
+        within={"profile": "default"},
+        mean=middle,
+        low=middle - half_width,
+        high=middle + half_width,
+        persons=24,
+        smallest_effect=2.0,
+    )
+    return replace(whole, **changes)
+
+
 def write(folder: Path, tables: dict[str, Rows], facts: dict[str, Any]) -> Path:
     """Write tables and manifest as a results folder."""
     import duckdb
@@ -204,6 +232,32 @@ def write(folder: Path, tables: dict[str, Rows], facts: dict[str, Any]) -> Path:
             connection.sql("select * from rows").write_parquet(str(path))
     (folder / "manifest.json").write_text(json.dumps(facts), encoding="utf-8")
     return folder
+
+
+def reading(folder: Path, rows: Rows, facts: dict[str, Any], **tables: Rows) -> Reading:
+    """What a report reads of these runs."""
+    return Reading(Results.load(write(folder, {"runs": rows, **tables}, facts)))
+
+
+def write_shifts(folder: Path, shifts: int) -> Path:
+    """Of shifts of an hour, which ARE simulated: three policies at two loads."""
+    from dva_sim.simulation.shift import build, measures, simulate_timed
+
+    tables: dict[str, Rows] = {"runs": [], "events": []}
+    policies, rates = ["random", "nearest_idle", "min_eta"], [1, 3]
+    for policy, rate, shift in itertools.product(policies, rates, range(shifts)):
+        changes = {"dispatch.policy": policy, "intensity": rate}
+        made = measures.tables(simulate_timed(build(SHIFT, changes), shift))
+        design = {"part": "shift", "person": shift, "trial": 0, "seed": shift, "cell": 0}
+        for name, rows in tables.items():
+            rows += [design | changes | {"is_reference": False} | row for row in made[name]]
+    answer = {"part": "shift", "measure": "response_mean_s", "factor": "dispatch.policy"}
+    answer |= {"contrast": ["random", "min_eta"], "over": "intensity", "smallest_effect_s": 5.0}
+    factors = {"dispatch.policy": policies, "intensity": rates}
+    study = {"question": "Who should go?", "persons": shifts, "replications": 1}
+    study |= {"factors": factors, "answer": answer}
+    scenarios = {"shift": build(SHIFT).model_dump(mode="json")}
+    return write(folder, tables, {"study": study, "scenarios": scenarios, "set": []})
 
 
 def _treatment(pattern: str, delay: float, profile: str) -> dict[str, Any]:
