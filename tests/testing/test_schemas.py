@@ -107,6 +107,7 @@ def test_what_a_study_may_say_follows_the_schema_and_is_taken_by_the_program(tmp
         ("direction: above, margin: 0.5", "direction: same"),
         ("direction: above, margin: 0.5", "direction: same, margin: 0"),
         ("comparison: far, batch", "batch"),
+        ("comparison: far, batch", "comparison: null, batch"),
         ("comparison: far, batch", "measure: contacts, batch"),
         ("comparison: far, batch", "comparison: far, measure: contacts, part: it, batch"),
     ],
