@@ -80,7 +80,7 @@ def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow
         ("adaptive", False),
     }
     told = sentences(found)[-1].replace("\N{NO-BREAK SPACE}", " ")
-    assert unnamed(told, "1 of 3 (33 %)", "extrapolated") == []
+    assert unnamed(told, "1 of 3", "(33 %) are extrapolated") == []
     with styled():
         assert "Hollow: extrapolated" in drawn(view, found).caption
         assert "Hollow" not in drawn(*read(EFFECTS)).caption
