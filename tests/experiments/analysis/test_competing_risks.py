@@ -126,7 +126,7 @@ def test_the_contrast_is_told_with_intervals_and_in_points():
     (told,) = sentences(found, view, finding_of(view))
     told = told.replace("\N{NO-BREAK SPACE}", " ")
     shares = ("In part drive", "by 100 s", "short: confirmed 25 % (", "link lost 75 % (")
-    assert unnamed(told, *shares, "50.0 percentage points") == []
+    assert unnamed(told, *shares, "short lies 50.0", "points below long (") == []
 
 
 def test_the_table_has_a_row_for_each_level():

@@ -179,7 +179,7 @@ def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_besi
     text = words_of(synthetic_results.write(tmp_path / "r", {"runs": runs}, facts))
     assert unnamed(text, "Confirmatory:", "hash 1234567812345678", "Registered hypotheses") == []
     size, _, rest = text.partition("persons x trials ")[2].partition(" hypothesis ")
-    assert size.split(" 8") == ["8 x 1", " x 1"]
+    assert size.split() == ["8", "x", "1"] * 2
     assert unnamed(rest, "waits above 2.0 s", "✓ held: ") == []
     assert "waits: It waits." in text
 
