@@ -73,7 +73,7 @@ REFUSED = {
         ("[0, 0.25]", "[]", "7:3: factors.link.delay_s: ", ["1 item"]),
         ("[0, 0.25]", "0.25", "7:3: factors.link.delay_s: ", ["list", "0.25"]),
         ("-rep, latest-wins]\n  over", "-rep]\n  over", "19:3: answer.contrast: ", []),
-        ("scenario: one.yaml", "scenario: on.yaml", "10:5: scenario 'on.yaml'", []),
+        ("scenario: one.yaml", "scenario: on.yaml", "10:5: file 'on.yaml'", []),
     ],
     TREATED: [
         ("[none, both]", "[none, all]", "6:3: 'all'", ["none, both"]),

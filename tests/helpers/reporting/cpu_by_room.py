@@ -85,7 +85,7 @@ class Table(Meter):
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         figures = {room: round(cpu, 2) for room, cpu in self._rooms.items()}
-        key, cache = f"dva-sim/cpu-by-room/{choice(self._config)}", self._config.cache
+        key, cache = f"dva-sim/cpu-of-{choice(self._config)}", self._config.cache
         known = cache.get(key, {}) if cache else {}
         terminalreporter.section("CPU seconds by room")
         for line in table(figures, *before(known)):
