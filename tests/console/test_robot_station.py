@@ -166,7 +166,7 @@ def test_what_no_robot_knows_is_refused(bench):
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        (RobotOptions(dva="x"), "--dva 'x' should be HOST:PORT"),
+        (RobotOptions(dva="x"), "--dva 'x' .* HOST:PORT"),
         (RobotOptions(profile="pibott"), "did you mean 'pibot'"),
         (RobotOptions(changes=("robot.nose=1",)), "nose"),
     ],

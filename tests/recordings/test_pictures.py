@@ -409,7 +409,7 @@ def test_everything_wanted_is_written_and_named(drive, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"video": "film.avi"}, ".gif or .mp4, not 'film.avi'"),
+        ({"video": "film.avi"}, "'film.avi' should end in .gif or .mp4"),
         ({"still": "a.gif"}, ".png, .pdf or .svg"),
         ({"still": "a.pdf", "camera": "robot-1"}, ".png or .jpg"),
         ({"strip": "no/a.png"}, "folder 'no' for the strip"),

@@ -248,7 +248,7 @@ def _tidy(out: Path) -> None:
     for path in out.glob(".tables-*"):
         shutil.rmtree(path, ignore_errors=True)
     for name in (MANIFEST, MACHINE):
-        for path in out.glob(f".{name}.*"):
+        for path in out.glob(f".{Path(name).stem}.*"):
             path.unlink(missing_ok=True)
 
 

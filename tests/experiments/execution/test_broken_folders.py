@@ -86,7 +86,7 @@ def test_a_disk_that_fills_up_at_the_manifest_is_told(tmp_path, out, monkeypatch
     (out / "manifest.json").unlink()
 
     def instead(folder: Path) -> None:
-        (folder / f".manifest.json.{os.getpid()}").symlink_to("/dev/full")
+        (folder / f".manifest.{os.getpid()}.json").symlink_to("/dev/full")
 
     with monkeypatch.context() as patch:
         patch.setattr("dva_sim.experiments.execution.runner._tidy", instead)
@@ -98,7 +98,7 @@ def test_a_disk_that_fills_up_at_the_manifest_is_told(tmp_path, out, monkeypatch
 def test_what_a_killed_runner_left_behind_is_removed(tmp_path, out):
     (out / ".tables-abc").mkdir()
     (out / ".tables-abc" / "runs.duckdb").write_bytes(b"half")
-    (out / ".manifest.json.123").write_text("{")
+    (out / ".manifest.123.json").write_text("{")
     run_study(kit.study_in(tmp_path), out, jobs=1, episode=never)
     assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
 
