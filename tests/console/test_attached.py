@@ -79,7 +79,7 @@ def test_an_event_is_shown_as_the_dva_tells_it():
 
 @pytest.mark.parametrize("dva", ["here", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:70000", ":5600"])
 def test_what_is_no_address_is_refused(dva):
-    with pytest.raises(ConfigError, match="127.0.0.1:5600|65534"):
+    with pytest.raises(ConfigError, match=r"127\.0\.0\.1:5600|65534"):
         AttachOptions(dva=dva).check()
 
 
