@@ -1,21 +1,16 @@
-import csv
 import dataclasses
 import math
 
 import pytest
-from helpers.paths import ROOT
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.pattern_runs import (
     COLUMN_WORDS,
     CONDITION,
-    EMULATOR_RESULTS,
-    RESULTS,
     Condition,
 )
 from dva_sim.network.patterns import PATTERNS
 
-REFERENCE = ROOT.parent / "shared" / "targets" / "network.csv"
 ASKING = Condition("req", 10, timeout_ms=2500, attempts=3, delay_ms=100, loss=0.05, rate_kbit=64)
 PUBLISHING = Condition("pub", 50, conflate="both", sndbuf=4096, hwm=1, queue_pkts=20)
 
@@ -76,15 +71,6 @@ def test_what_cannot_be_is_refused_in_one_line(changed, told):
 def test_a_word_where_a_number_belongs_is_refused():
     with pytest.raises(ConfigError, match="hwm 'many'"):
         Condition.from_row(PUBLISHING.to_row() | {"hwm": "many"})
-
-
-def test_the_first_set_of_measurements_has_the_columns_and_conditions_named_here():
-    if not REFERENCE.exists():
-        pytest.skip("the first set of measurements is not here")
-    with REFERENCE.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert list(rows[0])[4:] == [*CONDITION[:-1], *RESULTS, *EMULATOR_RESULTS]
-    assert len({Condition.from_row(row).hash for row in rows}) == 385
 
 
 def test_patterns_are_called_as_everywhere_and_tables_keep_their_words():

@@ -1,10 +1,8 @@
 """The files of targets and of the split: complete, consistent, and true to where they come from."""
 
 import csv
-import json
 
 import pytest
-from helpers.paths import ROOT
 
 from dva_sim.agents.operator.published import (
     SplitFile,
@@ -19,7 +17,6 @@ from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 
 _COMPARISONS = ("first", "second", "third")
-SHARED = ROOT.parent / "shared/targets/operator.json"
 LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
 
 
@@ -43,28 +40,6 @@ def test_the_shipped_split_assigns_every_check_once():
 
 def test_only_one_publication_may_be_fitted_to():
     assert load_split().fit == {"mackenzie-teather-2012": ("S9", "S10")}
-
-
-@pytest.mark.skipif(not SHARED.is_file(), reason="../shared is not there")
-def test_the_embedded_targets_are_those_of_the_shared_file():
-    told = {check["id"]: check for check in json.loads(SHARED.read_text())["checks"]}
-    assert told.keys() == load_targets().checks.keys()
-    assert {n: c["tag"] for n, c in told.items()} == {
-        n: c.tag for n, c in load_targets().checks.items()
-    }
-    for name, check in told.items():
-        band = check.get("band")
-        if isinstance(band, list):
-            own = [line for line in LINES.values() if line.check == name and line.has_band]
-            assert [(line.low, line.high) for line in own] == [tuple(band)], name
-    for lag, time in told["S7"]["target"].items():
-        assert LINES[f"S7/time-{lag}"].target == time
-    for lag, (low, high) in told["S7"]["ratio_band"].items():
-        assert (LINES[f"S7/{lag}"].low, LINES[f"S7/{lag}"].high) == (low, high)
-    for line, share in (("S12/less", "-16.7"), ("S12/more", "16.7")):
-        assert [LINES[line].low, LINES[line].high] == told["S12"]["band"][share]
-    assert LINES["S13/linear"].low == told["S13"]["min_R2"]
-    assert LINES["S17/increase"].target == told["S17"]["target"]
 
 
 def test_a_check_assigned_twice_is_refused():
