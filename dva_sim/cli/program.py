@@ -16,6 +16,7 @@ import typer
 from dva_sim import __version__
 from dva_sim.cli import files, results, runs, site, studies
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
+from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
 from dva_sim.kernel.suggestions import hint
@@ -156,6 +157,7 @@ def call(words: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
+    replace_what_cannot_be_shown()
     try:
         code = app(words, prog_name="dva-sim", standalone_mode=False)
         sys.stdout.flush()

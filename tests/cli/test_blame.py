@@ -4,9 +4,12 @@ import errno
 import os
 import resource
 import socket
+import subprocess
+import sys
 from contextlib import closing
 
 import pytest
+from helpers.paths import PYTHON_PATH
 from helpers.processes.command_line import call
 from helpers.wording import unnamed
 
@@ -151,6 +154,21 @@ def test_an_option_is_named_with_its_dashes(tmp_path, words, names):
     told = call(*words, cwd=tmp_path)
     assert told.returncode == 2
     assert unnamed(told.stderr, *names) == []
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_signs_that_a_terminal_lacks_are_shown_as_plain_ones(tmp_path, encoding):
+    shown = "import dva_sim.cli.plain_output as o; "
+    shown += (
+        "o.replace_what_cannot_be_shown(); print('9.3\u2013120\u00a0s \u2026 \u4e16 caf\u00e9')"
+    )
+    environment = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONPATH": PYTHON_PATH}
+    done = subprocess.run([sys.executable, "-c", shown], env=environment, capture_output=True)
+    assert done.returncode == 0, done.stderr
+    told = done.stdout.decode(encoding)
+    wanted = {"ascii": "9.3-120 s ... ? cafe", "latin-1": "9.3-120\u00a0s ... ? caf\u00e9"}
+    assert told.strip() == wanted.get(encoding, "9.3\u2013120\u00a0s \u2026 ? caf\u00e9")
 
 
 def test_too_few_open_files_are_told_with_how_many_it_takes(monkeypatch):
