@@ -328,7 +328,7 @@ def _misses(f: Finding) -> list[str]:
     if not f.missed:
         return []
     part = f"in part {f.part} " if f.part else ""
-    every = capital(f"{part}every event{' whose run did not fail' if f.failed else ''}")
+    every = capital(f"{part}the first event of every run{' that did not fail' if f.failed else ''}")
     where = _after(at(f, [len(f.levels) - 1]))
     if f.all_confirmed:
         return [f"{every} was confirmed."]

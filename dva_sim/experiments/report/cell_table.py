@@ -167,7 +167,10 @@ def _endings(part: RunGrid) -> Iterator[_Column]:
     if not part.has("confirmed"):
         return
     grid = part.grid("confirmed")
-    yield "confirmed", [_text(np.mean, present(cell), percent) for cell in _by_cell(part, grid)]
+    yield (
+        "first event confirmed",
+        [_text(np.mean, present(cell), percent) for cell in _by_cell(part, grid)],
+    )
     how = part.treated.get("outcome", np.array([]))
     for outcome, head in _ENDINGS.items():
         if np.any(how == outcome):

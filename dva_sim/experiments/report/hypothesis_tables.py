@@ -61,6 +61,24 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
     return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
 
 
+_SETTLED: dict[Verdict, str] = {
+    "held": "held",
+    "did not hold": "did not hold",
+    "open": "stays open",
+    "not run": "was not run",
+}
+
+
+def verdict_sentences(tested: Sequence[Tested]) -> list[str]:
+    """What became of each hypothesis, for the head of a report."""
+    return [
+        f"Registered hypothesis {t.name} {_SETTLED[t.verdict]}: {_claim(t)}"
+        + (f"; found {_interval(t.difference, t.contrast.measure)}" if t.difference else "")
+        + (f", p {_p(t.adjusted)} by Holm." if t.difference else ".")
+        for t in tested
+    ]
+
+
 def comparison_table(found: Judgement) -> CellTable:
     """Each comparison at each level it runs over."""
     compared = found.compared

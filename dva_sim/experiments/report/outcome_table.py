@@ -26,8 +26,8 @@ def sentences(endings: Endings, view: StudyView, finding: Finding | None) -> lis
     stops = [stop for stop in view.stops if not _all_right(endings, sides, stop)]
     if not stops:
         return [
-            f"In part {finding.part} every event was confirmed at the levels that the answer "
-            "compares; at the others not all were."
+            f"In part {finding.part} the first event of every run was confirmed at the levels "
+            "that the answer compares; at the others not all were."
         ]
     stop = stops[-1]
     told = "; ".join(_side(view, endings.at(level, stop)) for level in sides)

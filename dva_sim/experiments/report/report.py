@@ -82,6 +82,7 @@ def blocks_of(reading: Reading, drawn: Sequence[Drawn]) -> list[Block]:
         chain(
             _status(reading),
             [_first(reading, drawn)],
+            _events(reading),
             _claims(reading),
             _comparisons(reading),
             _endings(reading),
@@ -112,6 +113,12 @@ def _first(reading: Reading, drawn: Sequence[Drawn]) -> First:
     """The answer, the figure that answers it, and what it depends on."""
     found = reading.answer
     return First(found.lead, drawn[0] if drawn else None, tuple(found.depends.items()))
+
+
+def _events(reading: Reading) -> Iterator[Block]:
+    """What became of all events; of any that was missed the warnings tell already."""
+    if reading.events is not None and not reading.events.warns:
+        yield Words(str(reading.events), "note")
 
 
 def _claims(reading: Reading) -> Iterator[Block]:

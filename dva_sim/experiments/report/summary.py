@@ -45,7 +45,8 @@ from dva_sim.experiments.analysis.study_view import (
     with_rows,
 )
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
-from dva_sim.experiments.report.hypothesis_tables import few_that_weigh
+from dva_sim.experiments.report.event_outcomes import EventOutcomes, outcomes_of
+from dva_sim.experiments.report.hypothesis_tables import few_that_weigh, verdict_sentences
 from dva_sim.experiments.report.model_page import ModelPage, page_of
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
@@ -314,6 +315,11 @@ class Reading:
         return found if len(found) and np.isfinite(horizon) else None
 
     @cached_property
+    def events(self) -> EventOutcomes | None:
+        """What became of the events of all runs; None where a study has none."""
+        return outcomes_of(self.table("events"))
+
+    @cached_property
     def robustness(self) -> RepeatedAnswer | None:
         """The answer under other models of the persons, where it was repeated."""
         if self.view is None or self.finding is None or not self.table(REPEATS):
@@ -360,9 +366,18 @@ class Reading:
         if why := self.distrusted.get(self.view.part.name):
             return Answer(f"The answer is withheld: {why}. Mend it, and run the study again.")
         found = self.page.answer(self.finding)
+        verdicts = verdict_sentences(self.judgement.tested) if self._confirms else []
+        if verdicts:
+            lead = f"Beside what was registered, over all levels at once: {found.lead}"
+            found = replace(found, lead=" ".join([*verdicts, lead]))
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
         notes = [*found.notes, *filter(None, weighed)]
         return replace(found, depends=found.depends | depends(self), notes=notes)
+
+    @property
+    def _confirms(self) -> bool:
+        """Whether the run is the one that was registered, so that its verdicts come first."""
+        return status_of(self.manifest).kind == "confirmatory"
 
     def trials_of(self, part: str) -> int:
         """How many each person made in a part; 0 where that is not known."""
@@ -435,6 +450,8 @@ class Reading:
             found.append(f"Runs that failed and are missing below: {len(failures)} ({shown}).")
         for part, told in self.distrusted.items():
             found.append(f"In part {part} {told}: no contrast of this part is shown.")
+        if self.events is not None and self.events.warns:
+            found.append(str(self.events))
         if broken := _broken(self.runs):
             found.append(f"Safety rules were broken in {broken}.")
         for name in covariates_of(self.study, self.view.part)[1] if self.view else ():

@@ -49,6 +49,8 @@ def show_results(results: Results, console: Console) -> None:
         console.print(escape(line), soft_wrap=True)
     console.print()
     console.print(escape(reading.answer.lead), soft_wrap=True)
+    if reading.events is not None and not reading.events.warns:
+        console.print(escape(str(reading.events)), soft_wrap=True)
     for about, words in reading.answer.depends.items():
         console.print(f"{about}: {escape(words)}", style="dim", soft_wrap=True)
     for note in reading.answer.notes:

@@ -151,6 +151,6 @@ def test_a_sentence_begins_with_a_capital_letter_also_without_conditions(mean):
 def test_that_every_event_was_confirmed_is_told_of_the_part_it_holds_for():
     missed = (Missed("req-rep", 0, 120), Missed("latest-wins", 0, 120))
     text = measured(finding(GROWING, missed=missed, part="drive"))
-    assert unnamed(text, "In part drive", "every event", "delay of 1 s") == []
+    assert unnamed(text, "In part drive", "first event of every run", "delay of 1 s") == []
     text = measured(finding(GROWING, missed=missed, all_confirmed=True, part="drive", failed=1))
-    assert unnamed(text, "every event", "did not fail") == []
+    assert unnamed(text, "first event of every run", "did not fail") == []

@@ -1,0 +1,88 @@
+"""What became of all events of a study, in a line: a mean over runs hides one that was missed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.kernel.wording import listing
+
+_SEEN = "confirmed", "contained"
+_LEFT = {
+    "escalated": "escalated",
+    "expired": "expired",
+    "open": "still open at the end",
+    "undetected": "never detected",
+}
+
+
+class EventOutcomes(NamedTuple):
+    """How many events there were, and what became of them.
+
+    Attributes:
+        real: Events that were no false alarms.
+        confirmed: Real ones that were confirmed.
+        missed: Real ones that were refuted, by kind and by who looked.
+        left: Other real ones, by what became of them.
+        false_alarms: How many there were.
+        believed: False alarms that were confirmed.
+    """
+
+    real: int
+    confirmed: int
+    missed: Counter[tuple[str, str]]
+    left: Counter[str]
+    false_alarms: int
+    believed: int
+
+    @property
+    def warns(self) -> bool:
+        """Whether a reader must know before anything else."""
+        return bool(self.missed or self.believed)
+
+    def __str__(self) -> str:
+        """`Events: 288, 263 of them confirmed, 23 missed, which were real and refuted: ...`."""
+        if self.real == self.confirmed:
+            told = f"Events: {self._all_of(self.real)} confirmed"
+        else:
+            told = f"Events: {self.real}, of which {self.confirmed} were confirmed"
+            if number := self.missed.total():
+                ways = listing([_looked(*who, n) for who, n in self.missed.most_common()])
+                told += f", {number} missed (real, and refuted: {ways})"
+            for outcome, n in self.left.most_common():
+                told += f", {n} {_LEFT.get(outcome, outcome)}"
+        if self.false_alarms:
+            told += f"; of {self.false_alarms} false alarms {self.believed} were taken for real"
+        return f"{told}."
+
+    @staticmethod
+    def _all_of(number: int) -> str:
+        return {1: "the only one was", 2: "both were"}.get(number, f"all {number} were")
+
+
+def _looked(kind: str, who: str, number: int) -> str:
+    by = "nobody" if who in ("none", "") else f"a {who}"
+    return f"{number} {kind.replace('_', ' ')} looked at by {by}"
+
+
+def outcomes_of(events: Mapping[str, NDArray[Any]]) -> EventOutcomes | None:
+    """What became of the events of a table; None where it has none, or does not say."""
+    if "outcome" not in events or "is_true" not in events or not len(events["outcome"]):
+        return None
+    real = np.asarray(events["is_true"]) == True  # noqa: E712  (True, False or missing)
+    outcome = np.asarray(events["outcome"])
+    seen = np.isin(outcome, _SEEN)
+    missed = real & (outcome == "refuted")
+    kinds, whose = np.asarray(events["kind"]), np.asarray(events["responder_kind"])
+    return EventOutcomes(
+        real=int(real.sum()),
+        confirmed=int((real & seen).sum()),
+        missed=Counter(zip(map(str, kinds[missed]), map(str, whose[missed]), strict=True)),
+        left=Counter(map(str, outcome[real & ~seen & ~missed])),
+        false_alarms=int((~real).sum()),
+        believed=int((~real & seen).sum()),
+    )
