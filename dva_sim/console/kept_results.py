@@ -6,6 +6,7 @@ no name: what a phone calls itself stays out of the tables.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -130,7 +131,8 @@ class KeptResults:
             phone = phones.get(log.operator)
             number = self._persons.setdefault(log.operator, len(self._persons) + 1)
             pattern = world.feed.pattern_of(log.robot)
-            by = log.by._replace(person=f"person-{number}", pattern=pattern)
+            delay = float(world.sliders.line().get("delay_s", math.nan))
+            by = log.by._replace(person=f"person-{number}", pattern=pattern, link_delay_s=delay)
             if phone is not None:
                 by = by._replace(
                     pipeline=phone.settings.pipeline, sensor_hz=phone.rate_hz or by.sensor_hz

@@ -185,12 +185,14 @@ class DrivenBy(NamedTuple):
         pattern: What carried the commands.
         pipeline: How tilt became commands.
         sensor_hz: Samples of a real phone per second, as measured.
+        link_delay_s: One-way delay of the link, as it was last set during the drive [s].
     """
 
     person: str = ""
     pattern: str = ""
     pipeline: str = ""
     sensor_hz: float = math.nan
+    link_delay_s: float = math.nan
 
 
 SIMULATED = DrivenBy()

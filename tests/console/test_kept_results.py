@@ -8,6 +8,7 @@ import sqlite3
 import pytest
 from helpers.console.simulated_console import Page
 from helpers.processes.programs import wait_until
+from helpers.wording import unnamed
 
 import dva_sim
 from dva_sim.console.kept_results import KeptResults, name_of
@@ -15,6 +16,8 @@ from dva_sim.console.recorder import KEPT
 from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.execution.kept_run import KEPT_RUN, KeptRun
+from dva_sim.experiments.report import answer_table
+from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.results.results import Results
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -97,6 +100,19 @@ def test_each_command_that_took_effect_is_a_row(whole):
     assert all(commands["t_made_s"] <= commands["t_sent_s"])
     assert all(commands["t_sent_s"] < commands["t_arrived_s"])
     assert all(commands["t_arrived_s"] <= commands["t_applied_s"])
+
+
+def test_its_report_shows_the_drives_of_people_by_pattern_and_link_and_compares_nothing(whole):
+    reading = Reading(whole)
+    told = [reading.answer.lead, answer_table.size_of(reading)]
+    assert unnamed(" ".join(told), "1 person", "4 drives", "2 robots", "people drove") == []
+    (table,) = reading.cells
+    assert [row[:4] for row in table.rows] == [
+        ["person-1", "latest-wins PUB/SUB", "0.10\N{NO-BREAK SPACE}s", "3"],
+        ["person-1", "REQ/REP", "0.10\N{NO-BREAK SPACE}s", "1"],
+    ]
+    assert (reading.finding, reading.endings) == (None, None)
+    assert list(whole.table("drives")["link_delay_s"]) == [0.1] * 4
 
 
 def test_every_column_says_what_it_means(whole):

@@ -66,6 +66,8 @@ def size_of(reading: Reading) -> str:
 
 def _as_run(reading: Reading) -> str:
     study, cells = reading.study, len(reading.manifest.get("cells", []))
+    if reading.by_people:
+        return f"1 run in real time, in which people drove, seed {study.get('seed')}"
     persons = _people(reading.persons, study.get("replications"), reading.cluster)
     configurations = f" in {cells:,} configurations" if cells else ""
     runs = sum(

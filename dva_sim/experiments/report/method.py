@@ -23,7 +23,8 @@ def remarks(reading: Reading) -> list[str]:
     said = _usual(reading) if own is None else own
     study = {"hypotheses": None, "comparisons": None} | reading.study
     tests = paragraphs("tests", study=study)
-    return [_size(reading), *said, *tests, _made_by(reading)]
+    size = [] if reading.by_people else [_size(reading)]
+    return [*size, *said, *tests, _made_by(reading)]
 
 
 def _size(reading: Reading) -> str:

@@ -48,6 +48,7 @@ from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.event_outcomes import EventOutcomes, outcomes_of
 from dva_sim.experiments.report.hypothesis_tables import few_that_weigh, verdict_sentences
 from dva_sim.experiments.report.model_page import ModelPage, page_of
+from dva_sim.experiments.report.people_page import PeoplePage, people_drove
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results
@@ -295,9 +296,16 @@ class Reading:
     def page(self) -> ModelPage:
         """What the report says otherwise of the study's model; asked where there are runs."""
         assert self.view is not None
+        if self.by_people:
+            return PeoplePage(self.view, self.table("drives"))
         page = page_of(self.scenarios.values())
         fitting = page if page.fits(self.view) else ModelPage
         return fitting(self.view, self.table("events") or None)
+
+    @cached_property
+    def by_people(self) -> bool:
+        """Whether people drove, and no simulated person."""
+        return people_drove(self.table("drives"))
 
     @property
     def cluster(self) -> str:
@@ -308,7 +316,7 @@ class Reading:
     def endings(self) -> Endings | None:
         """How the events of the answer's part ended; None where a study has none."""
         events = self.table("events")
-        if self.view is None or "closing_s" not in events:
+        if self.view is None or self.by_people or "closing_s" not in events:
             return None
         horizon = horizon_of(self.view, self.scenario_of(self.view.part.name))
         found = Endings(self.view, events, self.runs, horizon)

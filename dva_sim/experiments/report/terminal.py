@@ -154,7 +154,10 @@ def _facts(reading: Reading) -> Iterator[str]:
     cells = len(manifest.get("cells", []))
     size = f"{results.runs.rows} runs in {cells} configurations"
     persons = f"{reading.persons} {reading.cluster}s x {study.get('replications')} trials"
-    yield f"{size}, {len(results.failures)} failed; {persons}, seed {study.get('seed')}"
+    if reading.by_people:
+        yield f"1 run in real time, in which people drove, seed {study.get('seed')}"
+    else:
+        yield f"{size}, {len(results.failures)} failed; {persons}, seed {study.get('seed')}"
     if (stopped := manifest.get("stopped") or {}).get("why"):
         why = _ENDS.get(stopped["why"], stopped["why"])
         yield f"Ended after {stopped['rounds']} of {stopped['of']} rounds: {why}"

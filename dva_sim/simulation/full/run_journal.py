@@ -245,5 +245,5 @@ def _numbered(state: Mapping[str, Any], kind: str) -> Iterable[tuple[str, Any]]:
 
 
 def _drive(facts: dict[str, Any]) -> DriveLog:
-    refused, by = Counter(dict(facts.pop("refused"))), DrivenBy._make(facts.pop("by"))
+    refused, by = Counter(dict(facts.pop("refused"))), DrivenBy(*facts.pop("by"))
     return DriveLog(**facts, refused=refused, by=by, round_trips=[])
