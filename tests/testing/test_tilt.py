@@ -120,9 +120,9 @@ def half(self, wanted, *_):
         (but(ONE, tilt_for=half), "level 5, 10 deg/s when level 5, 20 deg/s "),
         (
             commands(TWO, lambda honest, a, b, dt: honest(a, b, 0.03)),
-            "after 68 half steps",
+            "level 5.7, 30 deg/s after 68 half steps",
         ),
-        (commands(ONE, lambda honest, a, b, c: honest(a, max(b, -5.0), c)), "left and right"),
+        (commands(ONE, lambda honest, a, b, c: honest(a, max(b, -5.0), c)), "level 3.8, 11.4 deg"),
     ],
 )
 def test_a_promise_that_a_mapping_breaks_is_told_in_a_plain_line(kind, told):
