@@ -11,7 +11,7 @@ import pytest
 from helpers.console.accessibility import faults
 from helpers.processes.patience import becomes
 from helpers.processes.programs import Programs, all_gone_after
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, TimeoutError, expect
 from recordings.runs import drill, drive
 
 from dva_sim.recordings.audit_log import AuditEntry, AuditLog, plain_row
@@ -70,10 +70,14 @@ def drilled(address, shared, folder: Path) -> Callable[..., Page]:
         pause, play = (
             page.get_by_role("button", name=word, exact=True) for word in ("Pause", "Play")
         )
-        expect(pause.or_(play)).to_be_visible()
-        if pause.is_visible():
-            pause.click()
-        expect(play).to_be_visible()
+
+        def stands() -> bool:
+            if pause.is_visible():
+                with suppress(TimeoutError):  # at its end it stands by itself meanwhile
+                    pause.click(timeout=5_000)
+            return play.is_visible()
+
+        assert becomes(stands)
         page.get_by_role("slider", name="Replay position").press("Home")
         assert becomes(lambda: shown(page) == 0)
         return page
