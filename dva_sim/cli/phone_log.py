@@ -28,7 +28,7 @@ def tell(path: Path, as_json: bool, unit: Unit | None) -> None:
 
 
 def _motion(path: Path, unit: Unit | None) -> PhoneMotion:
-    """What a console has written, or the log of another app."""
+    """Samples from a file of a console, or from the export of a logger app."""
     try:
         return read_motion(path)
     except NoMotionOfOursError:

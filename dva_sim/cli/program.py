@@ -54,7 +54,7 @@ _BOUNDS = {
 
 
 def _plain(message: str) -> str:
-    """What the parser's library says of a number, in our words."""
+    """The parser library's bounds on a number in plain words."""
     for theirs, ours in _BOUNDS.items():
         message = message.replace(f"Input should be {theirs}", f"should be {ours}")
     return message

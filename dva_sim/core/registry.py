@@ -114,7 +114,7 @@ class Registry:
         entry.there_until = max(entry.there_until, now + self.silent_after)
 
     def is_elsewhere(self, id_tag: str, address: str, now: float) -> bool:
-        """Whether a device is still heard at an address other than the given one."""
+        """Return True while a device is heard at another address than the given one."""
         entry = self.entries.get(id_tag)
         moved = entry is not None and entry.device.address != address
         return moved and entry is not None and now < entry.there_until

@@ -115,7 +115,7 @@ def _missing(name: str, folder: str, known: list[str], is_asked: bool) -> str:
 
 
 def _meant(path: Path, kind: str, known: list[str]) -> str:
-    """Which file beside a path that is not there, or which name, was meant; empty if none."""
+    """A hint at the file or name that was probably meant; empty without one."""
     try:
         beside = sorted(each.name for each in path.parent.iterdir() if each.suffix in _TEXTS)
     except OSError:

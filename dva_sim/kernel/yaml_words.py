@@ -18,25 +18,25 @@ class Slip(NamedTuple):
 
 _WORDS: Final = (
     Slip(r"mapping values are not allowed here",
-         "a second colon in a line, or a key that is indented otherwise than those beside it; "
-         "text with a colon needs quotes"),
+         "a second colon on the line, or a key indented differently from its neighbours; "
+         "quote text that contains a colon"),
     Slip(r"expected ',' or '([\]}])'", "a bracket is not closed: {0} is missing", True),
     Slip(r"found character '\\t'", "a tab; indent with spaces"),
     Slip(r"found character '(.)' that cannot start any token",
          "a value cannot begin with {0}; put it in quotes"),
     Slip(r"found unexpected (?:end of stream|document separator)", "a quote is not closed", True),
     Slip(r"found duplicate key \"?(.*?)\"? with value", "key {0!r} stands twice"),
-    Slip(r"found undefined alias '(.*)'", "*{0} stands for nothing; text with a * needs quotes"),
+    Slip(r"found undefined alias '(.*)'", "*{0} refers to nothing; quote text that begins with *"),
     Slip(r"could not find expected ':'", "a key without a colon and a value", True),
     Slip(r"found unknown escape character '(.)'",
          "\\{0} means nothing within double quotes; use single ones"),
     Slip(r"expected <block end>, but found '(?:-|<block sequence start>)'",
-         "a list item that is indented otherwise than those beside it"),
+         "a list item indented differently from its neighbours"),
     Slip(r"expected <block end>",
-         "indented otherwise than the lines beside it, or text behind a value"),
+         "indented differently from its neighbours, or text after a value"),
     Slip(r"but found another document", "a second document; give each a file of its own"),
     Slip(r"(?:block )?sequence entries are not allowed", "a list item begins on a line of its own"),
-    Slip(r"expected (?:'<document start>'|<document start>)", "the file goes on behind its end"),
+    Slip(r"expected (?:'<document start>'|<document start>)", "text after the end of the document"),
     Slip(r"found unhashable key", "a key is text or a number, not a list or a mapping"),
 )  # fmt: skip
 _THEIRS: Final = r"(found|expected|could|but|did|while) "  # what is not of our own constructor

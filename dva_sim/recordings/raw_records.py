@@ -119,7 +119,7 @@ class RawRecords:
 
     def _filtered(self, what: str) -> str:
         by = f" by {self.made_by[1]!r:.60}" if self.made_by[1] else ""
-        return f"was filtered{by}, without its {what}: filter it with metadata and attachments"
+        return f"was filtered{by}, without its {what}; keep metadata and attachments when filtering"
 
     def _take(self, record: Any, opened: dict[int, Any]) -> None:
         from mcap.records import Attachment, Channel, Header, Message, Metadata

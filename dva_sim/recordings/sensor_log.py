@@ -23,7 +23,7 @@ from dva_sim.recordings.motion import MotionSample
 
 Unit = Literal["m/s2", "g"]
 
-NEEDED: Final = "needs columns of a time and of the axes x, y and z, acceleration with gravity"
+NEEDED: Final = "needs columns for the time and for the axes x, y and z (acceleration with gravity)"
 _TIMES: Final = re.compile(r"seconds_elapsed|elapsed|time|timestamp|t", re.IGNORECASE)
 _AXIS: Final = re.compile(r"(?:.*(?:acc\w*|gf|force)[\W_]*|a)?([xyz])(?:[\W_].*)?", re.IGNORECASE)
 _WITHOUT_GRAVITY: Final = re.compile(r"linear|without g|user", re.IGNORECASE)
@@ -92,7 +92,7 @@ def _columns_of(head: Sequence[str], path: Path) -> _Columns:
         if match and n not in times:
             axes.setdefault(match[1].lower(), n)
     if not times or len(axes) < 3:
-        raise ConfigError(f"is no motion of a phone: {NEEDED}; it has: {listed(names)}", path, 1, 1)
+        raise ConfigError(f"is not a motion log: it {NEEDED}; it has: {listed(names)}", path, 1, 1)
     if any(_WITHOUT_GRAVITY.search(names[n]) for n in axes.values()):
         raise ConfigError("is acceleration without gravity; log it with gravity", path, 1, 1)
     return _Columns((elapsed or times)[0], (axes["x"], axes["y"], axes["z"]), names)
@@ -118,7 +118,7 @@ def _numbers(
             f"should be a time and x, y, z, not {row!r:.60}", path, number, 1
         ) from None
     if not all(map(math.isfinite, (time, x, y, z))):
-        raise ConfigError("has a number that is none", path, number, 1)
+        raise ConfigError("has a value that is not finite", path, number, 1)
     return time, x, y, z
 
 

@@ -128,7 +128,7 @@ def check_recorded_link(path: Path) -> Found:
     doubts = []
     if gap > LONG_GAP_S:
         doubts.append(
-            f"carries nothing for {gap:,.0f} s on end, and nothing in runs that fit there"
+            f"carries nothing for {gap:,.0f} s at a stretch; a run that falls there carries nothing"
         )
     return (
         [],

@@ -271,13 +271,15 @@ def _in_metres(geometry: dict[str, Any], frame: GeoFrame, crs: str, fail: Fail) 
     try:
         drawn: Any = shape(geometry)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, GEOSException):
-        raise fail(f"its coordinates make no {geometry['type']}") from None
+        raise fail(f"its coordinates do not form a {geometry['type']}") from None
     positions = shapely.get_coordinates(drawn).tolist()
     if not positions or not np.isfinite(positions).all():
         raise fail("has no usable coordinates")
     for longitude, latitude in positions:
         if abs(longitude) > 180 or abs(latitude) > 90:
-            told = f"position {longitude:g}, {latitude:g} is no longitude and latitude in degrees"
+            told = (
+                f"position {longitude:g}, {latitude:g} is not a longitude and latitude in degrees"
+            )
             raise fail(told + _of_system(crs))
         if frame.distance(latitude, longitude) > FARTHEST:
             raise fail(_far(longitude, latitude, frame) + _of_system(crs))

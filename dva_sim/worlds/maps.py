@@ -229,9 +229,7 @@ def doubts_of_map(path: str | Path) -> tuple[str, ...]:
     doubts = []
     for key in document.data.keys() - RosMap.model_fields.keys():
         meant = guess(key, RosMap.model_fields)
-        doubts.append(
-            f"key {key!r} is left alone" + (f"; did you mean {meant!r}?" if meant else "")
-        )
+        doubts.append(f"key {key!r} is ignored" + (f"; did you mean {meant!r}?" if meant else ""))
     yaw = config.origin[2]
     if abs(yaw) > math.tau:
         doubts.append(

@@ -1,4 +1,4 @@
-"""What became of all events of a study, in a line: a mean over runs hides one that was missed."""
+"""Outcomes of all events of a study in one line; a mean over runs can hide a missed event."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LEFT = {
 
 
 class EventOutcomes(NamedTuple):
-    """How many events there were, and what became of them.
+    """Counts of events by outcome.
 
     Attributes:
         real: Events that were no false alarms.
@@ -41,18 +41,18 @@ class EventOutcomes(NamedTuple):
 
     @property
     def warns(self) -> bool:
-        """Whether a reader must know before anything else."""
+        """Return True if an event was missed or a false alarm was taken for real."""
         return bool(self.missed or self.believed)
 
     def __str__(self) -> str:
-        """`Events: 288, 263 of them confirmed, 23 missed, which were real and refuted: ...`."""
+        """`Events: 288, of which 263 were confirmed, 23 missed (real but refuted: ...)`."""
         if self.real == self.confirmed:
             told = f"Events: {self._all_of(self.real)} confirmed"
         else:
             told = f"Events: {self.real}, of which {self.confirmed} were confirmed"
             if number := self.missed.total():
                 ways = listing([_looked(*who, n) for who, n in self.missed.most_common()])
-                told += f", {number} missed (real, and refuted: {ways})"
+                told += f", {number} missed (real but refuted: {ways})"
             for outcome, n in self.left.most_common():
                 told += f", {n} {_LEFT.get(outcome, outcome)}"
         if self.false_alarms:
@@ -65,12 +65,13 @@ class EventOutcomes(NamedTuple):
 
 
 def _looked(kind: str, who: str, number: int) -> str:
-    by = "nobody" if who in ("none", "") else f"a {who}"
-    return f"{number} {kind.replace('_', ' ')} looked at by {by}"
+    if number == 1:
+        return f"1 {kind.replace('_', ' ')} inspected by a {who}"
+    return f"{number} {kind.replace('_', ' ')}s inspected by {who}s"
 
 
 def outcomes_of(events: Mapping[str, NDArray[Any]]) -> EventOutcomes | None:
-    """What became of the events of a table; None where it has none, or does not say."""
+    """Count the events of a table by outcome; None if it has no events or no outcomes."""
     if "outcome" not in events or "is_true" not in events or not len(events["outcome"]):
         return None
     real = np.asarray(events["is_true"]) == True  # noqa: E712  (True, False or missing)

@@ -70,7 +70,7 @@ _SETTLED: dict[Verdict, str] = {
 
 
 def verdict_sentences(tested: Sequence[Tested]) -> list[str]:
-    """What became of each hypothesis, for the head of a report."""
+    """One sentence with the verdict on each hypothesis, for the top of a report."""
     return [
         f"Registered hypothesis {t.name} {_SETTLED[t.verdict]}: {_claim(t)}"
         + (f"; found {_interval(t.difference, t.contrast.measure)}" if t.difference else "")

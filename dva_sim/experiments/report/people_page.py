@@ -29,12 +29,12 @@ _HEADS = (
 
 
 def people_drove(drives: Mapping[str, NDArray[Any]]) -> bool:
-    """Whether some of the drives of a table were a person's."""
+    """Return True if a person made at least one of the drives."""
     return "person_label" in drives and any(drives["person_label"].tolist())
 
 
 class PeoplePage(ModelPage):
-    """What people did.
+    """The page of a run in which people drove.
 
     Args:
         view: How the study is looked at.
@@ -51,7 +51,7 @@ class PeoplePage(ModelPage):
         self._drives = {name: np.asarray(column)[theirs] for name, column in drives.items()}
 
     def answer(self, finding: Finding | None) -> Answer:
-        """Who drove how often; that it is no experiment."""
+        """Count people, drives and robots, and say that this is not an experiment."""
         drives = len(self._drives["person_label"])
         people = len(set(self._drives["person_label"].tolist()))
         robots = len(set(self._drives["robot_name"].tolist()))
@@ -75,7 +75,7 @@ class PeoplePage(ModelPage):
         return CellTable(part.name, list(_HEADS), 3, rows)
 
     def method(self, correlation: float | None) -> list[str] | None:
-        """What the columns are."""
+        """Explain the columns."""
         return [
             "Ages and time-outs are measured by the run's clock, command by command: the tables "
             "drives and commands have all of them. Nobody's name is kept."

@@ -116,7 +116,7 @@ def _first(reading: Reading, drawn: Sequence[Drawn]) -> First:
 
 
 def _events(reading: Reading) -> Iterator[Block]:
-    """What became of all events; of any that was missed the warnings tell already."""
+    """The line on event outcomes, unless it is already among the warnings."""
     if reading.events is not None and not reading.events.warns:
         yield Words(str(reading.events), "note")
 

@@ -304,7 +304,7 @@ class Reading:
 
     @cached_property
     def by_people(self) -> bool:
-        """Whether people drove, and no simulated person."""
+        """Return True if people drove the robots, not simulated persons."""
         return people_drove(self.table("drives"))
 
     @property
@@ -324,7 +324,7 @@ class Reading:
 
     @cached_property
     def events(self) -> EventOutcomes | None:
-        """What became of the events of all runs; None where a study has none."""
+        """Outcomes of the events of all runs; None for a study without events."""
         return outcomes_of(self.table("events"))
 
     @cached_property
@@ -376,7 +376,7 @@ class Reading:
         found = self.page.answer(self.finding)
         verdicts = verdict_sentences(self.judgement.tested) if self._confirms else []
         if verdicts:
-            lead = f"Beside what was registered, over all levels at once: {found.lead}"
+            lead = f"Not registered, over all levels at once: {found.lead}"
             found = replace(found, lead=" ".join([*verdicts, lead]))
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
         notes = [*found.notes, *filter(None, weighed)]
@@ -384,7 +384,7 @@ class Reading:
 
     @property
     def _confirms(self) -> bool:
-        """Whether the run is the one that was registered, so that its verdicts come first."""
+        """Return True for the registered run, whose verdicts lead the report."""
         return status_of(self.manifest).kind == "confirmatory"
 
     def trials_of(self, part: str) -> int:

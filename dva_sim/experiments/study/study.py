@@ -173,7 +173,7 @@ class Study(Config):
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """What was declared about levels that settings have left out, each in a sentence."""
+        """Declared claims that the settings have made impossible, one sentence each."""
         return self._lost
 
     @property

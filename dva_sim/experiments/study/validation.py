@@ -209,7 +209,7 @@ def kept_claims(study: Study) -> Study:
 
 
 def lost_claims(study: Study) -> list[str]:
-    """What cannot be said any more of a study whose factors or levels were changed, and why."""
+    """Claims that the changed factors or levels no longer allow, one sentence each."""
     kept = kept_claims(study)
     lost = [f"the answer will not be computed: {problem}" for problem, _ in of_answer(study)][:1]
     for what, declared, left in (

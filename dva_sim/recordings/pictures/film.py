@@ -11,7 +11,6 @@ import math
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.whole_files import whole
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.colours import ROBOT
 from dva_sim.recordings.pictures.moments import Moments
@@ -185,7 +185,7 @@ def write_film(film: Film, path: Path) -> None:
     Raises:
         ConfigError: ffmpeg is missing or failed.
     """
-    with _whole(path) as part:
+    with whole(path) as part:
         (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(film, part)
 
 
@@ -206,17 +206,6 @@ def find_ffmpeg() -> str:
             "mp4 needs ffmpeg: pip install 'dva-sim[video]', or install ffmpeg, or write a .gif"
         )
     return found
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """A name to write to beside `path`, which becomes `path` if all goes well."""
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        yield part
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _write_gif(film: Film, path: Path) -> None:

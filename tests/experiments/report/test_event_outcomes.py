@@ -26,8 +26,8 @@ def test_missed_events_are_counted_by_kind_and_by_who_looked():
     )  # fmt: skip
     assert found.warns
     assert unnamed(
-        str(found), "288", "263", "23 missed", "22 gas leak", "a robot", "1 gas leak", "a guard",
-        "2 still open",
+        str(found), "288", "263", "23 missed", "22 gas leaks", "robots",
+        "1 gas leak inspected by a guard", "2 still open",
     ) == []  # fmt: skip
 
 
