@@ -148,7 +148,7 @@ def _of_link(scenario: Scenario) -> Iterator[str]:
         if file is not None and (gap := longest_gap_s(read_trace(file))) > scenario.horizon_s:
             yield (
                 f"link.{key} {file!r} carries nothing for {gap:,.0f} s at a stretch, longer than a "
-                f"run (horizon_s {scenario.horizon_s:g}): runs that begin there carry nothing at all"
+                f"run (horizon_s {scenario.horizon_s:g}): runs that begin there carry nothing"
             )
 
 
