@@ -17,6 +17,8 @@ from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.execution.kept_run import KEPT_RUN, KeptRun
 from dva_sim.experiments.report import answer_table
+from dva_sim.experiments.report.blocks import Printed
+from dva_sim.experiments.report.report import blocks_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.results.results import Results
@@ -112,6 +114,8 @@ def test_its_report_shows_the_drives_of_people_by_pattern_and_link_and_compares_
         ["person-1", "REQ/REP", "0.10\N{NO-BREAK SPACE}s", "1"],
     ]
     assert (reading.finding, reading.endings) == (None, None)
+    printed = [block.table for block in blocks_of(reading, []) if isinstance(block, Printed)]
+    assert table in printed  # and not folded
     assert list(whole.table("drives")["link_delay_s"]) == [0.1] * 4
 
 

@@ -241,6 +241,10 @@ def _figures(reading: Reading, drawn: Sequence[Drawn]) -> Iterator[Block]:
 
 
 def _tables(reading: Reading) -> Iterator[Block]:
+    if reading.by_people:
+        yield Heading("Drives by person, messaging pattern and link")
+        yield from map(Printed, reading.cells)
+        return
     yield Heading("Every configuration")
     if not reading.cells:
         yield Words("No run was completed.")
