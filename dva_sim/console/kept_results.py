@@ -19,6 +19,7 @@ from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import DriveLog
 from dva_sim.simulation.full.run_journal import RunJournal
 from dva_sim.simulation.full.stage import kind_of
 from dva_sim.simulation.scenario import Scenario
@@ -99,6 +100,7 @@ class KeptResults:
         manifest |= {"runs": 1, "stopped": None, "failures": []}
         self._kept = KeptRun(self._out, manifest, self.scenario, self.seed)
         self._world, self._journal = world, RunJournal(world.run, self._label_of)
+        world.recorder.on_ordered = self._attribute  # one that is over soon is never looked at
         world.recorder.on_tidy = self._keep
         world.recorder.on_tidied = self._journal.forget
         world.clock.pulse(LOOK, self._look)
@@ -122,22 +124,29 @@ class KeptResults:
 
     def _look(self) -> None:
         assert self._world is not None
+        for log in self._world.recorder.drives:
+            if log.ended is None:
+                self._attribute(log)
+
+    def _attribute(self, log: DriveLog) -> None:
+        """Say which person drives, and with what; nothing of a simulated one."""
+        assert self._world is not None
         world = self._world
-        persons = {person.device.id_tag: person for person in world.persons}
-        phones = {s.person.device.id_tag: s for s in world.phones.by_client.values() if s.person}
-        for log in world.recorder.drives:
-            if log.ended is not None or log.operator not in persons | phones:
-                continue
-            phone = phones.get(log.operator)
-            number = self._persons.setdefault(log.operator, len(self._persons) + 1)
-            pattern = world.feed.pattern_of(log.robot)
-            delay = float(world.sliders.line().get("delay_s", math.nan))
-            by = log.by._replace(person=f"person-{number}", pattern=pattern, link_delay_s=delay)
-            if phone is not None:
-                by = by._replace(
-                    pipeline=phone.settings.pipeline, sensor_hz=phone.rate_hz or by.sensor_hz
-                )
-            log.by = by
+        seats = world.phones.by_client.values()
+        phones = {seat.person.device.id_tag: seat for seat in seats if seat.person}
+        phone = phones.get(log.operator)
+        at_page = {person.device.id_tag for person in world.persons}
+        if phone is None and log.operator not in at_page:
+            return
+        number = self._persons.setdefault(log.operator, len(self._persons) + 1)
+        pattern = world.feed.pattern_of(log.robot)
+        delay = float(world.sliders.line().get("delay_s", math.nan))
+        by = log.by._replace(person=f"person-{number}", pattern=pattern, link_delay_s=delay)
+        if phone is not None:
+            by = by._replace(
+                pipeline=phone.settings.pipeline, sensor_hz=phone.rate_hz or by.sensor_hz
+            )
+        log.by = by
 
     def write(self) -> None:
         """Write all; nothing where nothing was followed.

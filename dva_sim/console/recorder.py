@@ -24,6 +24,7 @@ class ConsoleRecorder(Recorder):
 
     Attributes:
         on_applied: Told of each drive that has had a command take effect.
+        on_ordered: Told of each drive as it is ordered.
         on_tidy: Called before what is old is forgotten.
         on_tidied: Called afterwards.
         kept: Takes lines for a recording, if there is to be one.
@@ -33,6 +34,7 @@ class ConsoleRecorder(Recorder):
     def __init__(self) -> None:
         super().__init__()
         self.on_applied: Note = lambda _: None
+        self.on_ordered: Note = lambda _: None
         self.on_tidy: Callable[[], object] = lambda: None
         self.on_tidied: Callable[[], object] = lambda: None
         self.kept: LiveRecorder | None = None
@@ -84,6 +86,7 @@ class ConsoleRecorder(Recorder):
         super().drive_ordered(drive)
         self._known += 1
         self._numbers[id(drive)] = self._known
+        self.on_ordered(drive)
 
     def tidy(self) -> None:
         """Keep what is new for the recording and the results, and forget what is old."""

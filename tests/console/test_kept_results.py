@@ -95,6 +95,21 @@ def test_a_drive_of_a_person_is_a_row(whole):
     assert results.runs["simulated_s"][0] > 10
 
 
+def test_a_drive_that_is_over_at_once_has_its_person_too(monkeypatch, tmp_path):
+    results, page = begun(monkeypatch, tmp_path / "out")
+    page.let(1.0)
+    assert page.do("take", robots=[0])[0]
+    for _ in range(3):
+        assert page.do("start")[0]
+        assert page.do("stop")[0]
+        page.let(0.1)
+    results.write()
+    results.close()
+    drives = Results.load(tmp_path / "out").table("drives")
+    assert len(drives["person_label"]) >= 3
+    assert set(drives["person_label"]) == {"person-1"}
+
+
 def test_each_command_that_took_effect_is_a_row(whole):
     drives, commands = whole.table("drives"), whole.table("commands")
     for number, count in zip(drives["drive"], drives["commands_applied"], strict=True):
