@@ -28,6 +28,7 @@ from dva_sim.network.realtime import FASTEST
 
 Line = dict[str, Any]
 
+LONGEST_LEG = 3600.0  # of the tour [s]
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
 
@@ -66,6 +67,7 @@ class Actions:
             "refute": lambda client, _, said: self._person(client).report("refuted", said),
             "decline": self._decline,
             "tour": self._tour,
+            "tour_time": self._tour_time,
             **self._phones.doers,
             **self._at_robots.doers,
             **GuardActions(world).doers,
@@ -346,6 +348,16 @@ class Actions:
                 "the tour needs two robots with 3 m of free way: drive them into the open"
             )
         said(True, "two goals", tour=plan)
+
+    def _tour_time(self, client: str, line: Line, said: Said) -> None:
+        robot, took = self._robot(line.get("robot")), line.get("took_s")
+        log = self._world.recorder.newest_drive.get(robot)
+        if log is None or log.operator != self._person(client).device.id_tag:
+            raise Refused("You have not driven this robot.")
+        if not _is_share(took, 0.0, LONGEST_LEG):
+            raise Refused(f"took_s should be a number from 0 to {LONGEST_LEG:g}")
+        log.by = log.by._replace(tour_time=float(took))
+        said(True, f"{took:.1f} s noted")
 
     def _watch(self, robots: Any) -> None:
         numbers = robots if isinstance(robots, list) else []

@@ -186,6 +186,7 @@ class DrivenBy(NamedTuple):
         pipeline: How tilt became commands.
         sensor_hz: Samples of a real phone per second, as measured.
         link_delay_s: One-way delay of the link, as it was last set during the drive [s].
+        tour_time: Of the leg of the guided tour that this drive ended, as its page measured it [s].
     """
 
     person: str = ""
@@ -193,6 +194,7 @@ class DrivenBy(NamedTuple):
     pipeline: str = ""
     sensor_hz: float = math.nan
     link_delay_s: float = math.nan
+    tour_time: float = math.nan
 
 
 SIMULATED = DrivenBy()

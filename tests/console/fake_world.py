@@ -204,6 +204,9 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
             robot.wanted = (0.0, 0.0)
         return "two goals"
 
+    def do_tour_time(self, asked: dict[str, Any]) -> None:
+        print(f"Tour: robot {asked['robot']} took {asked['took_s']:.1f} s", flush=True)
+
     def do_watch(self, asked: dict[str, Any]) -> None:
         self.watched = set(asked["robots"])
 

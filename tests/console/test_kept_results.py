@@ -110,6 +110,25 @@ def test_a_drive_that_is_over_at_once_has_its_person_too(monkeypatch, tmp_path):
     assert set(drives["person_label"]) == {"person-1"}
 
 
+def test_the_times_of_the_tour_are_in_the_table_and_the_report(monkeypatch, tmp_path):
+    results, page = begun(monkeypatch, tmp_path / "out")
+    page.let(1.0)
+    assert page.do("take", robots=[0])[0]
+    assert not page.do("tour_time", robot=0, took_s=9.0)[0]  # who has not driven
+    assert page.do("start")[0]
+    for robot, took in [(0, -1.0), (0, True), (0, 4000.0), (1, 9.0)]:
+        assert not page.do("tour_time", robot=robot, took_s=took)[0]
+    assert page.do("tour_time", robot=0, took_s=12.34)[0]
+    assert page.do("stop")[0]
+    results.write()
+    results.close()
+    found = Results.load(tmp_path / "out")
+    assert list(found.table("drives")["tour_time_s"]) == [12.34]
+    (table,) = Reading(found).cells
+    assert table.heads[-1].endswith("[s]")
+    assert [row[-1] for row in table.rows] == ["12.3"]
+
+
 def test_each_command_that_took_effect_is_a_row(whole):
     drives, commands = whole.table("drives"), whole.table("commands")
     for number, count in zip(drives["drive"], drives["commands_applied"], strict=True):

@@ -162,6 +162,7 @@ ACTIONS: Known = {
     "refute": ({}, ()),
     "decline": ({}, ()),
     "tour": ({}, ()),
+    "tour_time": ({"robot": robot, "took_s": number(0, 3600)}, ("robot", "took_s")),
     "manual_take": ({"robot": robot}, ("robot",)),
     "manual_release": ({}, ()),
     "robot_register": ({"robot": robot, "dva": text(3, 80)}, ("robot", "dva")),
@@ -203,7 +204,8 @@ SILENT: Known = {
 # nothing for others, but that it stops a robot.
 NEEDS = {
     **dict.fromkeys(
-        ("take", "link", "pattern", "pace", "tour", "seek", "open_recording"), Role.DRIVE
+        ("take", "link", "pattern", "pace", "tour", "tour_time", "seek", "open_recording"),
+        Role.DRIVE,
     ),
     **dict.fromkeys(("server_start", "server_stop", "fake_add", "fake_remove"), Role.DRIVE),
     **dict.fromkeys(("manual_take", "manual", "fault"), Role.DRIVE),

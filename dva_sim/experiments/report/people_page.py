@@ -24,7 +24,7 @@ _KEYS = "person_label", "pattern", "link_delay_s"
 _HEADS = (
     *("person", "messaging pattern", "one-way delay", "drives", "driven [s]"),
     *("age of commands, median [s]", "worst 5 % older than [s]", "without a command [%]"),
-    *("refused", "time-outs"),
+    *("refused", "time-outs", "times in the tour [s]"),
 )
 
 
@@ -86,6 +86,7 @@ class PeoplePage(ModelPage):
         lasted = np.asarray(drives["driven_s"], float)
         stopped = np.nansum(np.asarray(drives["stop_share"], float) * lasted)
         total = float(np.nansum(lasted))
+        tour = np.asarray(drives.get("tour_time_s", []), float)
         return [
             str(drives["person_label"][0]),
             level_name("pattern", str(drives["pattern"][0])),
@@ -97,6 +98,7 @@ class PeoplePage(ModelPage):
             f"{100 * stopped / total:.0f}" if total else "–",
             str(int(np.nansum(np.asarray(drives["commands_refused"], float)))),
             str(int(np.nansum(np.asarray(drives["timeouts"], float)))),
+            ", ".join(f"{time:.1f}" for time in tour[np.isfinite(tour)]) or "–",
         ]
 
 

@@ -39,6 +39,7 @@ DRIVE_COLUMNS = (
     Measure("round_trip_p50_s", "median time from a command's request to its answer"),
     Measure("round_trip_p95_s", "percentile 95 of this time"),
     Measure("stop_share", "share of the driving time without a command in force"),
+    Measure("tour_time_s", "time of the tour's leg that ended in this drive; empty: none did"),
 )
 COMMAND_COLUMNS = (
     _NUMBER,
@@ -92,6 +93,7 @@ def _drive(recording: Recording, number: int, log: DriveLog) -> Row:
         "round_trip_p50_s": _percentile(list(log.round_trips), 50),
         "round_trip_p95_s": _percentile(list(log.round_trips), 95),
         "stop_share": 1.0 - float(done.hold.sum()) / lasted if lasted > 0.0 else NAN,
+        "tour_time_s": by.tour_time,
     }
 
 

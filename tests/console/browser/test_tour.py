@@ -1,5 +1,7 @@
 """The guided tour, from its button to the person's own two times."""
 
+import re
+
 from helpers.processes.patience import becomes
 from playwright.sync_api import Page, expect
 
@@ -28,7 +30,7 @@ def drive(page: Page, leg: int) -> None:
     page.keyboard.up("ArrowUp")
 
 
-def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, visit):
+def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, visit, tmp_path):
     page = visit.open(own_world("--robots", "2", "--people", "0")[0].drive, "map")
     tour = page.get_by_role("complementary", name="Tour")
     page.get_by_role("button", name="Take the tour").click()
@@ -44,6 +46,8 @@ def test_the_tour_ends_with_both_times_and_can_be_taken_once_more(own_world, vis
     times = [float(text.split()[0]) for text in tour.locator(".bar-row b").all_inner_texts()]
     assert len(times) == 2
     assert min(times) > 1.0
+    kept = re.findall(r"robot (\d) took (\S+) s", (tmp_path / "world-0.out").read_text())
+    assert kept == [(str(robot), f"{time:.1f}") for robot, time in enumerate(times)]
     page.get_by_role("button", name="Once more").click()
     expect(tour.get_by_role("heading")).to_contain_text("robot-1")
     assert distance(page, 0) > 1.5

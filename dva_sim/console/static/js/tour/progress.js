@@ -101,7 +101,9 @@ export function watchLeg(leg) {
     return;
   }
   if (place.speed > STILL_MPS || (awayFromGoal(leg) ?? Infinity) > now.plan.radius_m) return;
-  progress.value = noted(now, 'took', leg, worldNow() - began);
+  const took = worldNow() - began;
+  progress.value = noted(now, 'took', leg, took);
+  act('tour_time', { robot: robot.i, took_s: took / 1000 });
   act('stop');
 }
 
