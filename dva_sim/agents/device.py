@@ -9,6 +9,7 @@ from itertools import islice
 
 from dva_sim.agents.dva_watch import DvaWatch
 from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.labels import distinct
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request, Requester, Subscription, Transport
 from dva_sim.protocol import messages as m
@@ -100,6 +101,11 @@ class AgentDevice:
         self.clock = self.network.clock
         self.outbox = Outbox(self.id_tag, *self.time_of_day)
         self.labels[self.id_tag] = self.label
+
+    def call(self, label: str) -> None:
+        """Give it another label, which can be told apart from those of all others here."""
+        others = [known for id_tag, known in self.labels.items() if id_tag != self.id_tag]
+        self.label = self.labels[self.id_tag] = distinct(label, self.id_tag, others)
 
     def register(self, then: Callable[[], object] = do_nothing, hears_dva: bool = True) -> None:
         """Make oneself known to the DVA until it has answered, then renew that now and then.

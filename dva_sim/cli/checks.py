@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError, ExitCode, error_line
+from dva_sim.kernel.labels import visible
 from dva_sim.protocol.mistakes import READ_BYTES, check_message
 from dva_sim.testing.files import FileVerdict, NotReadError, check_file, schema_text
 from dva_sim.testing.promises import TRIALS, CheckedKind, said, tried
@@ -144,5 +145,4 @@ def _near(file: str) -> str:
 
 def _say(text: str) -> None:
     """One line stays one line, whatever a file or its name holds."""
-    escaped = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    print("".join(escaped))
+    print(visible(text))

@@ -350,7 +350,7 @@ class Actions:
         said(True, "two goals", tour=plan)
 
     def _tour_time(self, client: str, line: Line, said: Said) -> None:
-        robot, took = self._robot(line.get("robot")), line.get("took_s")
+        robot, took = self._robot(line.get("robot")), line.get("took_s", -1.0)
         log = self._world.recorder.newest_drive.get(robot)
         if log is None or log.operator != self._person(client).device.id_tag:
             raise Refused("You have not driven this robot.")

@@ -17,6 +17,7 @@ from dva_sim.console.phones import TYPES
 from dva_sim.console.refusal import NO_ANSWER, Refused, Said
 from dva_sim.console.seats import Seats
 from dva_sim.console.world import ConsoleWorld
+from dva_sim.kernel.labels import visible
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
 
@@ -230,6 +231,8 @@ def _identity(line: Line) -> tuple[str, str, str]:
         raise Refused("port should be a whole number from 1 to 65535")
     if not isinstance(label, str) or not 1 <= len(label) <= MOST_LETTERS:
         raise Refused(f"label should have 1 to {MOST_LETTERS} characters")
+    if not label.isprintable():
+        raise Refused(f"label should have characters that can be seen: {visible(label)}")
     if kind not in TYPES:
         raise Refused(f"type should be one of {', '.join(TYPES)}")
     return label, str(kind), f"{server.strip()}:{port}"

@@ -131,7 +131,7 @@ class Phones:
             return None
         self._used.add(number)
         device = self._run.stage.device("phone", number)
-        device.label = device.labels[device.id_tag] = label
+        device.call(label)
         device.device_type = TYPES[kind]
         device.dva = DVA if address == self.address else NOBODY
         seat.person = PersonAgent(device, self._console(), seat.new_tilt)

@@ -17,6 +17,7 @@ from dva_sim.console.decisions import dispatch_line
 from dva_sim.console.refusal import Said, unanswered
 from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.core.roles import Roles
+from dva_sim.kernel.labels import with_id
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
 
@@ -44,6 +45,10 @@ class ConsoleRoom:
     agent: ControlRoomAgent
     role: str
     registered: bool = False
+
+    def is_called(self, name: str) -> bool:
+        """Return True if that is the name which its person gave."""
+        return self.device.label in (name, with_id(name, self.device.id_tag))
 
     @property
     def device(self) -> AgentDevice:
@@ -98,7 +103,7 @@ class ConsoleRooms:
 
     def _agent(self, number: int, label: str) -> ControlRoomAgent:
         device = self._run.stage.device("control-room", number)
-        device.label = device.labels[device.id_tag] = label
+        device.call(label)
         return ControlRoomAgent(device)
 
     def _note_switch(self, _: m.DispatchStatus) -> None:
@@ -109,7 +114,7 @@ class ConsoleRooms:
     def join(self, client: str, role: str, name: str, said: Said) -> None:
         """A page's person gets a device of its role, or its device gets another name."""
         room = self.by_client.get(client)
-        if room is not None and (not name or room.device.label == name):
+        if room is not None and (not name or room.is_called(name)):
             said(True, f"you are {room.device.label}")
             return
         if room is not None:

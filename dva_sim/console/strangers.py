@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from dva_sim.console.feed import Feed
 from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
+from dva_sim.kernel.labels import distinct
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import kind_of
 
@@ -63,7 +64,8 @@ class Strangers:
         device, is_robot = entry.device, entry.kind == ROBOT
         self._known[device.id_tag] = "robot" if is_robot else "guard"
         more = UNKNOWN_ROBOT if is_robot else UNKNOWN_GUARD
-        self._feed.add_other(device.id_tag, device.label, self._known[device.id_tag], more)
+        label = distinct(device.label, device.id_tag, self._run.stage.labels.values())
+        self._feed.add_other(device.id_tag, label, self._known[device.id_tag], more)
 
     def positions(self) -> list[list[int]]:
         """Of those who have said where they are."""

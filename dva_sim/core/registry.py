@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections import OrderedDict, defaultdict, deque
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
+from dva_sim.kernel.labels import distinct, look_of, with_id
 from dva_sim.protocol.messages import Device, Position, Registration
 
 ROBOT, GUARD, OPERATOR, DETECTOR = "Robot", "Guard", "TeleOp", "Sensor"
@@ -87,6 +88,8 @@ class Registry:
     _changed: dict[str, DeviceEntry | None] = field(default_factory=dict)
     _moved: dict[str, DeviceEntry | None] = field(default_factory=dict)
     _places: int = 0
+    _looks: dict[str, str] = field(default_factory=dict)  # of each label as it was given, by id
+    _alike: dict[str, set[str]] = field(default_factory=dict)  # ids, by look
 
     @property
     def is_full(self) -> bool:
@@ -94,11 +97,21 @@ class Registry:
         return len(self.entries) >= self.most
 
     def register(self, id_tag: str, request: Registration, now: float) -> DeviceEntry | None:
-        """Enter a device, or renew its entry; None if the registry is full."""
-        device = Device(id_tag, request.label, request.device_type, request.address)
+        """Enter a device, or renew its entry; None if the registry is full.
+
+        Of two whose labels look the same, one is called by its id, too: the one that is silent, or
+        else the one that came later.
+        """
+        label = self._label_of(id_tag, request.label)
+        device = Device(id_tag, label, request.device_type, request.address)
         entry = self.entries.get(id_tag)
         if entry is None:
-            return None if self.is_full else self.add(DeviceEntry(device, now))
+            if self.is_full:
+                return None
+            entry = self.add(DeviceEntry(device, now))
+            self._look(id_tag, request.label)
+            return entry
+        self._look(id_tag, request.label)
         if entry.device.address != device.address:
             self.is_there(entry, now)
         elif entry.kind == DETECTOR:  # which publishes nothing: it renews its registration
@@ -126,8 +139,32 @@ class Registry:
         self._places += 1
         self.entries[device.id_tag] = self._of_type[entry.kind][device.id_tag] = entry
         self._heard[device.id_tag] = entry
+        self._look(device.id_tag, device.label)
         self._note(device.id_tag, entry)
         return entry
+
+    def _look(self, id_tag: str, label: str) -> None:
+        """Note how a label looks."""
+        self._overlook(id_tag)
+        self._looks[id_tag] = look_of(label)
+        self._alike.setdefault(self._looks[id_tag], set()).add(id_tag)
+
+    def _overlook(self, id_tag: str) -> None:
+        look = self._looks.pop(id_tag, None)
+        if look is not None:
+            self._alike[look].discard(id_tag)
+            if not self._alike[look]:
+                del self._alike[look]
+
+    def _label_of(self, id_tag: str, label: str) -> str:
+        """The label by which a device is shown, if it is to be this one."""
+        alike = [self.entries[other] for other in self._alike.get(look_of(label), set()) - {id_tag}]
+        for entry in alike:
+            if entry.silent and entry.device.label == distinct(label, "", ()):
+                renamed = with_id(label, entry.device.id_tag)
+                entry.device = replace(entry.device, label=renamed)
+                self._note(entry.device.id_tag, entry)
+        return distinct(label, id_tag, [entry.device.label for entry in alike])
 
     def heard(self, id_tag: str, now: float) -> DeviceEntry | None:
         """Note a sign of life; None if the device is not registered."""
@@ -167,6 +204,7 @@ class Registry:
             known[entry.kind].pop(id_tag, None)
         self._heard.pop(id_tag, None)
         self._silent.pop(id_tag, None)
+        self._overlook(id_tag)
         self._note(id_tag, None)
 
     def long_silent(self, now: float) -> Iterator[str]:

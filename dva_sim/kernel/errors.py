@@ -9,6 +9,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import ClassVar, Final
 
+from dva_sim.kernel.labels import visible
+
 
 class ExitCode(IntEnum):
     """How a command ended, as a shell and CI see it."""
@@ -97,10 +99,7 @@ def error_line(problem: object) -> str:
     words = (
         word if len(word) <= _LONGEST else f"{word[:_LONGEST]}..." for word in str(problem).split()
     )
-    text = " ".join(words)
-    return ERROR + "".join(
-        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
-    )
+    return ERROR + visible(" ".join(words))
 
 
 class RunTooLong(BaseException):

@@ -287,10 +287,10 @@ def test_who_joins_is_shown_with_what_the_dva_knows(page):
     page.let(1.0)
     scene, rows = page.told("scene")[-1], page.told("rows")[-1]
     (ghost,) = [thing for thing in scene["things"] if thing["id"] == GHOST]
-    assert (ghost["kind"], ghost["label"]) == ("robot", "robot-1")
+    assert (ghost["kind"], ghost["label"]) == ("robot", f"robot-1 ({GHOST})")
     (row,) = [row for row in rows["robots"] if row["i"] == ghost["i"]]
     assert (row["mode"], row["battery"], row["commands_hz"]) == ("Idle", None, None)
-    assert page.do("take", robots=["robot-1"])[0]  # a name that is taken leads to its owner
+    assert page.do("take", robots=["robot-1"])[0]  # leads to the one of that label alone
     assert page.seat()["drives"][0]["i"] == 0
     page.do("fake_remove", device=GHOST)
     page.let(1.0)

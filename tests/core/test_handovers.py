@@ -234,7 +234,8 @@ def test_who_drives_by_its_type_may_have_a_robot_and_is_listed(kind):
     assert ask(office, OTHER_OPERATOR, None)[0].code == m.OK
     content = office.say(OPERATOR, m.GetDeviceList())[0].content
     assert isinstance(content, m.DeviceList)
-    assert m.Device(OTHER_OPERATOR, kind.lower(), kind, ADDRESS) in content.devices
+    device = next(one for one in content.devices if one.id_tag == OTHER_OPERATOR)
+    assert (device.device_type, device.address) == (kind, ADDRESS)
 
 
 @pytest.mark.parametrize(("kind", "sent"), [("Remote Control", False), ("Teleoperation", True)])

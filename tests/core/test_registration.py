@@ -200,3 +200,31 @@ def test_a_detector_that_publishes_nothing_keeps_its_id_by_registering(office):
     for second in range(0, 50, 10):
         office.say(DETECTOR, m.Registration("detector", "Sensor", ADDRESS), float(second))
         assert office.say(DETECTOR, other, second + 9.9)[0].code == m.BUSY
+
+
+def labels(registry: Registry) -> list[str]:
+    return [entry.device.label for entry in registry.entries.values()]
+
+
+def test_two_devices_of_one_label_can_be_told_apart():
+    registry = Registry()
+    for id_tag, label in [(ROBOT, "r"), (GUARD, "R "), (OPERATOR, "r"), (STRANGER, "\u202er")]:
+        registry.register(id_tag, m.Registration(label, "Robot", ADDRESS), 0.0)
+    assert labels(registry) == ["r", f"R ({GUARD})", f"r ({OPERATOR})", "\\u202er"]
+
+    registry.register(GUARD, m.Registration("R ", "Robot", ADDRESS), 1.0)  # renewed
+    registry.register(STRANGER, m.Registration("s", "Robot", ADDRESS), 1.0)  # another name
+    assert labels(registry) == ["r", f"R ({GUARD})", f"r ({OPERATOR})", "s"]
+
+
+def test_a_label_goes_from_one_that_is_silent_to_a_newcomer():
+    registry = Registry()
+    registry.register(OPERATOR, AGAIN, 0.0)
+    registry.fallen_silent(20.0)
+    registry.register(STRANGER, AGAIN, 20.0)
+    assert labels(registry) == [f"operator ({OPERATOR})", "operator"]
+    registry.register(OPERATOR, AGAIN, 21.0)
+    assert labels(registry) == [f"operator ({OPERATOR})", "operator"]
+    registry.forget(STRANGER)
+    registry.register(OPERATOR, AGAIN, 22.0)
+    assert labels(registry) == ["operator"]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from dva_sim.agents.device import HEARTBEAT, HOLDER, STATUS, AgentDevice
 from dva_sim.core.registry import GUARD, ROBOT
+from dva_sim.kernel.labels import distinct
 from dva_sim.live.parts import Rate
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
@@ -70,7 +71,11 @@ class ToldSystem:
         before = {(i, told.device) for i, told in self.devices.items()}
         for device in devices:
             if device.id_tag != self._device.id_tag:
-                self._meet(device)
+                others = [
+                    told.device.label for i, told in self.devices.items() if i != device.id_tag
+                ]
+                label = distinct(device.label, device.id_tag, others)
+                self._meet(replace(device, label=label))
         late = [i for i, told in self.devices.items() if self._now - told.listed > FORGET_AFTER]
         for id_tag in late:
             self._leave(self.devices.pop(id_tag))

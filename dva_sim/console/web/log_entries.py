@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
+from dva_sim.kernel.labels import visible
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
@@ -70,7 +71,7 @@ class Entry:
         try:
             body = decode(self.data).body
             self.kind, self.payload = kind_of(self.data), payload_of(body)
-            self.label = body.label if isinstance(body, m.Registration) else ""
+            self.label = visible(body.label) if isinstance(body, m.Registration) else ""
         except ProtocolError as error:
             self.kind, self.payload = kind_of(self.data), error.reason[:_SHOWN]
         if self.reply is not None:

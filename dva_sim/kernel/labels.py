@@ -1,0 +1,58 @@
+"""Labels that people can tell apart: nothing in them is invisible, and no two look the same."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable
+from typing import Final
+
+LONGEST: Final = 64  # characters of a label in a message
+# Letters and marks that are drawn as nothing, or as a gap, though they count as printable:
+# Unicode's Default_Ignorable_Code_Point beyond the format characters, and the empty Braille cell.
+_BLANK: Final = frozenset(
+    [
+        *map(chr, (0x034F, 0x115F, 0x1160, 0x17B4, 0x17B5, 0x2800, 0x3164, 0xFFA0)),
+        *map(chr, range(0x180B, 0x1810)),
+        *map(chr, range(0xFE00, 0xFE10)),
+        *map(chr, range(0xE0100, 0xE01F0)),
+    ]
+)
+
+
+def visible(text: str) -> str:
+    r"""Text with an escape, such as `\u202e`, for each character that is invisible.
+
+    Those change the direction of text, too, and end lines.
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() and c not in _BLANK else c.encode("unicode_escape").decode()
+        for c in text
+    )
+
+
+def look_of(label: str) -> str:
+    """How a label looks at a glance: without regard to case, width and white space."""
+    return " ".join(unicodedata.normalize("NFKC", visible(label)).casefold().split())
+
+
+def with_id(label: str, id_tag: str) -> str:
+    """A label that no other device has, no longer than a message may hold."""
+    beside = f" ({id_tag})"
+    shown = visible(label).strip()[: LONGEST - len(beside)]
+    return f"{shown}{beside}" if shown else id_tag
+
+
+def distinct(label: str, id_tag: str, others: Iterable[str]) -> str:
+    """A label as it is shown: with the device's id where one of the others looks the same.
+
+    Args:
+        label: As somebody gave it.
+        id_tag: Of the device.
+        others: Labels of other devices.
+    """
+    look = look_of(label)
+    if not look or any(look_of(other) == look for other in others):
+        return with_id(label, id_tag)
+    return visible(label)[:LONGEST]
