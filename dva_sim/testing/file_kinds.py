@@ -41,8 +41,9 @@ from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.transport import TransportScenario
 from dva_sim.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.validation.network.reference import PlanConfig, load_plan
+from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame
-from dva_sim.worlds.geojson import make_plan, read_features
+from dva_sim.worlds.geojson import read_features
 from dva_sim.worlds.maps import RosMap, doubts_of_map
 from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
 

@@ -27,8 +27,9 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.worlds.compartments import NOWHERE, FloorPartition, of_floor, of_rooms
+from dva_sim.worlds.drawn_plan import make_plan
 from dva_sim.worlds.geo import GeoFrame, Pose
-from dva_sim.worlds.geojson import Feature, make_plan, read_features
+from dva_sim.worlds.geojson import Feature, read_features
 from dva_sim.worlds.maps import FREE, OccupancyGrid, load_ros_map, outline, rasterise, side
 from dva_sim.worlds.office_block import OfficeBlock, office_block
 from dva_sim.worlds.site_parts import (

@@ -8,7 +8,7 @@ from dva_sim.network.link.link import (
     make_serialiser,
     part_links,
 )
-from dva_sim.network.link.losses import Gap, Outage, Partition
+from dva_sim.network.link.outages import Gap, Outage, Partition
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import read_delay_log, read_trace
 from dva_sim.network.link.time_noise import Weather

@@ -1,13 +1,9 @@
-"""When nothing gets through: outages of a link, and partitions between nodes of a network.
-
-What takes packets off a link by chance or by the clock.
-"""
+"""What takes packets off a link by chance, one by one or in bursts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from fnmatch import fnmatchcase
-from typing import Annotated, Literal
+from collections.abc import Callable, Iterator
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -21,59 +17,6 @@ PositiveSeconds = Annotated[float, Field(gt=0, le=1e7)]
 
 Fate = Callable[[float, float], bool]
 """Whether a packet sent at a time [s], which left the queue at another [s], is lost."""
-
-
-class Gap(Config):
-    """A time without a link, once or again and again.
-
-    Attributes:
-        from_s: When it begins.
-        for_s: How long it lasts.
-        every_s: From one beginning to the next; left out, it comes once.
-    """
-
-    from_s: Seconds
-    for_s: PositiveSeconds
-    every_s: PositiveSeconds | None = None
-
-    @model_validator(mode="after")
-    def _ends(self) -> Gap:
-        if self.every_s is not None and self.for_s >= self.every_s:
-            raise ValueError(f"for_s {self.for_s:g} should be below every_s {self.every_s:g}")
-        return self
-
-    def covers(self, time: float) -> bool:
-        """Whether nothing gets through at a time [s]."""
-        since = time - self.from_s
-        if self.every_s is not None and since >= 0:
-            since %= self.every_s
-        return 0 <= since < self.for_s
-
-
-class Outage(Gap):
-    """A time at which what would cross the link is lost.
-
-    Attributes:
-        direction: Which way; `up` is towards the robot.
-    """
-
-    direction: Literal["up", "down", "both"] = "both"
-
-
-class Partition(Gap):
-    """A time at which nothing gets from some nodes to others; the way back is not concerned.
-
-    Attributes:
-        source: Nodes that are not heard, such as `operator-1`, `robot-*` or `*`.
-        destination: Nodes that do not hear them.
-    """
-
-    source: str = "*"
-    destination: str = "*"
-
-    def parts(self, source: str, destination: str) -> bool:
-        """Whether the way from one node to another is concerned."""
-        return fnmatchcase(source, self.source) and fnmatchcase(destination, self.destination)
 
 
 class Bursts(Config):
@@ -167,11 +110,6 @@ def counted_bursts(
         return is_on and luck.draw(now) < loss
 
     return takes
-
-
-def gaps_of(gaps: Sequence[Gap]) -> Fate:
-    """What would cross the link when there is none."""
-    return lambda now, left_at: any(gap.covers(left_at) for gap in gaps)
 
 
 def _uniform(rng: np.random.Generator) -> Iterator[float]:

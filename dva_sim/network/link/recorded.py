@@ -1,15 +1,12 @@
 """Recorded links in files: packet opportunities, logs of delays, bare delays.
 
 Each file is read once per process.
-
-A delay log played back: what its probes met, a link's packets meet at the same times.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_right
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -209,57 +206,3 @@ def _lines(path: str, what: str) -> Iterator[tuple[int, str]]:
         text = line.strip()
         if text:
             yield number, text
-
-
-Flags = NDArray[np.bool_]
-
-
-class Replay:
-    """One direction's part of a log, over and over; each packet meets the probe nearest in time.
-
-    While the nearest probe is a lost one, every packet is lost: the log knows no finer.
-
-    Args:
-        log: What was measured.
-        share: Of each delay that this direction takes.
-        here: Whether a probe, if it was lost, was lost in this direction, shape `(n,)`.
-        offset: Where in the log the run begins [s].
-    """
-
-    def __init__(self, log: DelayLog, share: float, here: Flags, offset: float) -> None:
-        times = log.times - log.times[0]
-        self._period = period_of(log)
-        self._ends = (0.5 * (times + np.append(times[1:], self._period))).tolist()
-        self._delays = _filled(share * log.delays).tolist()
-        self._lost = (np.isnan(log.delays) & here).tolist()
-        self._offset = offset
-
-    def deviation(self, now: float) -> float:
-        """See `Wobble`."""
-        return float(self._delays[self._at(now)])
-
-    def takes(self, now: float, left_at: float) -> bool:
-        """See `Fate`."""
-        return bool(self._lost[self._at(now)])
-
-    def _at(self, now: float) -> int:
-        index = bisect_right(self._ends, (now + self._offset) % self._period)
-        return index if index < len(self._ends) else 0  # nearer to where the log begins anew
-
-
-def period_of(log: DelayLog) -> float:
-    """After how long a log begins anew [s]: a typical step after its last probe."""
-    steps = np.diff(log.times)
-    return float(log.times[-1] - log.times[0] + np.median(steps[steps > 0]))
-
-
-def moments_of(log: DelayLog) -> tuple[float, float]:
-    """Mean and standard deviation of the delays of a log [s]."""
-    return float(np.nanmean(log.delays)), float(np.nanstd(log.delays))
-
-
-def _filled(delays: Floats) -> Floats:
-    """With the last known delay where a probe was lost."""
-    known = np.flatnonzero(~np.isnan(delays))
-    last = np.searchsorted(known, np.arange(len(delays)), side="right") - 1
-    return delays[known[np.maximum(last, 0)]]

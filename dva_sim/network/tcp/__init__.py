@@ -1,6 +1,7 @@
 """A TCP connection in virtual time, segment by segment, as Linux behaves under ZeroMQ."""
 
-from dva_sim.network.tcp.connection import TcpConnection, TcpEndpoint
+from dva_sim.network.tcp.connection import TcpConnection
+from dva_sim.network.tcp.endpoint import TcpEndpoint
 from dva_sim.network.tcp.parameters import TcpOptions
 
 __all__ = ["TcpConnection", "TcpEndpoint", "TcpOptions"]

@@ -1,241 +1,24 @@
-"""What a sender of datagrams learns from acknowledgements: round trips, losses, when to give up.
+"""Datagrams as often as a law of rate lets them: the newest message waits, the others are gone.
 
-Each datagram is acknowledged by its number, and an acknowledgement repeats those before it, so
-that a lost one costs nothing. A datagram is lost when three later ones were acknowledged (the
-threshold of RFC 5681), or when nothing was heard for as long as RFC 6298 says.
-
-Tells a law of rate what happened: once per round trip, and once for all losses of one.
-
-Datagrams as often as a law of rate lets them: the newest message waits, the others are gone.
-
-A message is cut into datagrams of at most one packet. Those of a message that has begun are sent
-to the end, because a part of a picture shows nothing; what comes meanwhile replaces what waits.
+Those of a message that has begun are sent to the end, because a part of a picture shows nothing;
+what comes meanwhile replaces what waits.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
 from dva_sim.network.transports.config import Deliver, TransportMessage
+from dva_sim.network.transports.feedback import REPEATED, Echo, Feedback
+from dva_sim.network.transports.message_parts import IP_UDP, Assembly, MessagePart, parts_of
+from dva_sim.network.transports.pace import Pace
 from dva_sim.network.transports.rate_control import RateLaw
 
-REORDERED = 3  # later ones acknowledged, until one counts as lost: RFC 5681
-FIRST_TIMEOUT, LEAST_TIMEOUT, LONGEST_TIMEOUT = 1.0, 1.0, 60.0  # [s]: RFC 6298
-REPEATED = 32  # datagrams that an acknowledgement tells of: the bits of a word; assumed
-Echo = tuple[int, float]  # a datagram's number, and since when it had been there [s]
-
-
-class RoundTrips:
-    """Smoothed round trip and time-out.
-
-    Attributes:
-        smoothed: [s], or None before the first sample.
-
-    References:
-        RFC 6298.
-    """
-
-    def __init__(self) -> None:
-        self.smoothed: float | None = None
-        self._variation, self._backoff = 0.0, 1.0
-
-    @property
-    def timeout(self) -> float:
-        """How long to wait for an answer before giving it up [s]."""
-        if self.smoothed is None:
-            return min(FIRST_TIMEOUT * self._backoff, LONGEST_TIMEOUT)
-        plain = max(self.smoothed + 4.0 * self._variation, LEAST_TIMEOUT)
-        return min(plain * self._backoff, LONGEST_TIMEOUT)
-
-    def add(self, sample: float) -> None:
-        """Learn from a round trip [s]."""
-        if self.smoothed is None:
-            self.smoothed, self._variation = sample, 0.5 * sample
-        else:
-            self._variation += 0.25 * (abs(sample - self.smoothed) - self._variation)
-            self.smoothed += 0.125 * (sample - self.smoothed)
-        self._backoff = 1.0
-
-    def back_off(self) -> None:
-        """A time-out has passed: wait twice as long the next time."""
-        self._backoff *= 2.0
-
-
-class Feedback:
-    """What was sent and is not known to have arrived.
-
-    Attributes:
-        round_trips: What they were like.
-        lost: How many are taken for lost.
-        samples: Round trips since somebody emptied the list [s].
-    """
-
-    def __init__(self) -> None:
-        self.round_trips, self.lost = RoundTrips(), 0
-        self._pending: dict[int, float] = {}  # in order of sending
-        self._passed_by: dict[int, int] = {}
-        self._heard = 0.0
-        self.samples: list[float] = []
-
-    @property
-    def deadline(self) -> float:
-        """When all that is pending is given up, unless something is heard [s]."""
-        if not self._pending:
-            return math.inf
-        oldest = next(iter(self._pending.values()))
-        return max(oldest, self._heard) + self.round_trips.timeout
-
-    def sent(self, now: float, number: int) -> None:
-        """Datagram `number` was sent at `now` [s]."""
-        self._pending[number] = now
-
-    def acknowledged(self, now: float, echoes: Sequence[Echo]) -> list[int]:
-        """An acknowledgement has come.
-
-        Args:
-            now: [s]
-            echoes: Numbers of datagrams, oldest first, each with how long the other side had it
-                before it answered [s].
-
-        Returns:
-            Datagrams that are lost, as this one shows.
-        """
-        gone: list[int] = []
-        for number, held in echoes:
-            sent = self._pending.pop(number, None)
-            if sent is not None:
-                self._heard = now
-                self.samples.append(now - sent - held)
-                self.round_trips.add(self.samples[-1])
-                gone += self._passed(number)
-        return gone
-
-    def _passed(self, number: int) -> list[int]:
-        """A later datagram than some was acknowledged: those that this shows to be lost."""
-        earlier = [n for n in self._pending if n < number]
-        for n in earlier:
-            self._passed_by[n] = self._passed_by.get(n, 0) + 1
-        return self._drop(n for n in earlier if self._passed_by[n] >= REORDERED)
-
-    def give_up(self) -> list[int]:
-        """The time-out has passed: everything pending is lost."""
-        self.round_trips.back_off()
-        return self._drop(self._pending)
-
-    def _drop(self, numbers: Iterable[int]) -> list[int]:
-        gone = list(numbers)
-        for number in gone:
-            del self._pending[number]
-            self._passed_by.pop(number, None)
-        self.lost += len(gone)
-        return gone
-
-
-FIRST_FLIGHT = 10  # datagrams before the first answer: the initial window of RFC 6928
-
-
-class Pace:
-    """A law, and the round trips that it goes by.
-
-    Args:
-        law: How often a datagram may be sent.
-        feedback: Where round trips come from.
-
-    Attributes:
-        held: Whether the gap has made something wait since the round trip began.
-    """
-
-    def __init__(self, law: RateLaw, feedback: Feedback) -> None:
-        self._law, self._feedback = law, feedback
-        self._begun, self._unanswered, self.held = False, 0, False
-        self._since, self._deaf_until = 0.0, 0.0
-
-    @property
-    def gap(self) -> float:
-        """Between two datagrams [s]; unanswered, a first flight, and then one per time-out."""
-        if self._begun:
-            return self._law.gap
-        return self._feedback.round_trips.timeout if self._unanswered >= FIRST_FLIGHT else 0.0
-
-    def sent(self) -> None:
-        """A datagram was sent."""
-        self._unanswered += 1
-
-    def heard(self, now: float) -> None:
-        """An acknowledgement has come at `now` [s]; perhaps a round trip has passed."""
-        samples, smoothed = self._feedback.samples, self._feedback.round_trips.smoothed
-        if not samples or smoothed is None:
-            return
-        if not self._begun:
-            self._begun, self._since = True, now
-            self._law.begin(samples[0])
-        elif now - self._since >= smoothed:
-            self._law.passed(sum(samples) / len(samples), self.held)
-            self._restart(now)
-
-    def lost(self, now: float) -> None:
-        """Something is lost, as is known at `now` [s]."""
-        if self._begun and now >= self._deaf_until:
-            self._law.lost()
-            self._deaf_until = now + (self._feedback.round_trips.smoothed or 0.0)
-            self._restart(now)
-
-    def _restart(self, now: float) -> None:
-        self._feedback.samples.clear()
-        self._since, self.held = now, False
-
-
-PACKET = 1500  # largest IP packet of Ethernet: RFC 894 [B]
-IP_UDP = 28  # headers: RFC 791 and 768 [B]
 SLACK = 1e-6  # the clock's grain [s]
-
-
-class MessagePart(NamedTuple):
-    """A piece of a message: which of how many, and its size [B]."""
-
-    message: TransportMessage
-    place: int
-    pieces: int
-    size: int
-
-
-def parts_of(message: TransportMessage, header: int) -> list[MessagePart]:
-    """The datagrams that a message is cut into, all full but the last.
-
-    Args:
-        message: What is sent.
-        header: Of the transport, in each datagram [B].
-    """
-    room = PACKET - IP_UDP - header
-    count = max(1, math.ceil(message.size / room))
-    sizes = [room] * (count - 1) + [message.size - room * (count - 1)]
-    return [MessagePart(message, place, count, size) for place, size in enumerate(sizes)]
-
-
-class Assembly:
-    """Puts parts together again.
-
-    Args:
-        deliver: Told of every message once it is whole.
-    """
-
-    def __init__(self, deliver: Deliver) -> None:
-        self._deliver = deliver
-        self._missing: dict[int, set[int]] = {}
-
-    def add(self, part: MessagePart) -> None:
-        """A part has arrived, perhaps once more."""
-        number = part.message.number
-        missing = self._missing.setdefault(number, set(range(part.pieces)))
-        if part.place in missing:
-            missing.remove(part.place)
-            if not missing:
-                self._deliver(number)
 
 
 class DatagramSender:

@@ -21,7 +21,9 @@ from dva_sim.network.transports.config import (
     Trinomial,
     Zeromq,
 )
-from dva_sim.network.transports.datagrams import IP_UDP, Assembly, DatagramSender, Echo, parts_of
+from dva_sim.network.transports.datagrams import DatagramSender
+from dva_sim.network.transports.feedback import Echo
+from dva_sim.network.transports.message_parts import IP_UDP, Assembly, parts_of
 from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 

@@ -40,7 +40,7 @@ from dva_sim.simulation.shift import simulate_timed
 from dva_sim.worlds.hazards import GROWTH_S, Fire, make_hazard
 from dva_sim.worlds.hazards.detectors import CoAlarm
 from dva_sim.worlds.hazards.fire import FULL_GROWTH_KW
-from dva_sim.worlds.hazards.gas_dispersion import sigma_y
+from dva_sim.worlds.hazards.gas_plume import sigma_y
 
 STEPS = 200  # of time in a delay
 SMITH_STEPS = 500  # the same under a Smith predictor

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.worlds.camera.floors import HORIZON, OPEN_AIR, Floors
+from dva_sim.worlds.camera.room_colours import RoomGrid
 from dva_sim.worlds.camera.sprites import Figure, Sprite, sprite_of
-from dva_sim.worlds.camera.surfaces import Floats, Hits, RoomGrid, Surfaces
-from dva_sim.worlds.camera.textures import HORIZON, OPEN_AIR, TEXELS, Floors, Uprights
+from dva_sim.worlds.camera.surfaces import Floats, Hits, Surfaces
+from dva_sim.worlds.camera.textures import TEXELS, Uprights
 from dva_sim.worlds.camera.visibility import (
     Rays,
     SmokeView,

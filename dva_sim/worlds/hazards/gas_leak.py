@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from dva_sim.worlds.hazards.air_mesh import MIXED_HEIGHT, mesh_in
 from dva_sim.worlds.hazards.building import NOWHERE, Floats, SitePoints
 from dva_sim.worlds.hazards.conditions import BREATHING_HEIGHT, Conditions
 from dva_sim.worlds.hazards.detectors import DetectorAlarm, alarm_in
-from dva_sim.worlds.hazards.gas_dispersion import MIXED_HEIGHT, Air, Draught, air_in, mesh_in, plume
+from dva_sim.worlds.hazards.gas_dispersion import Air, Draught, air_in
+from dva_sim.worlds.hazards.gas_plume import plume
 from dva_sim.worlds.hazards.hazard import LARGEST, Hazard, March, SolvedField, Step
 from dva_sim.worlds.site import Site
 

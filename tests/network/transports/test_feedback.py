@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from dva_sim.network.transports.datagrams import Feedback, Pace, RoundTrips
+from dva_sim.network.transports.feedback import Feedback, RoundTrips
+from dva_sim.network.transports.pace import Pace
 
 
 def test_the_first_sample_of_200_ms_gives_a_time_out_of_a_second_the_least_there_is():

@@ -7,14 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dva_sim.worlds.geo import Pose
-from dva_sim.worlds.hazards.gas_dispersion import (
-    MIXED_HEIGHT,
-    Air,
-    Draught,
-    Mesh,
-    make_mesh,
-    side_for,
-)
+from dva_sim.worlds.hazards.air_mesh import MIXED_HEIGHT, Mesh, make_mesh, side_for
+from dva_sim.worlds.hazards.gas_dispersion import Air, Draught
 from dva_sim.worlds.maps import FREE, OCCUPIED, OccupancyGrid
 
 RESOLUTION = 0.1  # of the grids below [m]

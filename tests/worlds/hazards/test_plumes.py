@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dva_sim.worlds.hazards.gas_dispersion import CLASSES, plume, sigma_y, sigma_z
+from dva_sim.worlds.hazards.gas_plume import CLASSES, plume, sigma_y, sigma_z
 
 AT_1_KM = {"A": 213.0, "B": 156.0, "C": 104.0, "D": 68.0, "E": 50.5, "F": 34.0}  # Martin [m]
 

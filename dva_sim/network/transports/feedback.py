@@ -1,0 +1,122 @@
+"""What the sender of datagrams learns from acknowledgements: round trips, losses, when to give up.
+
+Each datagram is acknowledged by its number, and an acknowledgement repeats those before it, so
+that a lost one costs nothing. A datagram is lost when three later ones were acknowledged (the
+threshold of RFC 5681), or when nothing was heard for as long as RFC 6298 says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+REORDERED = 3  # later ones acknowledged, until one counts as lost: RFC 5681
+FIRST_TIMEOUT, LEAST_TIMEOUT, LONGEST_TIMEOUT = 1.0, 1.0, 60.0  # [s]: RFC 6298
+REPEATED = 32  # datagrams that an acknowledgement tells of: the bits of a word; assumed
+Echo = tuple[int, float]  # a datagram's number, and since when it had been there [s]
+
+
+class RoundTrips:
+    """Smoothed round trip and time-out.
+
+    Attributes:
+        smoothed: [s], or None before the first sample.
+
+    References:
+        RFC 6298.
+    """
+
+    def __init__(self) -> None:
+        self.smoothed: float | None = None
+        self._variation, self._backoff = 0.0, 1.0
+
+    @property
+    def timeout(self) -> float:
+        """How long to wait for an answer before giving it up [s]."""
+        if self.smoothed is None:
+            return min(FIRST_TIMEOUT * self._backoff, LONGEST_TIMEOUT)
+        plain = max(self.smoothed + 4.0 * self._variation, LEAST_TIMEOUT)
+        return min(plain * self._backoff, LONGEST_TIMEOUT)
+
+    def add(self, sample: float) -> None:
+        """Learn from a round trip [s]."""
+        if self.smoothed is None:
+            self.smoothed, self._variation = sample, 0.5 * sample
+        else:
+            self._variation += 0.25 * (abs(sample - self.smoothed) - self._variation)
+            self.smoothed += 0.125 * (sample - self.smoothed)
+        self._backoff = 1.0
+
+    def back_off(self) -> None:
+        """A time-out has passed: wait twice as long the next time."""
+        self._backoff *= 2.0
+
+
+class Feedback:
+    """What was sent and is not known to have arrived.
+
+    Attributes:
+        round_trips: What they were like.
+        lost: How many are taken for lost.
+        samples: Round trips since somebody emptied the list [s].
+    """
+
+    def __init__(self) -> None:
+        self.round_trips, self.lost = RoundTrips(), 0
+        self._pending: dict[int, float] = {}  # in order of sending
+        self._passed_by: dict[int, int] = {}
+        self._heard = 0.0
+        self.samples: list[float] = []
+
+    @property
+    def deadline(self) -> float:
+        """When all that is pending is given up, unless something is heard [s]."""
+        if not self._pending:
+            return math.inf
+        oldest = next(iter(self._pending.values()))
+        return max(oldest, self._heard) + self.round_trips.timeout
+
+    def sent(self, now: float, number: int) -> None:
+        """Datagram `number` was sent at `now` [s]."""
+        self._pending[number] = now
+
+    def acknowledged(self, now: float, echoes: Sequence[Echo]) -> list[int]:
+        """An acknowledgement has come.
+
+        Args:
+            now: [s]
+            echoes: Numbers of datagrams, oldest first, each with how long the other side had it
+                before it answered [s].
+
+        Returns:
+            Datagrams that are lost, as this one shows.
+        """
+        gone: list[int] = []
+        for number, held in echoes:
+            sent = self._pending.pop(number, None)
+            if sent is not None:
+                self._heard = now
+                self.samples.append(now - sent - held)
+                self.round_trips.add(self.samples[-1])
+                gone += self._passed(number)
+        return gone
+
+    def _passed(self, number: int) -> list[int]:
+        """A later datagram than some was acknowledged: those that this shows to be lost."""
+        earlier = [n for n in self._pending if n < number]
+        for n in earlier:
+            self._passed_by[n] = self._passed_by.get(n, 0) + 1
+        return self._drop(n for n in earlier if self._passed_by[n] >= REORDERED)
+
+    def give_up(self) -> list[int]:
+        """The time-out has passed: everything pending is lost."""
+        self.round_trips.back_off()
+        return self._drop(self._pending)
+
+    def _drop(self, numbers: Iterable[int]) -> list[int]:
+        gone = list(numbers)
+        for number in gone:
+            del self._pending[number]
+            self._passed_by.pop(number, None)
+        self.lost += len(gone)
+        return gone
