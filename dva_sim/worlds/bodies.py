@@ -29,7 +29,6 @@ from collections import deque
 from typing import Final, Generic, NamedTuple, TypeVar
 
 import pymunk
-from pymunk._chipmunk_cffi import lib
 
 from dva_sim.kernel.makers import maker
 from dva_sim.worlds.drives import DriveSpec
@@ -103,13 +102,6 @@ WALL, ROBOT, PERSON = 1, 2, 3  # collision types
 
 T = TypeVar("T")
 
-# Straight to the functions behind pymunk's properties, for the hot loop: half the cost.
-get_velocity, get_position = lib.cpBodyGetVelocity, lib.cpBodyGetPosition
-get_spin, get_angle = lib.cpBodyGetAngularVelocity, lib.cpBodyGetAngle
-set_velocity, set_spin = lib.cpBodySetVelocity, lib.cpBodySetAngularVelocity
-set_force, set_torque = lib.cpBodySetForce, lib.cpBodySetTorque
-step_space = lib.cpSpaceStep
-
 
 class AskedFor(Generic[T]):
     """What is asked of a body: what holds now, and what will from later ticks on.
@@ -163,7 +155,6 @@ class Ticks:
 
     def __init__(self, dt: float) -> None:
         self.dt, self.space = dt, pymunk.Space()
-        self._raw_space, self._have_changed = self.space._space, True
         self._tick_us = round(dt * US)
         self._tick, self._now_us = 0, 0
         self._awake: dict[Body, None] = {}  # a set that keeps its order
@@ -171,10 +162,6 @@ class Ticks:
     def wake(self, body: Body) -> None:
         """A body was asked for something, or was touched: it is pushed from the next tick on."""
         self._awake[body] = None
-
-    def change(self) -> None:
-        """Shapes or bodies have come or gone."""
-        self._have_changed = True
 
     def forget(self, body: Body) -> None:
         """A body is not pushed any more."""
@@ -211,18 +198,10 @@ class Ticks:
             while stand:
                 del awake[stand.pop()]
             if awake:
-                self._step(dt)
+                self.space.step(dt)
             self._tick = tick = tick + 1
         if tick < due:
             self._tick = due
-
-    def _step(self, dt: float) -> None:
-        """Let the library step: without its care for what callbacks add or remove, as none do."""
-        if self._have_changed:
-            self.space.step(dt)
-            self._have_changed = False
-        else:
-            step_space(self._raw_space, dt)
 
 
 class Body:
@@ -239,24 +218,23 @@ class Body:
 
     def __init__(self, world: Ticks, name: str, body: pymunk.Body, shape: pymunk.Shape) -> None:
         self.name, self._world, self.body, self.shape = name, world, body, shape
-        self._raw = body._body  # what the functions of the library take
         self.radius, self.impulse = 0.0, 0.0
         self._touch = Contacts()
 
     @property
     def x(self) -> float:
         """Position [m]."""
-        return float(get_position(self._raw).x)
+        return self.body.position.x
 
     @property
     def y(self) -> float:
         """Position [m]."""
-        return float(get_position(self._raw).y)
+        return self.body.position.y
 
     @property
     def velocity(self) -> tuple[float, float]:
         """Along x and y [m/s]."""
-        velocity = get_velocity(self._raw)
+        velocity = self.body.velocity
         return velocity.x, velocity.y
 
     @property
@@ -411,18 +389,18 @@ class RobotBody(Body):
     @property
     def speed(self) -> float:
         """Measured speed along the heading [m/s]."""
-        velocity, angle = get_velocity(self._raw), get_angle(self._raw)
-        return float(velocity.x * math.cos(angle) + velocity.y * math.sin(angle))
+        velocity, angle = self.body.velocity, self.body.angle
+        return velocity.x * math.cos(angle) + velocity.y * math.sin(angle)
 
     @property
     def turn_rate(self) -> float:
         """Measured turn rate [rad/s]."""
-        return float(get_spin(self._raw))
+        return self.body.angular_velocity
 
     def pose(self) -> Pose:
         """Where it is, as of the last whole tick; the heading counts full turns."""
-        place = get_position(self._raw)
-        return make_pose(place.x, place.y, get_angle(self._raw))
+        place = self.body.position
+        return make_pose(place.x, place.y, self.body.angle)
 
     @property
     def grip(self) -> float:
@@ -481,20 +459,20 @@ class RobotBody(Body):
         locks them until it is asked to move; and so does who still moves when its brakes should
         have stopped it, as somebody pushes.
         """
-        raw = self._raw
+        body = self.body
         wanted, wanted_spin, end = self._asked.at(tick)
         if tick >= end or not self._powered:
             wanted = wanted_spin = 0.0
-        velocity, spin = get_velocity(raw), get_spin(raw)
+        velocity, spin = body.velocity, body.angular_velocity
         vx, vy = velocity.x, velocity.y
         # Bodies are moved before forces act on them: aim along the heading by then.
-        angle = get_angle(raw) + spin * dt
+        angle = body.angle + spin * dt
         cos, sin = math.cos(angle), math.sin(angle)
         forward, sideways = vx * cos + vy * sin, vy * cos - vx * sin
         if wanted == wanted_spin == 0.0:
             if abs(forward) + abs(sideways) + abs(spin) < AT_REST:
-                set_velocity(raw, (0.0, 0.0))
-                set_spin(raw, 0.0)
+                body.velocity = (0.0, 0.0)
+                body.angular_velocity = 0.0
                 if not self._lock.closed:
                     self._lock.close(self._grip)
                 return bool(self._asked.coming)
@@ -516,8 +494,8 @@ class RobotBody(Body):
         torque, most_torque = self._moment * turn, self._mass * most * self._arm
         if not -most_torque <= torque <= most_torque:
             torque = math.copysign(most_torque, torque)
-        set_force(raw, (along * cos - across * sin, along * sin + across * cos))
-        set_torque(raw, torque)
+        body.force = (along * cos - across * sin, along * sin + across * cos)
+        body.torque = torque
         self.distance += abs(forward) * dt
         power = along * (forward + 0.5 * dt * along / self._mass)  # with the mean of the tick
         spinning = torque * (spin + 0.5 * dt * torque / self._moment)

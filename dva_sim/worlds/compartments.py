@@ -149,7 +149,7 @@ def of_floor(grid: OccupancyGrid, floor: NDArray[np.bool_]) -> FloorPartition:
 
 def _pieces(floor: NDArray[np.bool_], resolution: float) -> Labels:
     """Connected parts of the floor within each block of a lattice."""
-    from dva_sim.worlds.scipy_parts import label  # late: start-up
+    from scipy.ndimage import label  # late: start-up
 
     labels = np.full(floor.shape, NOWHERE, np.int16)
     found = 0

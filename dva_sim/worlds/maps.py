@@ -91,7 +91,7 @@ class OccupancyGrid:
         Outside of the grid counts as not free. Measured to the near edge of that cell,
         exactly so along the axes.
         """
-        from dva_sim.worlds.scipy_parts import distance_transform_edt  # late: start-up
+        from scipy.ndimage import distance_transform_edt  # late: start-up
 
         free = np.pad(self.cells == FREE, 1)
         distance = distance_transform_edt(free)[1:-1, 1:-1] - 0.5
@@ -104,7 +104,7 @@ class OccupancyGrid:
 
     def reachable(self, clearance: float) -> NDArray[np.bool_]:
         """The largest connected part of the cells with at least `clearance` [m] of room."""
-        from dva_sim.worlds.scipy_parts import label  # late: start-up
+        from scipy.ndimage import label  # late: start-up
 
         labels, count = label((self.clearance >= clearance) & (self.cells == FREE))
         if not count:
@@ -116,7 +116,7 @@ class OccupancyGrid:
 
     def floor(self, clearance: float) -> NDArray[np.bool_]:
         """The connected free cells around `reachable`, up to the walls."""
-        from dva_sim.worlds.scipy_parts import label  # late: start-up
+        from scipy.ndimage import label  # late: start-up
 
         labels, _ = label(self.cells == FREE)
         rows, columns = np.nonzero(self.reachable(clearance))

@@ -28,8 +28,6 @@ from dva_sim.worlds.bodies import (
     Contacts,
     RobotBody,
     Ticks,
-    set_force,
-    set_velocity,
 )
 from dva_sim.worlds.drives import DriveSpec
 from dva_sim.worlds.geo import Pose
@@ -85,12 +83,12 @@ class PersonBody(Body):
         wx, wy = self._asked.at(tick)
         vx, vy = self.velocity
         if wx == wy == 0.0 and abs(vx) + abs(vy) < AT_REST:
-            set_velocity(self._raw, (0.0, 0.0))
+            self.body.velocity = (0.0, 0.0)
             return bool(self._asked.coming)
         ax, ay = (wx - vx) / RELAXATION, (wy - vy) / RELAXATION
         asked = math.hypot(ax, ay)
         share = MASS * min(1.0, MOST_PUSH / asked) if asked > 0.0 else 0.0
-        set_force(self._raw, (ax * share, ay * share))
+        self.body.force = (ax * share, ay * share)
         return True
 
     def counts(self, other: Body | None) -> tuple[Contacts, ...]:
@@ -178,7 +176,6 @@ class World(Ticks):
         self.people.remove(person)
         self.forget(person)
         self.space.remove(person.body, person.shape)
-        self.change()
         del self._by_shape[person.shape]
 
     def _check_place(self, kind: str, name: str, pose: Pose, radius: float) -> None:
@@ -197,7 +194,6 @@ class World(Ticks):
     def _add(self, body: Body) -> None:
         body.shape.filter = pymunk.ShapeFilter(categories=_MOVING)
         self.space.add(body.body, body.shape)
-        self.change()
         self._by_shape[body.shape] = body
 
     def neighbours(self, x: float, y: float, within: float) -> list[tuple[Body, float]]:

@@ -152,7 +152,7 @@ class Roadmap:
 
     def _connect(self) -> Any:
         """Eight neighbours, where their free discs overlap: then nothing is between them."""
-        from dva_sim.worlds.scipy_parts import csr_array  # late: start-up
+        from scipy.sparse import csr_array  # late: start-up
 
         number = np.arange(self._room.size).reshape(self._room.shape)
         free = self._room >= self._clearance
@@ -195,7 +195,7 @@ class Roadmap:
 
     def _field(self, goal: int) -> tuple[Floats, NDArray[np.int32]]:
         """Cost from every node to `goal`, and each node's next one on the way there."""
-        from dva_sim.worlds.scipy_parts import dijkstra  # late: start-up
+        from scipy.sparse.csgraph import dijkstra  # late: start-up
 
         costs, towards = dijkstra(self._graph, indices=goal, return_predecessors=True)
         return costs, towards
@@ -272,7 +272,7 @@ def _both_ways(graph: Any) -> Any:
     node keep the order in which an undirected search looks at them, which decides between ways
     of the same cost: those that are given before those that are turned around.
     """
-    from dva_sim.worlds.scipy_parts import csr_array  # late: start-up
+    from scipy.sparse import csr_array  # late: start-up
 
     back = graph.T.tocsr()
     sizes = np.diff(graph.indptr), np.diff(back.indptr)
