@@ -6,8 +6,7 @@ A call makes the one command that it names: to make all of them takes as long as
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import typer
@@ -31,39 +30,6 @@ def name_of(param: Any) -> str:
     return str(max(param.opts, key=len))
 
 
-class _PlainValue:
-    """Makes a value of what was typed for an option: words, paths, or what its parser makes.
-
-    Typer would load pydantic for that, which is half of what the quickest commands cost.
-
-    Args:
-        make: Makes one value of one word, or of a value that is one already.
-    """
-
-    def __init__(self, make: Callable[[Any], Any]) -> None:
-        self._make = make
-
-    def coerce(self, value: Any, param: Any, ctx: Any) -> Any:
-        """The value of an option, a tuple or list of such if it may be given again."""
-        if param.multiple or param.nargs == -1:
-            return [self._make(each) for each in value or ()]
-        return None if value is None else self._make(value)
-
-
-def _read_plainly(params: Sequence[Any]) -> None:
-    """Spare pydantic where a type needs none; what Typer knows of others stays as it is."""
-    for param in params:
-        told = getattr(param, "type_descriptor", None)  # of the Typers that use pydantic
-        if told is not None:
-            kinds = {str: str, list[str]: str, bool: bool, Path: Path}
-            make = told.parameter_info.parser or kinds.get(told.annotation)
-            param._runtime_param = None if make is None else _PlainValue(make)
-
-
-HELP = {"help_option_names": ["-h", "--help"]}
-_EXAMPLES = "\nExamples:\n"
-
-
 class CommandWithExamples(TyperCommand):
     """A command whose docstring ends in examples, each `call  # what it does`.
 
@@ -79,11 +45,6 @@ class CommandWithExamples(TyperCommand):
             for call, _, told in (line.partition("  # ") for line in examples.splitlines())
             if call.strip()
         ]
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As ever, without pydantic."""
-        _read_plainly(self.get_params(ctx))
-        return super().parse_args(ctx, args)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Options, then what has to be given, and in brackets what may be."""
@@ -132,11 +93,6 @@ class PanelGroup(TyperGroup):
             if cmd_name in commands:
                 self.add_command(_made(cmd_name, commands[cmd_name]), cmd_name)
         return super().get_command(ctx, cmd_name)
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As ever, without pydantic."""
-        _read_plainly(self.get_params(ctx))
-        return super().parse_args(ctx, args)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """As ever; of a command that there is not, the nearest is named."""

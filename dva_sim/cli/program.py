@@ -21,9 +21,6 @@ from dva_sim.kernel import early_stop
 from dva_sim.kernel.errors import DvaSimError, ExitCode, error_line
 from dva_sim.kernel.suggestions import hint
 
-UsageError: type[Exception] = typer.BadParameter.__mro__[1]
-"""What the parser of the command line raises, whichever library it is from."""
-
 
 def in_a_line(error: Any) -> str:
     """What is wrong with a call, and what would be right."""
@@ -168,7 +165,7 @@ def call(words: Sequence[str] | None = None) -> int:
         return ExitCode.READER_GONE
     except DvaSimError as error:
         return _told(error, error.exit_code)
-    except UsageError as error:
+    except typer.TyperException as error:
         return _told_of_words(error)
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
@@ -189,6 +186,4 @@ def _told(problem: object, code: int) -> int:
 
 def main() -> NoReturn:
     """Do what the command line says, and end the process."""
-    import dva_sim.kernel.rare_collection  # noqa: F401  # late: start-up
-
     sys.exit(call())
