@@ -15,14 +15,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, suppress
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from dva_sim.kernel.errors import ConfigError, DvaSimError, RunsFailed
+from dva_sim.kernel.rare_collection import collect_rarely
 
 P = ParamSpec("P")
 R = TypeVar("R")
-_FIRST = "dva_sim.kernel.rare_collection"  # loaded by name: only workers shall be changed by it
 _FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
@@ -121,10 +122,11 @@ class LocalProcesses(Workers):
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
         """A pool whose processes are gone when the block ends, at once if it ends in an error."""
         context = multiprocessing.get_context(_FAMILY)
-        context.set_forkserver_preload([_FIRST, task.__module__])
+        self._others = set(multiprocessing.active_children())
+        context.set_forkserver_preload([task.__module__])
         kind = ProcessPoolExecutor if task.__module__ == "__main__" else _WithoutScript
         try:
-            pool = self._pool = kind(min(width, self.width), context, initializer=_begin)
+            pool = kind(min(width, self.width), context, initializer=_begin)
         except OSError as error:  # its locks lie there
             raise DvaSimError(
                 f"processes cannot share locks: {error.strerror}; is /dev/shm there and writable? "
@@ -139,8 +141,12 @@ class LocalProcesses(Workers):
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)
 
+    def _processes(self) -> set[BaseProcess]:
+        """Processes that were started since the pool was made."""
+        return set(multiprocessing.active_children()) - self._others
+
     def _kill(self) -> None:
-        for process in list((self._pool._processes or {}).values()):
+        for process in self._processes():
             process.kill()
 
     def look_after(self, is_idle: bool) -> None:
@@ -150,8 +156,8 @@ class LocalProcesses(Workers):
             KeyboardInterrupt: Ctrl-C was pressed.
         """
         self._let_through()
-        pids = set(self._pool._processes or {})
-        stopped = {pid for pid in pids if is_idle and _is_stopped(pid)}
+        pids = {process.pid for process in self._processes()} if is_idle else set()
+        stopped = {pid for pid in pids if pid is not None and _is_stopped(pid)}
         for pid in stopped & self._stopped:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
@@ -217,6 +223,7 @@ def _is_stopped(pid: int) -> bool:
 
 def _begin() -> None:
     """Leave Ctrl-C to the parent, and end with it however it ends."""
+    collect_rarely()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
