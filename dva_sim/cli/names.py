@@ -1,120 +1,33 @@
 """All that can be named: files that users edit, and classes that they may add to the program.
 
-`dva-sim list` and `dva-sim plugins` print it, for people or as JSON. To list names nothing is
-loaded: what registries ship is read from their source. A registry is a
-`Plugins(kind, base, shipped, group=..., hidden=...)`, and what it ships is a dictionary of names
-and classes, or made from a tuple of classes that say their names themselves.
+`dva-sim list` and `dva-sim plugins` print it, for people or as JSON. Only the modules of the kinds
+that are listed are loaded.
 """
 
 from __future__ import annotations
 
-import ast
+import inspect
 import re
 import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
-import dva_sim
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import hint
 from dva_sim.kernel.yaml_files import parse_scalar
-from dva_sim.testing.promises import TRIALS, plural
+from dva_sim.testing.promises import TRIALS, CheckedKind
 
 if TYPE_CHECKING:
     from dva_sim.kernel.plugins import Plugins
 
 
-class ShippedNames(NamedTuple):
-    """A kind of plug-ins.
-
-    Attributes:
-        several: What several of its kind are called.
-        group: Entry points of installed packages.
-        shipped: Names that a configuration can use, with the docstring of each class.
-    """
-
-    several: str
-    group: str
-    shipped: dict[str, str]
-
-
-def registry(place: str) -> ShippedNames:
-    """The registry at `module:NAME`."""
-    module, _, name = place.partition(":")
-    module, call = _found(module, ast.Name(name))
-    given = {keyword.arg: keyword.value for keyword in call.keywords}
-    given |= dict(zip(("kind", "base", "shipped"), call.args, strict=False))
-    hidden = ast.literal_eval(given["hidden"].args[0]) if "hidden" in given else ()
-    shipped = {
-        name: ast.get_docstring(kind) or ""
-        for name, kind in _classes(*_found(module, given["shipped"]))
-        if name not in hidden
-    }
-    return ShippedNames(plural(given["kind"].value), given["group"].value, shipped)
-
-
-def _classes(module: str, shipped: Any) -> Iterator[tuple[str, ast.ClassDef]]:
-    """The names of a dictionary, and what defines the class of each."""
-    if isinstance(shipped, ast.Dict):
-        for name, kind in zip(shipped.keys, shipped.values, strict=True):
-            yield ast.literal_eval(name or ast.Constant("")), _found(module, kind)[1]
-        return
-    for kind in _found(module, shipped.generators[0].iter)[1].elts:
-        origin, found = _found(module, kind)
-        yield _found(origin, ast.Name(shipped.key.attr), found.body)[1].value, found
-
-
-def _found(module: str, what: Any, body: list[ast.stmt] | None = None) -> tuple[str, Any]:
-    """What is meant by an expression in a module, or in a part of it, and the module it is from."""
-    if isinstance(what, ast.Attribute):
-        package, imported = _found(module, what.value)
-        return _found(f"{package}.{imported}", ast.Name(what.attr))
-    if not isinstance(what, ast.Name):
-        return module, what
-    for node in _statements(module, what.id) if body is None else body:
-        match node:
-            case ast.ClassDef(name=what.id):
-                return module, node
-            case (
-                ast.Assign(targets=[ast.Name(id=what.id)])
-                | ast.AnnAssign(target=ast.Name(id=what.id))
-            ):
-                return _found(module, node.value)
-            case ast.ImportFrom(module=str(origin)) if what.id in {a.name for a in node.names}:
-                return _found(origin, what) if _file(origin, what.id) is None else (origin, what.id)
-    raise LookupError(f"{module} has no {what.id}")
-
-
-def _file(module: str, name: str = "") -> Path | None:
-    """The source of a module, or of one in a package; None if it is none."""
-    path = Path(dva_sim.__file__).parent.joinpath(*module.split(".")[1:], name)
-    return next((p for p in (path / "__init__.py", path.with_suffix(".py")) if p.is_file()), None)
-
-
-def _statements(module: str, name: str) -> Iterator[ast.stmt]:
-    """The statements of a module that may bind a name; to parse all of it takes much longer."""
-    binds = re.compile(rf"(class )?{name}\b|from dva_sim\b.*\b{name}\b", re.DOTALL)
-    return (ast.parse(text).body[0] for text in _texts(module) if binds.match(text))
-
-
-@cache
-def _texts(module: str) -> list[str]:
-    """The statements of a module as text: each begins at a line's first column."""
-    file = _file(module)
-    assert file is not None, module
-    return re.split(r"\n(?=[A-Za-z_@])", file.read_text(encoding="utf-8"))
-
-
 def kinds_of_plugins() -> dict[str, tuple[str, Plugins[Any]]]:
     """Kinds of plug-ins by what several are called, each with the word for trying one."""
-    loaded = [(word, trial.load_plugins()) for word, trial in TRIALS.items()]
-    return {plural(plugins.kind): (word, plugins) for word, plugins in loaded}
+    return {trial.classes: (word, trial.load_plugins()) for word, trial in TRIALS.items()}
 
 
 def plugins_as_json() -> dict[str, Any]:
@@ -208,13 +121,7 @@ class NamedThing:
 
 def kinds() -> list[str]:
     """What can be listed, in the order in which it is."""
-    return [*FILES, *_registries()]
-
-
-def _registries() -> dict[str, ShippedNames]:
-    """Kinds of plug-ins by what several are called."""
-    found = (registry(f"dva_sim.{trial.room}:PLUGINS") for trial in TRIALS.values())
-    return {each.several: each for each in found}
+    return [*FILES, *(trial.classes for trial in TRIALS.values())]
 
 
 def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
@@ -227,7 +134,7 @@ def everything(kind: str | None = None) -> dict[str, list[NamedThing]]:
         ConfigError: there is no such kind.
     """
     makers: dict[str, Any] = {name: _files(name, folder) for name, folder in FILES.items()}
-    makers |= {several: _plugins_of(there) for several, there in _registries().items()}
+    makers |= {trial.classes: _plugins_of(trial) for trial in TRIALS.values()}
     if kind is not None and kind not in makers:
         raise ConfigError(f"there is no list of {kind!r}; {hint(kind, makers, 'there are')}")
     return {name: list(made) for name, made in makers.items() if kind in (None, name)}
@@ -270,17 +177,15 @@ def _described(path: Path) -> str:
     return _first(" ".join(str(next(iter(found.values()), "")).split())) if found else ""
 
 
-def _plugins_of(there: ShippedNames) -> Iterator[NamedThing]:
-    told = {entry.name: f"of {entry.value}" for entry in _installed().select(group=there.group)}
-    for name, text in there.shipped.items():
-        told[name] = _first(" ".join(text.partition("\n\n")[0].split())) or told.get(name, "")
-    return (NamedThing(name, description) for name, description in sorted(told.items()))
-
-
-@cache
-def _installed() -> Any:
-    """What all installed packages offer: asked for once, as each question reads all of them."""
-    return entry_points()
+def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
+    """Shipped and installed classes; an installed one is loaded only when it is used."""
+    plugins = trial.load_plugins()
+    told = {entry.name: f"of {entry.value}" for entry in plugins.installed()}
+    for name in plugins.shipped.keys() - plugins.hidden:
+        summary = (inspect.getdoc(plugins.shipped[name]) or "").partition("\n\n")[0]
+        told[name] = _first(" ".join(summary.split())) or told.get(name, "")
+    for name, description in sorted(told.items()):
+        yield NamedThing(name, description)
 
 
 def _first(text: str) -> str:

@@ -121,6 +121,7 @@ class CheckedKind:
         module: The one here whose `check_KIND` tries one.
         told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
         folder: Of the files that are named, where it is not the class itself that is.
+        class_word: The word for a class of it, where that is another.
     """
 
     kind: str
@@ -128,6 +129,12 @@ class CheckedKind:
     module: str
     told: str
     folder: str = ""
+    class_word: str = ""
+
+    @property
+    def classes(self) -> str:
+        """What several classes of it are called."""
+        return plural(self.class_word or self.kind)
 
     @property
     def many(self) -> str:
@@ -176,6 +183,9 @@ TRIALS: Final[dict[str, CheckedKind]] = {
         ("measure", "simulation.run_measures", "measures", "{tries} answers, slowest {ms:.1f} ms"),
         ("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
         ("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),
-        ("robot", "worlds.drives", "robots", f"{{tries}} drives, {_US} a tick", "agents/robots"),
+        (
+            *("robot", "worlds.drives", "robots", f"{{tries}} drives, {_US} a tick"),
+            *("agents/robots", "drive"),
+        ),
     )
 }

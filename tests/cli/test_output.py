@@ -15,6 +15,7 @@ from dva_sim.cli import call, names
 from dva_sim.experiments.execution.dry_run import _Tried
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.kernel.errors import ExitCode
+from dva_sim.testing.promises import plural
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +66,9 @@ def test_a_terminal_cuts_what_it_has_no_room_for_and_a_pipe_does_not(monkeypatch
     assert capsys.readouterr().out == "x" * 37 + "...\n" + "y" * 40 + "\n"
 
 
-def test_what_is_listed_of_plugins_is_what_is_there_though_nothing_is_loaded():
+def test_what_is_listed_of_plugins_is_what_is_there():
     for several, (_, plugins) in names.kinds_of_plugins().items():
+        assert several == plural(plugins.kind)
         listed = {entry.name: entry.description for entry in names.everything(several)[several]}
         assert list(listed) == plugins.known()
         for name, kind in plugins.shipped.items():
