@@ -1,7 +1,7 @@
 """What the command line does, for programs and notebooks: `import dva_sim; dva_sim.run(...)`.
 
-Options are declared here, once: name, type, default and words. A command takes those of the
-function of its name, and shows the first sentence of the words; what follows is for programs. The
+A command takes the parameters of the function of its name with their defaults; how they look on a
+command line stands in `cli/options.py`, whose help is the first sentence of the words here. The
 results are the same bytes. Only `show` prints, so nothing is quiet, verbose or JSON, and
 `--dry-run` is a function; mistakes are `DvaSimError`. A script needs no
 `if __name__ == "__main__"` around it.

@@ -1,8 +1,8 @@
-"""Options of commands: those of a function of `dva_sim`, and others that several commands have.
+"""Options of commands: names, placeholders, ranges, completion and help.
 
-A function declares name, type, default and words of an option, once. `FORMS` is what only a command
-line has of it: short name, placeholder, range and completion. Numbers are read here too, so that a
-wrong one is told with what would be right. Nothing heavy is imported: every command begins here.
+A command that stands for a function of `dva_sim` takes its parameters with their defaults
+(`takes`), each in the form of its entry in `OPTIONS`. Numbers are read here too, so that a wrong
+one is told with what would be right. Nothing heavy is imported: every command begins here.
 """
 
 from __future__ import annotations
@@ -11,14 +11,11 @@ import inspect
 import math
 import re
 from collections.abc import Callable, Sequence
-from functools import cache
 from inspect import Parameter
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar
 
 import typer
 from typer import Argument, Option
-
-from dva_sim import api
 
 Completer = Callable[[str], list[str]]
 
@@ -83,100 +80,29 @@ def _within(least: int, most: int) -> str:
 
 
 MOST_JOBS = 1024
-
-# By the name in a function. Units are placeholders here, so that `limit_s` is `--limit SECONDS`.
-FORMS: dict[str, dict[str, Any]] = {
-    "at": {"metavar": "SECONDS"},
-    "camera": {"metavar": "ROBOT"},
-    "export.out": {"metavar": "PATH"},
-    "figure": {"metavar": "FILE:CLASS"},
-    "first": {"metavar": "A"},
-    "format": {"metavar": "csv|parquet"},
-    "jobs": {"names": ("-j", "--jobs"), "parser": whole(1, MOST_JOBS)},
-    "limit_s": {"names": ("--limit",), "metavar": "SECONDS"},
-    "mcap": {"metavar": "FILE"},
-    "out": {"names": ("-o", "--out"), "metavar": "FOLDER"},
-    "panels": {"parser": whole(1, 24)},
-    "pilot": {"metavar": "PERSONS", "parser": whole(1)},
-    "ros2": {"metavar": "FOLDER"},
-    "rows": {"parser": whole(1)},
-    "scenario": {"autocompletion": SCENARIOS},
-    "scheduler": {"metavar": "tcp://HOST:PORT"},
-    "second": {"metavar": "B"},
-    "set": {"metavar": "KEY=VALUE"},
-    "side_by_side": {"metavar": "PATTERN,PATTERN"},
-    "study": {"autocompletion": STUDIES},
-}
-# All else is as its type has it, by the first of these words in that.
-_USUAL: dict[str, tuple[Any, dict[str, Any]]] = {
-    "several": (list[str], {"metavar": "NAME"}),
-    "bool": (bool, {}),
-    "Path": (str, {"metavar": "FILE"}),
-    "str": (str, {"metavar": "NAME"}),
-    "int": (int, {"metavar": "N", "parser": whole()}),
-    "float": (float, {"metavar": "NUMBER", "parser": number()}),
-}
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-def takes(function: Callable[..., Any], but: Sequence[str] = ()) -> Callable[[Command], Command]:
-    """A command that takes what a function takes, by the same names, and what it adds itself.
-
-    It has parameters for what it looks at, and hands over all else that it is given.
-
-    Args:
-        function: One of `dva_sim`.
-        but: What only programs have.
-    """
-
-    def declare(command: Command) -> Command:
-        there = inspect.signature(function).parameters.items()
-        taken = {name: _as_option(function, p) for name, p in there if name not in but}
-        own = inspect.signature(command, eval_str=True).parameters.values()
-        added = [p for p in own if p.name not in taken and p.kind is not Parameter.VAR_KEYWORD]
-        every = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*taken.values(), *added)]
-        declared: Any = command
-        declared.__signature__ = inspect.Signature(every)
-        return command
-
-    return declare
+def argument(help: str, metavar: str, completer: Completer | None = None) -> Any:
+    """What has to be given, by its place."""
+    return Annotated[str, Argument(metavar=metavar, autocompletion=completer, help=help)]
 
 
-def option_of(function: Callable[..., Any], name: str) -> Any:
-    """An option as the command of a function has it, for a command that has no function."""
-    parameter = inspect.signature(function).parameters[name]
-    return get_args(_as_option(function, parameter).annotation)[1]
+def text(help: str, *names: str, metavar: str = "NAME") -> Any:
+    """An option that takes some text, such as the path of a file."""
+    return Annotated[str | None, Option(*names, metavar=metavar, help=help)]
 
 
-def _as_option(function: Callable[..., Any], parameter: Parameter) -> Parameter:
-    """A parameter with type, form and words of an option, or of an argument if it has to be given.
-
-    Its annotation is read as text, since what that names is imported later, if at all.
-    """
-    name, default, several = parameter.name, parameter.default, parameter.default == ()
-    form = FORMS.get(name, {}) | FORMS.get(f"{function.__name__}.{name}", {})
-    words = _words(function).get(name, "")
-    if default is Parameter.empty and "names" not in form:
-        place = Argument(**{"metavar": name.upper()} | form, help=words)
-        return parameter.replace(annotation=Annotated[str, place])
-    told = ["several"] if several else re.findall(r"\w+", str(parameter.annotation))
-    kind, usual = next(_USUAL[word] for word in _USUAL if word in told)
-    asked = {"names": (f"--{name.replace('_', '-')}",), "help": words} | usual | form
-    if several:
-        asked["help"] = f"{words.removesuffix('.')}; may be given again."
-    option = Option(*asked.pop("names"), **asked)
-    return parameter.replace(annotation=Annotated[kind | None if default is None else kind, option])
+def several(help: str, metavar: str = "NAME") -> Any:
+    """An option that takes some text, and may be given again."""
+    return Annotated[list[str], Option(metavar=metavar, help=help)]
 
 
-@cache
-def _words(function: Callable[..., Any]) -> dict[str, str]:
-    """Of each argument the first sentence that the docstring says of it."""
-    text = inspect.getdoc(function) or ""
-    told = re.findall(r"^    (\w+): (.+(?:\n {8}.+)*)", text, re.MULTILINE)
-    return {name: re.split(r"(?<=\.)\s+(?=[A-Z])", some)[0].replace("`", "") for name, some in told}
+def flag(name: str, help: str) -> Any:
+    """An option without a value, which cannot be switched off again."""
+    return Annotated[bool, Option(name, help=help)]
 
 
-# --- of commands that no function stands behind, and what only a terminal has ---------------
 def count(help: str, *names: str, metavar: str = "N", least: int = 0, most: int = MOST_SEED) -> Any:
     """An option that takes a whole number."""
     return Option(*names, metavar=metavar, parser=whole(least, most), help=help)
@@ -197,18 +123,120 @@ def folder(help: str) -> Any:
     return Option(metavar="FOLDER", help=help)
 
 
-Jobs = Annotated[int | None, option_of(api.run, "jobs")]
-RunSeed = Annotated[int, option_of(api.episode, "seed")]
-ScenarioName = Annotated[str, option_of(api.episode, "scenario")]
-Sets = Annotated[list[str] | None, option_of(api.episode, "set")]
-
-Overwrite = Annotated[bool, option_of(api.episode, "overwrite")]
+Jobs = Annotated[
+    int | None,
+    count(
+        "How many processes; default: one for each core.", "-j", "--jobs", least=1, most=MOST_JOBS
+    ),
+]
+RunSeed = Annotated[int, count("The run's random seed.")]
+ScenarioName = Annotated[
+    str,
+    Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path."),
+]
+Sets = Annotated[
+    list[str] | None,
+    Option("--set", metavar="KEY=VALUE", help="Change a key; may be given again."),
+]
+Overwrite = Annotated[bool, Option("--overwrite", help="Replace what is there.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
-
 
 Host = Annotated[str, Option(metavar="HOST", help="Address of this machine to listen on.")]
 Port = Annotated[int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)]
 NoOpen = Annotated[bool, Option("--no-open", help="Open no browser.")]
 NoToken = Annotated[bool, Option("--no-token", help="Let everybody in who reaches the page.")]
+
+OPTIONS: dict[str, Any] = {
+    "again": flag("--again", "In place of an earlier registration; the report will say so."),
+    "at": text("Moment of the still, or moments of the strip: 10,20,30.", metavar="SECONDS"),
+    "camera": text("The still shows what this robot's camera sees.", metavar="ROBOT"),
+    "columns": flag("--columns", "Say what the columns mean, of one table or all."),
+    "figure": several("With a figure of one's own; may be given again.", metavar="FILE:CLASS"),
+    "file": argument("A recording: .mcap, or .mcap.part as a run that was killed left it.", "FILE"),
+    "first": argument("A results folder.", "A"),
+    "folder": argument("A results folder.", "FOLDER"),
+    "format": text("In a folder; default: csv.", metavar="csv|parquet"),
+    "full": flag("--full", "The study's larger version."),
+    "inset": flag("--inset", "Show in the film what a robot's camera sees."),
+    "jobs": Jobs,
+    "limit_s": Annotated[
+        float,
+        Option(
+            "--limit",
+            metavar="SECONDS",
+            parser=number(),
+            help="A run that takes longer has failed.",
+        ),
+    ],
+    "mcap": text("Write a whole recording of an .mcap.part; the file is new.", metavar="FILE"),
+    "name": argument("Name or path of the new study.", "NAME"),
+    "overwrite": Overwrite,
+    "panels": Annotated[int, count("How many moments a strip has.", least=1, most=24)],
+    "pdf": flag("--pdf", "As PDF too, for print."),
+    "pilot": Annotated[
+        int | None,
+        count("Only so many persons, with a random seed of their own.", metavar="PERSONS", least=1),
+    ],
+    "quick": flag("--quick", "The study's small version."),
+    "record": text("Keep the run as a file: .mcap, for replay and viewers.", metavar="FILE"),
+    "ros2": text("Write a ROS 2 bag; the folder is new.", metavar="FOLDER"),
+    "rows": Annotated[int, count("How many of them.", least=1)],
+    "scenario": ScenarioName,
+    "scheduler": text("Use a dask.distributed cluster instead.", metavar="tcp://HOST:PORT"),
+    "second": argument("What is compared with it.", "B"),
+    "seed": RunSeed,
+    "set": Sets,
+    "side_by_side": text("Run the same seed under two patterns.", metavar="PATTERN,PATTERN"),
+    "still": text("Draw one moment: .png, .pdf or .svg.", metavar="FILE"),
+    "strip": text("Draw several moments in one figure, likewise.", metavar="FILE"),
+    "study": argument("A study by name or path.", "STUDY", STUDIES),
+    "table": text("Show the rows of a table."),
+    "video": text("Write a film: .gif or .mp4.", metavar="FILE"),
+    # What is another option in one command.
+    "export.out": Annotated[
+        str,
+        Option(
+            "-o", "--out", metavar="PATH", help="X.csv or X.parquet for one table, or a folder."
+        ),
+    ],
+    "export.table": several("Only this one; may be given again."),
+    "run.out": text("Results folder; default: results/STUDY.", "-o", "--out", metavar="FOLDER"),
+    "run.seed": Annotated[int | None, count("Random seed of the whole study.")],
+    "tune.out": text(
+        "Folder of the trials; default: results/STUDY-tuning.", "-o", "--out", metavar="FOLDER"
+    ),
+}
+"""By the name of the parameter, or by those of function and parameter."""
+
+
+def takes(function: Callable[..., Any], but: Sequence[str] = ()) -> Callable[[Command], Command]:
+    """A command that takes what a function takes, by the same names, and what it adds itself.
+
+    It has parameters for what it looks at, and hands over all else that it is given.
+
+    Args:
+        function: One of `dva_sim`.
+        but: What only programs have.
+    """
+
+    def declare(command: Command) -> Command:
+        there = inspect.signature(function).parameters.items()
+        taken = {
+            name: parameter.replace(annotation=_form(function.__name__, name))
+            for name, parameter in there
+            if name not in but
+        }
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        added = [p for p in own if p.name not in taken and p.kind is not Parameter.VAR_KEYWORD]
+        every = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*taken.values(), *added)]
+        declared: Any = command
+        declared.__signature__ = inspect.Signature(every)
+        return command
+
+    return declare
+
+
+def _form(function: str, name: str) -> Any:
+    return OPTIONS[f"{function}.{name}" if f"{function}.{name}" in OPTIONS else name]

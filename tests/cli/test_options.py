@@ -1,4 +1,4 @@
-"""Options of commands are those of the functions of their names, declared once."""
+"""Options of commands are the parameters of the functions of their names, with their words."""
 
 import inspect
 from functools import partial
@@ -59,33 +59,11 @@ def test_each_option_of_each_command_has_words():
         assert [option.name for option in command.params if not option.help] == []
 
 
-def planted(
-    study: str | Path,
-    *,
-    loud: bool = False,
-    twice_s: int = 2,
-    mark: str | None = None,
-    kept_in: str | Path | None = None,
-    weight: float | None = None,
-    set: Any = (),
-    secret: Any = None,
-) -> None:
-    """Do something.
-
-    Args:
-        study: A study.
-        loud: Loudly, and
-            twice. In a notebook it blinks.
-        twice_s: How often.
-        mark: `X.csv`.
-        kept_in: Where.
-        weight: How much.
-        set: A key. Or several.
-        secret: Is for programs.
-    """
+def planted(study: str | Path, *, full: bool = False, rows: int = 2, secret: Any = None) -> None:
+    """Do something."""
 
 
-def test_a_new_option_of_a_function_is_one_of_its_command(capsys):
+def test_a_command_takes_the_options_of_its_function_and_hands_on_what_it_does_not_look_at(capsys):
     seen = []
 
     @takes(planted, but=("secret",))
@@ -95,17 +73,15 @@ def test_a_new_option_of_a_function_is_one_of_its_command(capsys):
     program = typer.Typer(rich_markup_mode=None, add_completion=False)
     program.command(cls=CommandWithExamples)(command)
     program(["--help"], standalone_mode=False)
-    told = {" ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
-    assert {
-        *("STUDY A study.", "--loud Loudly, and twice."),
-        *("--mark NAME X.csv.", "--kept-in FILE Where.", "--weight NUMBER How much."),
-    } <= told
-    assert unnamed(told, "--twice-s N How", "[default: 2]", "--set KEY=VALUE A key;") == []
-    assert unnamed(told, "again.", "-q, --quiet ") == []
-    assert not any("secret" in line for line in told)
-    words = ["mine", "--loud", "--twice-s", "3", "--weight", "0.5", "--set", "a=1", "--set", "b=2"]
-    program(words, standalone_mode=False)
-    given = {"loud": True, "twice_s": 3, "weight": 0.5, "set": ["a=1", "b=2"]}
-    assert seen == [("mine", False, given | {"mark": None, "kept_in": None})]
-    with pytest.raises(typer.BadParameter, match=r"'-1' .*at least 0"):
-        program(["mine", "--twice-s", "-1"], standalone_mode=False)
+    told = " ".join(capsys.readouterr().out.split())
+    assert unnamed(told, "STUDY", "--full", "--rows N", "[default: 2]", "-q, --quiet ") == []
+    assert "secret" not in told
+    program(["mine", "--full", "--rows", "3"], standalone_mode=False)
+    assert seen == [("mine", False, {"full": True, "rows": 3})]
+    with pytest.raises(typer.BadParameter, match=r"'0' .*at least 1"):
+        program(["mine", "--rows", "0"], standalone_mode=False)
+
+
+def test_a_parameter_without_a_form_is_named_when_the_command_is_defined():
+    with pytest.raises(LookupError, match="secret"):
+        takes(planted)(print)
