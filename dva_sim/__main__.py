@@ -8,11 +8,10 @@ from dva_sim.kernel import early_stop
 def main() -> NoReturn:
     """Entry point: `dva-sim`."""
     early_stop.end_at_once()
-    # Late imports, so that Ctrl-C is heard meanwhile.
-    from dva_sim.kernel.rare_collection import collect_rarely
+    from dva_sim.kernel.rare_collection import collect_rarely  # late: start-up, for Ctrl-C
 
     collect_rarely()
-    from dva_sim.cli import main as program
+    from dva_sim.cli import main as program  # late: start-up, so that Ctrl-C is heard meanwhile
 
     program()
 
