@@ -298,11 +298,12 @@ def report(folder: Folder, *, pdf: bool = False, figure: str | Sequence[str] = (
 
     Args:
         folder: A results folder.
-        pdf: As PDF too, for print.
+        pdf: Print it as PDF too, by Chromium. Or by Chrome; no other browser is looked for.
         figure: With a figure of one's own. Such as `mine.py:Mine`, or several.
 
     Raises:
-        DvaSimError: no results there, no such figure, or a disk that cannot be written.
+        DvaSimError: no results there, no such figure, no browser that prints, or a disk that cannot
+            be written.
     """
     from dva_sim.experiments.report.figures.registry import load_figures  # late: start-up
     from dva_sim.experiments.report.report import write_report  # late: start-up

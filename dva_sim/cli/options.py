@@ -174,7 +174,7 @@ OPTIONS: dict[str, Any] = {
     "name": argument("Name or path of the new study.", "NAME"),
     "overwrite": Overwrite,
     "panels": Annotated[int, count("How many moments a strip has.", least=1, most=24)],
-    "pdf": flag("--pdf", "As PDF too, for print."),
+    "pdf": flag("--pdf", "Print it as PDF too, by Chromium."),
     "pilot": Annotated[
         int | None,
         count("Only so many persons, with a random seed of their own.", metavar="PERSONS", least=1),

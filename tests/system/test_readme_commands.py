@@ -23,6 +23,7 @@ import dva_sim
 from dva_sim.cli import app
 from dva_sim.experiments.execution import dry_run
 from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report.printing import browser
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.simulation.models import Tables
 
@@ -220,6 +221,12 @@ def two_results() -> None:
         run_study(study_in(Path(f"of-{name}")), Path(name), jobs=1, episode=short)
 
 
+def results_and_a_browser() -> None:
+    if browser() is None:
+        pytest.skip("no Chromium")
+    two_results()
+
+
 def a_recording() -> None:
     dva_sim.episode("fire-drill", seed=3, set={"horizon_s": 20}, record="drill.mcap")
 
@@ -297,7 +304,7 @@ EXPECTED = {
         Expected(planned(MAIN), DRY, dear=True)
     ),
     "dva-sim report small --pdf": Expected(
-        written("small/report.html", "small/report.pdf"), given=two_results, dear=True
+        written("small/report.html", "small/report.pdf"), given=results_and_a_browser, dear=True
     ),
     "dva-sim show small": Expected(
         told("Which is quicker?", "latest-wins PUB/SUB", "95 % interval"), given=two_results

@@ -1,7 +1,7 @@
 """The words of a report that not every reader knows, explained where they first stand.
 
-A page links each word, where it is first said, to the list at its foot; paper marks it there with
-a small ring. Only words that a report says are in its list.
+A page links each word, where it is first said, to the list at its foot. Only words that a report
+says are in its list.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from pathlib import Path
 
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.network.patterns import PATTERNS, Pattern, meaning_of
-
-RING = "°"  # marks on paper what the list explains
 
 
 @dataclass(frozen=True)
@@ -86,10 +84,6 @@ class Marker:
             text = text[match.end() :]
         if text:
             yield text, None
-
-    def ringed(self, text: str) -> str:
-        """A text with a ring behind each term that is said for the first time."""
-        return "".join(f"{piece}{RING if term else ''}" for piece, term in self.split(text))
 
     def _first(self, text: str) -> tuple[re.Match[str], Term] | None:
         """The earliest term, and of those at one place the longest."""

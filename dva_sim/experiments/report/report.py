@@ -46,6 +46,7 @@ from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.outcome_table import in_a_line
 from dva_sim.experiments.report.outcome_table import sentences as sentences_of_endings
 from dva_sim.experiments.report.outcome_table import table as endings_table
+from dva_sim.experiments.report.printing import print_page
 from dva_sim.experiments.report.prose import note
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.tuning_table import tuned_table
@@ -331,14 +332,15 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
 
     Args:
         folder: Of the results.
-        pdf: Make `report.pdf` too. One that is there already is made again in any case, so that
-            it never says something else than the page.
+        pdf: Print `report.pdf` too. One that is there already is printed again in any case, so
+            that it never says something else than the page.
         figures: Those of users, of `load_figures`; they come last.
 
     Raises:
         ConfigError: the folder holds no results; or a figure of a user cannot be drawn, and the
             report, which is there, is without it.
-        DvaSimError: the disk is full or refuses to be written.
+        DvaSimError: the disk is full or refuses to be written, or the page is there and no browser
+            prints it.
     """
     reading = Reading(load_so_far(folder))
     drawn, problems = draw_all(reading, figures)
@@ -349,10 +351,8 @@ def write_report(folder: Path, pdf: bool = False, *, figures: Sequence[ReportFig
         _write_figures(folder / FIGURES, drawn)
         write_whole(page, _page(question, blocks))
         if pdf or (folder / PAPER).exists():
-            from dva_sim.experiments.report.pdf import write_pdf  # late: start-up
-
             with whole(folder / PAPER) as part:
-                write_pdf(part, question, blocks)
+                print_page(page, part)
     except OSError as error:
         raise DvaSimError(
             f"the report cannot be written in {folder}: {error.strerror}; "

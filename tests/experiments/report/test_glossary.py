@@ -34,10 +34,6 @@ def test_only_what_is_said_is_listed_in_the_order_of_the_alphabet():
     assert [term.name for term in found] == ["horizon", "phone default", "REQ/REP", "trial"]
 
 
-def test_paper_has_a_ring_where_a_page_has_a_link():
-    assert Marker(TERMS).ringed("phone default, phone default") == "phone default°, phone default"
-
-
 def test_every_term_can_be_said_and_linked():
     assert len({term.key for term in TERMS}) == len(TERMS)
     assert all(not term.means.endswith(".") for term in TERMS)

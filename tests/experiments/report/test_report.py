@@ -153,16 +153,6 @@ def test_figures_of_an_older_report_do_not_stay(failed):
     assert [path.name for path in (failed / "figures").iterdir()] == ["mine.txt"]
 
 
-def test_a_pdf_is_made_when_asked_for_and_kept_up_to_date(failed):
-    assert "No run was completed" in words(write_report(failed))
-    assert not (failed / "report.pdf").exists()
-    write_report(failed, pdf=True)
-    made = (failed / "report.pdf").read_bytes()
-    (failed / "report.pdf").write_bytes(b"old")
-    write_report(failed)
-    assert (failed / "report.pdf").read_bytes() == made
-
-
 def test_a_registered_study_is_called_confirmatory_and_its_hypotheses_stand_beside_the_result(
     tmp_path,
 ):

@@ -23,7 +23,7 @@ import sys
 from pathlib import Path
 from dva_sim.experiments.report.report import write_report
 for folder in sys.argv[1:]:
-    write_report(Path(folder), pdf=True)
+    write_report(Path(folder))
 """
 
 
@@ -107,7 +107,7 @@ KINDS = {
 }
 
 
-def test_every_kind_of_figure_page_and_paper_are_the_same_whatever_hashes_are(tmp_path):
+def test_every_kind_of_figure_and_page_are_the_same_whatever_hashes_are(tmp_path):
     folders = [write(tmp_path / "1" / write.__name__) for write in (grid, points, shifts, contest)]
     shutil.copytree(tmp_path / "1", tmp_path / "2")
     root = str(Path(dva_sim.__file__).parents[1])
@@ -130,6 +130,6 @@ def test_every_kind_of_figure_page_and_paper_are_the_same_whatever_hashes_are(tm
         for files in [sorted((tmp_path / seed).rglob("*.*"))]
     )
     assert {Path(name).stem for name in first if name.endswith(".svg")} == KINDS
-    assert sum(name.endswith("report.pdf") for name in first) == 4
+    assert sum(name.endswith("report.html") for name in first) == 4
     assert set(first) == set(second)
     assert [name for name in first if first[name] != second[name]] == []
