@@ -27,7 +27,6 @@ from dva_sim.experiments.report.episode import (
     write_replay,
 )
 from dva_sim.kernel.measure import Measure
-from dva_sim.kernel.plugins import resolved
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
@@ -66,12 +65,6 @@ COLUMNS = {
     "delay_felt_s": "delay\nfelt\n[s]",
 }
 """Columns of the trials that are told, as far as the task has them, with their heads."""
-
-
-def tell(run: Played, console: Console) -> None:
-    """A run, as its model tells it."""
-    teller: Callable[[Played, Console], None] = resolved(model_for(run.scenario).teller)
-    teller(run, console)
 
 
 def tell_any(run: Played, console: Console) -> None:
@@ -413,3 +406,16 @@ def _say_written(files: Iterable[str], pictures: Wanted, where: Console) -> None
         with where.status("Drawing ..."):
             files = list(files)
     print_lines(files, where)
+
+
+def tell(run: Played, console: Console) -> None:
+    """Tell a run as it suits its model, one of a user's by its measures."""
+    _TELLERS.get(run.scenario.model, tell_any)(run, console)
+
+
+_TELLERS: dict[str, Callable[[Played, Console], None]] = {
+    "full": tell_full,
+    "timed": tell_shift,
+    "task": tell_task,
+    "transports": tell_session,
+}

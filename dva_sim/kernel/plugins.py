@@ -262,11 +262,6 @@ def stamp_of(name: str) -> int:
     return file.stat().st_mtime_ns if file.is_file() else 0
 
 
-def resolved(name: str) -> Any:
-    """What `module:function` means: how a lower room names what a higher one has."""
-    return EntryPoint(name=name, group="", value=name).load()
-
-
 def said(error: BaseException) -> str:
     """An error in one line."""
     text = " ".join(str(error).split())

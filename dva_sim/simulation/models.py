@@ -76,20 +76,12 @@ class Model(Generic[S]):
         scenario: What its scenarios are; a user's derives from `OwnScenario`.
         columns: Every column of its tables. `runs` has one row for each run.
         is_recorded: Whether its runs can be kept as recordings, filmed and run side by side.
-        teller: What tells one run in the terminal, as `module:function` of a `Played` run and a
-            console.
-        still: What draws one run, likewise; empty if there is nothing to see.
-        page: What reports of its studies say otherwise than of drives, as `module:class` derived
-            from `ModelPage`; only ours have one, since a results folder loads no user's code.
     """
 
     name = ""
     scenario: type[S]
     columns: ClassVar[Columns]
     is_recorded = False
-    teller = "dva_sim.cli.stories:tell_any"
-    still = ""
-    page = ""
 
     def simulate(self, scenario: S, seed: int) -> Any:
         """Run a scenario; what is left of the run, to be measured."""
@@ -193,7 +185,6 @@ class _Full(_Operated[Scenario]):
         "commands": COMMAND_COLUMNS,
     }
     is_recorded = True
-    teller = "dva_sim.cli.stories:tell_full"
     build = staticmethod(scenarios.build)
     contradictions = staticmethod(contradictions)
     rehearse = staticmethod(full.rehearse)
@@ -219,8 +210,6 @@ class _Timed(Model[TimedScenario]):
         "events": of_shift.EVENT_COLUMNS,
         "responders": of_shift.RESPONDER_COLUMNS,
     }
-    teller = "dva_sim.cli.stories:tell_shift"
-    page = "dva_sim.experiments.report.shift_page:ShiftPage"
     build = staticmethod(shift.build)
     rehearse = staticmethod(shift.rehearse_timed)
     simulate = staticmethod(shift.simulate_timed)
@@ -237,10 +226,8 @@ class _Task(_Operated[TaskScenario]):
 
     scenario = TaskScenario
     columns: ClassVar[Columns] = {"runs": of_task.RUN_COLUMNS, "trials": of_task.TRIAL_COLUMNS}
-    teller = "dva_sim.cli.stories:tell_task"
     build = staticmethod(task.build)
     simulate = staticmethod(task.play)
-    still = "dva_sim.experiments.report.figures.trial:draw_trial"
 
     def measures(self, scenario: TaskScenario | None = None) -> tuple[str, ...]:
         return super().measures() if scenario is None else of_task.measures_of(scenario)
@@ -260,8 +247,6 @@ class _Transports(_Operated[TransportScenario]):
         "runs": of_transport.RUN_COLUMNS,
         "flows": of_transport.FLOW_COLUMNS,
     }
-    teller = "dva_sim.cli.stories:tell_session"
-    page = "dva_sim.experiments.report.transport_page:TransportPage"
     build = staticmethod(transport.build)
     simulate = staticmethod(transport.simulate_session)
 

@@ -1,6 +1,5 @@
 """The report of a study: its page, its tables, its figures, on screen and on paper.
 
-Imports analysis, execution and results, and nothing above; no model of a run but in the page that
-the model names (`Model.page`). Begin with `report`, whose `blocks_of` is the order of a page, then
-`summary`.
+Imports analysis, execution and results, and nothing above; no model of a run but in its
+page (`model_pages`). Begin with `report`, whose `blocks_of` is the order of a page, then `summary`.
 """

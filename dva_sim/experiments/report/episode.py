@@ -15,15 +15,15 @@ from typing import Any
 from dva_sim.experiments.study.loading import Settings, pairs_of
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.plugins import resolved
 from dva_sim.network.patterns import known_patterns
 from dva_sim.recordings.pictures import Wanted, joined
 from dva_sim.recordings.reading import Opened, read_recording
 from dva_sim.recordings.writing import check_target, write_recording
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Recording, simulate
-from dva_sim.simulation.models import AnyScenario, Model, Tables, model_for, model_of
+from dva_sim.simulation.models import AnyScenario, Tables, model_for, model_of
 from dva_sim.simulation.scenario import Scenario, contradictions
+from dva_sim.simulation.task import TaskScenario
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class EpisodeRequest:
         model = model_of(document)
         built = model.build(document, changes)
         if not isinstance(built, Scenario):
-            self._check_other(model, f"{self.scenario} is a {built.model} scenario")
+            self._check_other(built)
             return [built]
         self.pictures.check(built)
         if self.side_by_side is None:
@@ -131,13 +131,14 @@ class EpisodeRequest:
         patterns = _two_patterns(self.side_by_side)
         return [scenarios.build(document, changes | {"pattern": each}) for each in patterns]
 
-    def _check_other(self, model: Model[Any], it: str) -> None:
+    def _check_other(self, scenario: AnyScenario) -> None:
         """What only runs of the full model have is refused of others, before anything is run."""
+        it = f"{self.scenario} is a {scenario.model} scenario"
         if self.record is not None:
             raise ConfigError(f"{it}: only full ones are recorded")
         if self.side_by_side is not None:
             raise ConfigError(f"{it}: only full ones run twice")
-        if self.pictures.any and not model.still:
+        if self.pictures.any and not isinstance(scenario, TaskScenario):
             raise ConfigError(f"{it}: there is nothing to see")
         if self.pictures.any and not self.pictures.is_plain_still:
             raise ConfigError(f"{it}: only --still shows something of it")
@@ -165,8 +166,10 @@ class EpisodeRequest:
             yield f"Recording: {self.record}"
         if recordings and pictures.any:
             yield from pictures.write(recordings)
-        elif pictures.still is not None:
-            resolved(model_for(first.scenario).still)(first.scenario, self.seed, pictures.still)
+        elif isinstance(first.scenario, TaskScenario) and pictures.still is not None:
+            from dva_sim.experiments.report.figures.trial import draw_trial  # late: start-up
+
+            draw_trial(first.scenario, self.seed, pictures.still)
             yield f"Still: {pictures.still}"
 
 

@@ -1,12 +1,12 @@
 """What a report says otherwise of one model of a run: words, tables, and which figures it has.
 
 `ModelPage` is the usual page, of persons who drive; a model whose runs are something else has a
-page of its own, derived from it, which the model names (`Model.page`).
+page of its own, derived from it (`model_pages`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, answer
@@ -14,8 +14,6 @@ from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import SUMMARIES, CellTable, Summary
-from dva_sim.kernel.plugins import resolved
-from dva_sim.simulation.models import MODELS
 
 
 class ModelPage:
@@ -82,13 +80,6 @@ class ModelPage:
             correlation: Of the two sides of the contrast at the last level, where it is known.
         """
         return None
-
-
-def page_of(scenarios: Iterable[Mapping[str, Any]]) -> type[ModelPage]:
-    """The page of a study: that of the first of its models that has one of its own."""
-    models = (MODELS.get(str(scenario.get("model"))) for scenario in scenarios)
-    own: Iterable[type[ModelPage]] = (resolved(m.page) for m in models if m is not None and m.page)
-    return next(iter(own), ModelPage)
 
 
 def correlated(correlation: float | None) -> str:

@@ -47,7 +47,8 @@ from dva_sim.experiments.analysis.study_view import (
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.event_outcomes import EventOutcomes, outcomes_of
 from dva_sim.experiments.report.hypothesis_tables import few_that_weigh, verdict_sentences
-from dva_sim.experiments.report.model_page import ModelPage, page_of
+from dva_sim.experiments.report.model_page import ModelPage
+from dva_sim.experiments.report.model_pages import page_of
 from dva_sim.experiments.report.people_page import PeoplePage, people_drove
 from dva_sim.experiments.report.tuning_table import tuning_warning
 from dva_sim.experiments.results.manifest import status_of
