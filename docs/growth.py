@@ -254,8 +254,8 @@ def a_study(kind: str, size: int, folder: Path) -> Costs:
     from dva_sim import api
     from dva_sim.experiments.execution.runner import run_study
     from dva_sim.experiments.study.cell_grid import cells, jobs
+    from dva_sim.experiments.study.file_kinds import open_study
     from dva_sim.simulation.models import model_for
-    from dva_sim.testing.file_kinds import open_study
 
     costs = Costs()
     persons = min(1_000, size // 10)

@@ -86,7 +86,7 @@ def episode(
     asked = locals().copy()
     from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
     from dva_sim.experiments.report.notebook import episode_of  # late: start-up
-    from dva_sim.testing.scenario_mistakes import mistakes_of  # late: start-up
+    from dva_sim.experiments.study.scenario_mistakes import mistakes_of  # late: start-up
 
     request = EpisodeRequest.of(**asked)
     with mistakes_of(request.scenario, request.changes, seed):
@@ -223,7 +223,7 @@ def dry_run(
 def _rehearsed(request: RunRequest) -> tuple[Study, list[DesignCell]]:
     """A study without mistakes, and its configurations."""
     from dva_sim.experiments.execution.dry_run import rehearse_all  # late: start-up
-    from dva_sim.testing.file_kinds import open_study  # late: start-up
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
     asked = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     return asked, rehearse_all(asked)
@@ -255,7 +255,7 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> P
         DvaSimError: nothing to register, a size left open, or a registration that is there.
     """
     from dva_sim.experiments.study import registration  # late: start-up
-    from dva_sim.testing.file_kinds import open_study  # late: start-up
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
     asked = open_study(study, version="full" if full else None)
     registration.register(asked, again)
@@ -283,8 +283,8 @@ def tune(
         DvaSimError: the study tunes nothing, or runs failed.
     """
     from dva_sim.experiments.analysis import tuning  # late: start-up
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
     from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned  # late: start-up
-    from dva_sim.testing.file_kinds import open_study  # late: start-up
 
     asked = open_study(study)
     folder = Path(out or folder_of_tuning(str(study)))

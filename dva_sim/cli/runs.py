@@ -49,7 +49,7 @@ def episode(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> Non
     """
     from dva_sim.cli import stories  # late: start-up
     from dva_sim.experiments.report.episode import EpisodeRequest  # late: start-up
-    from dva_sim.testing.scenario_mistakes import mistakes_of  # late: start-up
+    from dva_sim.experiments.study.scenario_mistakes import mistakes_of  # late: start-up
 
     request = EpisodeRequest.of(**asked)
     with loudness(quiet, verbose), mistakes_of(request.scenario, request.changes, request.seed):
@@ -262,7 +262,7 @@ def console(
     from dva_sim.console.attached.supervisor import attach  # late: start-up
     from dva_sim.console.options import DEFAULT, ConsoleOptions  # late: start-up
     from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
-    from dva_sim.testing.scenario_mistakes import mistakes_of  # late: start-up
+    from dva_sim.experiments.study.scenario_mistakes import mistakes_of  # late: start-up
 
     changes = tuple(set_ or ())
     if dva is not None:

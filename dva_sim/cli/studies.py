@@ -84,8 +84,8 @@ def register(study: str, full: bool, again: bool) -> None:
     Examples:
         dva-sim register mine.yaml  # writes mine.registration.yaml beside it
     """
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
     from dva_sim.experiments.study.registration import register as write_down  # late: start-up
-    from dva_sim.testing.file_kinds import open_study  # late: start-up
 
     typer.echo(write_down(open_study(study, version="full" if full else None), again))
 

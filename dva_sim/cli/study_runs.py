@@ -21,10 +21,10 @@ from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import DesignCell
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
+from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
-from dva_sim.testing.file_kinds import open_study
 
 _FEW = 5  # failures that are told one by one
 _MANY = 500  # configurations, which take some seconds to check

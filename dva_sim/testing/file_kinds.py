@@ -1,40 +1,35 @@
-"""What a YAML file is, by its keys and its folder, and where in it a mistake was made.
+"""What a YAML file should be, tried by the code that runs it, and where in it a mistake was made.
 
-It stands above all rooms whose files it knows. What is opened here tells of a file of another kind
-what it is, and which command takes it; what is checked is read and rehearsed by the same code that
-runs it. The table of all kinds stands at the end.
+It stands above all rooms whose files it knows: the table of all kinds stands at the end.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from PIL import Image
 
-from dva_sim.agents.operator.published import SplitFile, TargetFile, load_split
-from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-from dva_sim.agents.population import Population
+from dva_sim.agents.operator.published import SplitFile, load_split
 from dva_sim.agents.robot.profile import RobotProfile, read_robot
-from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile, try_phone
+from dva_sim.agents.tilt import PhoneProfile, try_phone
 from dva_sim.experiments.execution.dry_run import contradictions_in
 from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.factor_levels import Bands
+from dva_sim.experiments.study.file_kinds import EVIDENCE, FileKind
+from dva_sim.experiments.study.file_kinds import KINDS as KINDS_OF_RUNS
 from dva_sim.experiments.study.loading import load_study
+from dva_sim.experiments.study.mistake_places import blamed_in
 from dva_sim.experiments.study.registration import Preregistration, departures, load_registration
-from dva_sim.experiments.study.study import FOLDER, Study, Version
-from dva_sim.experiments.study.tuning import TunedValues
-from dva_sim.kernel import resources
+from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config import Config, validate
-from dva_sim.kernel.config_overrides import blame, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml, read_text
+from dva_sim.kernel.yaml_files import Document, read_text
 from dva_sim.protocol.mistakes import Problem
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario, model_of
+from dva_sim.simulation.models import OwnScenario, model_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.task import TaskScenario
@@ -49,167 +44,7 @@ from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
 
 PROBE: Final = "drive-to-event"  # the scenario that a map is tried with
 PROBES: Final = 6  # its runs
-_COUNTS: Final = {
-    "robots of the scenario": ("robot", "count"),
-    "guards of the scenario": ("guard", "count"),
-    "another bystander": ("bystander", "count"),
-    "without robot.way_m": ("robot", "way_m"),
-    "without guard.way_m": ("guard", "way_m"),
-}
-
-
-class FileKind(NamedTuple):
-    """One kind of YAML file.
-
-    Attributes:
-        name: As it is called in messages.
-        model: Its keys.
-        folder: Where files of this kind lie.
-        command: What does something with it, if a command does.
-        load: Reads it as the program does, where that is more than its keys.
-        check: Gives every mistake, where there may be several.
-    """
-
-    name: str
-    model: type[Config]
-    folder: str
-    command: str = ""
-    load: Callable[[Document], object] | None = None
-    check: Callable[[Document], Iterator[ConfigError]] | None = None
-
-    def mistakes(self, document: Document) -> Iterator[ConfigError]:
-        """What is wrong, by the code that runs it.
-
-        Raises:
-            ConfigError: the first mistake, where there is but one to be told.
-        """
-        if self.check is not None:
-            yield from self.check(document)
-        elif self.load is not None:
-            self.load(document)
-        else:
-            validate(self.model, document.data, document.error)
-
-
-def recognise(document: Document) -> FileKind | None:
-    """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
-    keys = document.data.keys() - {"description"}
-    model = document.data.get("model")
-    if (
-        isinstance(model, str)
-        and model not in MODELS
-        and (".py:" in model or model in PLUGINS.known())
-    ):
-        return next(kind for kind in KINDS if kind.model is OwnScenario)
-    named = {each.scenario: name for name, each in MODELS.items() if name != "full"}
-    named[OwnScenario] = "of a user's model"
-    kinds = [kind for kind in KINDS if named.get(kind.model, model) == model]
-    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in kinds}
-    likely = [kind for kind in kinds if shared[kind.name] == max(shared.values())]
-    if len(likely) == 1:
-        return likely[0]
-    folder = document.file.resolve().parent.as_posix()
-    here = [kind for kind in likely if folder.endswith(f"/{kind.folder}")]
-    return here[0] if len(here) == 1 else None
-
-
-def open_study(
-    name: str | Path,
-    settings: Iterable[str] = (),
-    *,
-    version: Version | None = None,
-    pilot: int | None = None,
-) -> Study:
-    """`load_study`, which tells of a file of another kind what it is.
-
-    Raises:
-        ConfigError: not found, not a study, not valid, or changes that make no sense.
-    """
-    try:
-        return load_study(name, settings, version=version, pilot=pilot)
-    except ConfigError as error:
-        document = _opened(lambda: load_yaml(resources.find(str(name), FOLDER, is_asked=True)))
-        if document is None or error.file != str(document.file):
-            raise
-        raise of_other_kind(document, "dva-sim run", "study") or error from None
-
-
-def _opened(load: Callable[[], Document]) -> Document | None:
-    try:
-        return load()
-    except ConfigError:
-        return None
-
-
-def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError | None:
-    """That a file is of another kind than a command takes; None if it is not, or cannot be told.
-
-    Args:
-        document: The file.
-        command: Which files of the right kind have.
-        wanted: What these are called.
-    """
-    kind = recognise(document)
-    if kind is None or kind.command == command:
-        return None
-    given = f"; try: {kind.command} {document.file}" if kind.command else ""
-    article = "an" if kind.name[0] in "aeiou" else "a"
-    return ConfigError(f"is {article} {kind.name}, not a {wanted}{given}", document.file)
-
-
-def blamed_in(document: Document, error: ConfigError) -> ConfigError:
-    """The same mistake at the key that it is about, unless another file holds it."""
-    problem = error.problem
-    if error.file is not None:
-        if Path(error.file).exists():
-            return error
-        problem = f"{error.file!r}: {problem}"
-    counts: list[KeyPath] = [path for phrase, path in _COUNTS.items() if phrase in problem]
-    return document.error(problem, counts[0] if counts else _quoted(document, problem))
-
-
-def _quoted(document: Document, problem: str) -> KeyPath:
-    """The deepest key whose value the problem quotes."""
-    for path in sorted(document.places, key=len, reverse=True):
-        value: Any = document.data
-        for step in path:
-            value = value[step]
-        if isinstance(value, str) and repr(value) in problem:
-            return path
-    return ()
-
-
-def placed_mistake(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> ConfigError:
-    """A mistake in a scenario with its place: see `scenario_mistakes.mistakes_of`."""
-    if error.file is not None and not error.keys:
-        return _of_other_kind(error, name) or error
-    return _placed(error, name, pairs, seed)
-
-
-def _of_other_kind(error: ConfigError, name: str) -> ConfigError | None:
-    document = _opened(lambda: scenarios.load(name))
-    if document is None or error.file != str(document.file):
-        return None
-    return of_other_kind(document, "dva-sim episode", "scenario")
-
-
-def _placed(error: ConfigError, name: str, pairs: Sequence[str], seed: int) -> ConfigError:
-    """A mistake that has no place yet, if it is one of the scenario."""
-    document = _opened(lambda: scenarios.load(name))
-    if document is None:
-        return error
-    changes = parse_changes(pairs)
-
-    def make(some: Mapping[str, Any]) -> None:
-        model = model_of(document)
-        model.rehearse(model.build(document, some), seed)
-
-    try:
-        make(changes)
-    except ConfigError:
-        found = error if error.keys else blame(error, changes, make, document)
-        return set_by(pairs, found) if found.keys else blamed_in(document, found)
-    return error  # it can be run: the mistake is in what else was asked for
+_SCENARIOS: Final = (Scenario, TimedScenario, TaskScenario, TransportScenario, OwnScenario)
 
 
 # What readers may raise on files that nobody would write, besides what they say in words.
@@ -218,7 +53,19 @@ _HOSTILE: Final = (ValueError, OverflowError, Image.DecompressionBombError)
 
 def check_config(kind: FileKind, document: Document) -> list[Problem]:
     """What is wrong with a configuration, by the code that runs it."""
-    return _collect(document.file, partial(kind.mistakes, document), partial(blamed_in, document))
+    return _collect(
+        document.file, partial(_mistakes, kind.model, document), partial(blamed_in, document)
+    )
+
+
+def _mistakes(model: type[Config], document: Document) -> Iterator[ConfigError]:
+    """Mistakes of which there may be several; the only one is raised."""
+    if model in _CHECKS:
+        yield from _CHECKS[model](document)
+    elif model in _LOADERS:
+        _LOADERS[model](document)
+    else:
+        validate(model, document.data, document.error)
 
 
 def doubts(kind: FileKind, document: Document) -> list[str]:
@@ -227,7 +74,7 @@ def doubts(kind: FileKind, document: Document) -> list[str]:
         return contradictions_in(cell_grid.cells(load_study(document.file)))
     if kind.model is RosMap:
         return [*doubts_of_map(document.file), *_without_a_place(document)]
-    if kind.load is not _rehearse:
+    if kind.model not in _SCENARIOS:
         return []
     model = model_of(document)
     return model.contradictions(model.build(document, {}))
@@ -343,28 +190,27 @@ def _frame_of(path: Path) -> GeoFrame:
     return GeoFrame(latitude, longitude) if abs(latitude) < 89 else DEFAULT_FRAME
 
 
-_RUN, _PLAY, _DRAW = "dva-sim run", "dva-sim episode", "dva-sim site show"
-_SCENARIOS, _EVIDENCE = "experiments/scenarios", "experiments/validation"
 KINDS: Final = (
-    FileKind("study", Study, "experiments", _RUN, check=_check_study),
-    FileKind("scenario", Scenario, _SCENARIOS, _PLAY, _rehearse),
-    FileKind("timed scenario", TimedScenario, _SCENARIOS, _PLAY, _rehearse),
-    FileKind("task", TaskScenario, "experiments/scenarios/tasks", _PLAY, _rehearse),
-    FileKind("transports", TransportScenario, _SCENARIOS, _PLAY, _rehearse),
-    FileKind("own scenario", OwnScenario, _SCENARIOS, _PLAY, _rehearse),
-    FileKind("validation cases", CaseFile, _EVIDENCE, load=lambda d: load_cases(d.file)),
-    FileKind("targets", TargetFile, _EVIDENCE),
-    FileKind("measurements", PlanConfig, _EVIDENCE, load=lambda d: load_plan(str(d.file))),
-    FileKind("split", SplitFile, _EVIDENCE, load=lambda d: load_split(str(d.file))),
-    FileKind("site", SiteFile, "worlds", _DRAW, lambda d: load_site(d.file)),
-    FileKind("ROS map", RosMap, "worlds", _DRAW, _load_map),
-    FileKind("robot", RobotProfile, "agents/robots", load=_load_robot),
-    FileKind("phone", PhoneProfile, "agents/phones", load=_load_phone),
-    FileKind("accelerometer", AccelerometerPart, "agents/accelerometers"),
-    FileKind("guard", GuardProfile, "agents/people"),
-    FileKind("bystanders", BystanderProfile, "agents/people"),
-    FileKind("operators", Population, "agents/people"),
-    FileKind("bands of operators", Bands, "agents/people"),
-    FileKind("registration", Preregistration, "experiments", check=_check_registration),
-    FileKind("tuned values", TunedValues, "experiments/tuned"),
+    *KINDS_OF_RUNS,
+    FileKind("validation cases", CaseFile, EVIDENCE),
+    FileKind("measurements", PlanConfig, EVIDENCE),
 )
+"""All kinds; those of evidence are of no use to a run."""
+
+_LOADERS: Final[dict[type[Config], Callable[[Document], object]]] = {
+    **dict.fromkeys(_SCENARIOS, _rehearse),
+    CaseFile: lambda d: load_cases(d.file),
+    PlanConfig: lambda d: load_plan(str(d.file)),
+    PhoneProfile: _load_phone,
+    RobotProfile: _load_robot,
+    RosMap: _load_map,
+    SiteFile: lambda d: load_site(d.file),
+    SplitFile: lambda d: load_split(str(d.file)),
+}
+"""How the program reads a file, where that is more than its keys."""
+
+_CHECKS: Final[dict[type[Config], Callable[[Document], Iterator[ConfigError]]]] = {
+    Preregistration: _check_registration,
+    Study: _check_study,
+}
+"""Where there may be several mistakes."""

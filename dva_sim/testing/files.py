@@ -157,13 +157,15 @@ def _check_evidence(kind: str, path: Path) -> FileVerdict:
 
 def _check_yaml(path: Path) -> FileVerdict:
     """A message needs none of what reads configurations: it is imported here."""
-    from dva_sim.testing.file_kinds import check_config, doubts, recognise  # late: start-up
+    from dva_sim.experiments.study.file_kinds import recognise  # late: start-up
+    from dva_sim.testing.file_kinds import KINDS as FILES  # late: start-up
+    from dva_sim.testing.file_kinds import check_config, doubts  # late: start-up
 
     problems = _flawed(path, YAML_BYTES)
     document, problem = (None, problems[0]) if problems else _parse(path)
     if document is None:
         return FileVerdict("configuration", [problem] if problem else [])
-    kind = recognise(document)
+    kind = recognise(document, FILES)
     if kind is None:
         return FileVerdict("unknown", [Problem(1, 1, _UNKNOWN)])
     problems = check_config(kind, document)

@@ -7,11 +7,11 @@ from helpers.wording import unnamed
 from dva_sim.experiments.execution.dry_run import rehearse_all
 from dva_sim.experiments.report.episode import EpisodeRequest
 from dva_sim.experiments.study.loading import load_study
+from dva_sim.experiments.study.scenario_mistakes import mistakes_of
 from dva_sim.kernel.config_overrides import build, parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.scenario import Scenario
-from dva_sim.testing.scenario_mistakes import mistakes_of
 
 
 def played(request):

@@ -26,6 +26,6 @@ def mistakes_of(name: str, pairs: Sequence[str], seed: int) -> Iterator[None]:
     try:
         yield
     except ConfigError as error:
-        from dva_sim.testing.file_kinds import placed_mistake  # late: start-up
+        from dva_sim.experiments.study.mistake_places import placed_mistake  # late: start-up
 
         raise placed_mistake(error, name, pairs, seed) from None

@@ -1,0 +1,141 @@
+"""What a YAML file is, by its keys and its folder; and a study opened by its name.
+
+A file of another kind than the one that is asked for is told what it is, and which command takes
+it. Files of evidence are known above (`testing/file_kinds.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from dva_sim.agents.operator.published import SplitFile, TargetFile
+from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
+from dva_sim.agents.population import Population
+from dva_sim.agents.robot.profile import RobotProfile
+from dva_sim.agents.tilt import AccelerometerPart, PhoneProfile
+from dva_sim.experiments.study.factor_levels import Bands
+from dva_sim.experiments.study.loading import load_study
+from dva_sim.experiments.study.registration import Preregistration
+from dva_sim.experiments.study.study import FOLDER, Study, Version
+from dva_sim.experiments.study.tuning import TunedValues
+from dva_sim.kernel import resources
+from dva_sim.kernel.config import Config
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document, load_yaml
+from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.task import TaskScenario
+from dva_sim.simulation.transport import TransportScenario
+from dva_sim.worlds.maps import RosMap
+from dva_sim.worlds.site import SiteFile
+
+
+class FileKind(NamedTuple):
+    """One kind of YAML file.
+
+    Attributes:
+        name: As it is called in messages.
+        model: Its keys.
+        folder: Where files of this kind lie.
+        command: What does something with it, if a command does.
+    """
+
+    name: str
+    model: type[Config]
+    folder: str
+    command: str = ""
+
+
+_RUN, _PLAY, _DRAW = "dva-sim run", "dva-sim episode", "dva-sim site show"
+_SCENARIOS, EVIDENCE = "experiments/scenarios", "experiments/validation"
+KINDS: Final = (
+    FileKind("study", Study, "experiments", _RUN),
+    FileKind("scenario", Scenario, _SCENARIOS, _PLAY),
+    FileKind("timed scenario", TimedScenario, _SCENARIOS, _PLAY),
+    FileKind("task", TaskScenario, "experiments/scenarios/tasks", _PLAY),
+    FileKind("transports", TransportScenario, _SCENARIOS, _PLAY),
+    FileKind("own scenario", OwnScenario, _SCENARIOS, _PLAY),
+    FileKind("targets", TargetFile, EVIDENCE),
+    FileKind("split", SplitFile, EVIDENCE),
+    FileKind("site", SiteFile, "worlds", _DRAW),
+    FileKind("ROS map", RosMap, "worlds", _DRAW),
+    FileKind("robot", RobotProfile, "agents/robots"),
+    FileKind("phone", PhoneProfile, "agents/phones"),
+    FileKind("accelerometer", AccelerometerPart, "agents/accelerometers"),
+    FileKind("guard", GuardProfile, "agents/people"),
+    FileKind("bystanders", BystanderProfile, "agents/people"),
+    FileKind("operators", Population, "agents/people"),
+    FileKind("bands of operators", Bands, "agents/people"),
+    FileKind("registration", Preregistration, "experiments"),
+    FileKind("tuned values", TunedValues, "experiments/tuned"),
+)
+
+
+def recognise(document: Document, kinds: Sequence[FileKind] = KINDS) -> FileKind | None:
+    """The kind that knows most of the keys; among equals, the one whose folder it lies in."""
+    keys = document.data.keys() - {"description"}
+    model = document.data.get("model")
+    if (
+        isinstance(model, str)
+        and model not in MODELS
+        and (".py:" in model or model in PLUGINS.known())
+    ):
+        return next(kind for kind in kinds if kind.model is OwnScenario)
+    named = {each.scenario: name for name, each in MODELS.items() if name != "full"}
+    named[OwnScenario] = "of a user's model"
+    fit = [kind for kind in kinds if named.get(kind.model, model) == model]
+    shared = {kind.name: len(keys & kind.model.model_fields.keys()) for kind in fit}
+    likely = [kind for kind in fit if shared[kind.name] == max(shared.values())]
+    if len(likely) == 1:
+        return likely[0]
+    folder = document.file.resolve().parent.as_posix()
+    here = [kind for kind in likely if folder.endswith(f"/{kind.folder}")]
+    return here[0] if len(here) == 1 else None
+
+
+def open_study(
+    name: str | Path,
+    settings: Iterable[str] = (),
+    *,
+    version: Version | None = None,
+    pilot: int | None = None,
+) -> Study:
+    """`load_study`, which tells of a file of another kind what it is.
+
+    Raises:
+        ConfigError: not found, not a study, not valid, or changes that make no sense.
+    """
+    try:
+        return load_study(name, settings, version=version, pilot=pilot)
+    except ConfigError as error:
+        document = opened(lambda: load_yaml(resources.find(str(name), FOLDER, is_asked=True)))
+        if document is None or error.file != str(document.file):
+            raise
+        raise of_other_kind(document, "dva-sim run", "study") or error from None
+
+
+def opened(load: Callable[[], Document]) -> Document | None:
+    """A document; None if it cannot be read."""
+    try:
+        return load()
+    except ConfigError:
+        return None
+
+
+def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError | None:
+    """That a file is of another kind than a command takes; None if it is not, or cannot be told.
+
+    Args:
+        document: The file.
+        command: Which files of the right kind have.
+        wanted: What these are called.
+    """
+    kind = recognise(document)
+    if kind is None or kind.command == command:
+        return None
+    given = f"; try: {kind.command} {document.file}" if kind.command else ""
+    article = "an" if kind.name[0] in "aeiou" else "a"
+    return ConfigError(f"is {article} {kind.name}, not a {wanted}{given}", document.file)
