@@ -98,7 +98,16 @@ class CameraFrame(NamedTuple):
             tick, *pose = (float(value) for value in values)
             x, y, heading, speed, turn_rate = pose
             seen = tuple(_hazard(*hazard) for hazard in hazards)
-            at = Observation(int(tick), x, y, heading, speed, turn_rate, seen, float(visibility))
+            at = Observation(
+                tick=int(tick),
+                x=x,
+                y=y,
+                heading=heading,
+                speed=speed,
+                turn_rate=turn_rate,
+                hazards=seen,
+                visibility=float(visibility),
+            )
             sound = 0 <= tick < 2**53 and math.isfinite(sum(pose) + at.visibility)
             return cls(at, float(captured)) if sound else None
         except (ValueError, TypeError, OverflowError, RecursionError):

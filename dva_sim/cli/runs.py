@@ -166,7 +166,17 @@ def live(
 
     changes = tuple(set_ or ())
     options = LiveOptions(
-        *(scenario, changes, seed, operators, host, dva, port, keys, record, state, seconds),
+        scenario=scenario,
+        changes=changes,
+        seed=seed,
+        operators=operators,
+        host=host,
+        dva=dva,
+        port=port,
+        keys=keys,
+        record=record,
+        state=state,
+        duration=seconds,
         overwrite=overwrite,
         camera_port=camera_port,
     )

@@ -94,19 +94,19 @@ class Fact:
     def record(self) -> m.AuditRecord:
         """The same as a message, as far as one can hold it."""
         return m.AuditRecord(
-            self.author,
-            self.label[:64],
-            self.action,
-            _told(self.cause),
-            self.code,
-            _told(self.outcome),
-            self.role,
-            self.event,
-            self.device,
-            self.task,
-            _span(self.arrival_in),
-            self.advised,
-            _span(self.advised_in),
+            author=self.author,
+            label=self.label[:64],
+            action=self.action,
+            reason=_told(self.cause),
+            code=self.code,
+            text=_told(self.outcome),
+            role=self.role,
+            event_id=self.event,
+            device=self.device,
+            task=self.task,
+            arrival_in=_span(self.arrival_in),
+            advised=self.advised,
+            advised_in=_span(self.advised_in),
         )
 
 

@@ -28,14 +28,14 @@ def proposal(dispatcher: Dispatcher, event: Event, now: float) -> m.Proposal:
     named, arrival = (advised.device, advised.arrival_in) if advised else (None, None)
     task = advised.task if advised else event.waits_for if event.open else None
     return m.Proposal(
-        event.number,
-        dispatcher.name,
-        reason,
-        task,
-        named,
-        arrival,
-        within,
-        _as_many_as_fit(everybody),
+        event_id=event.number,
+        policy=dispatcher.name,
+        reason=reason,
+        task=task,
+        device=named,
+        arrival_in=arrival,
+        decide_within=within,
+        candidates=_as_many_as_fit(everybody),
     )
 
 

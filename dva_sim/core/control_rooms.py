@@ -148,7 +148,15 @@ class ControlRooms:
             self._check(body, event, sender, action, now)
             done = self._doers[type(body)](body, event, sender, now)
         except _Refused as refused:
-            answer = self._refuse(body, sender, action, refused.code, str(refused), now, advised)
+            answer = self._refuse(
+                body=body,
+                sender=sender,
+                action=action,
+                code=refused.code,
+                text=str(refused),
+                now=now,
+                advised=advised,
+            )
             return replace(answer, content=self.event_status(event, now))
         if isinstance(done, str):  # it was so already
             return RoomAnswer(m.OK, done, self.event_status(event, now))

@@ -87,13 +87,13 @@ class Dva:
         self.trail, self.roles = self.orders.trail, roles or Roles()
         self.trail.keeps = audit
         self.dispatcher = Dispatcher(
-            policy,
-            travel,
-            self.orders,
-            rng,
-            ground or SiteKnowledge(),
-            self.roles,
-            policy_name,
+            policy=policy,
+            travel=travel,
+            orders=self.orders,
+            rng=rng,
+            ground=ground or SiteKnowledge(),
+            roles=self.roles,
+            name=policy_name,
         )
         self.dispatcher.questions.asks = ask_first
         self.sensing = sensing or Sensing()

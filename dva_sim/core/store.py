@@ -316,13 +316,13 @@ def _handling(kept: dict[str, Any] | None, past: float) -> Handling:
     if kept is None:
         return Handling()
     return Handling(
-        kept["decisions"],
-        _choice(kept["last"], past),
-        _choice(kept["acknowledged"], past),
-        kept["note"],
-        set(kept["taken_off"]),
-        {d: (sent - past, way) for d, (sent, way) in kept["expected"].items()},
-        kept["advised"],
+        decisions=kept["decisions"],
+        last=_choice(kept["last"], past),
+        acknowledged=_choice(kept["acknowledged"], past),
+        note=kept["note"],
+        taken_off=set(kept["taken_off"]),
+        expected={d: (sent - past, way) for d, (sent, way) in kept["expected"].items()},
+        advised=kept["advised"],
     )
 
 

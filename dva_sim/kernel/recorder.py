@@ -365,7 +365,17 @@ class Recorder:
         if issued is None:
             return
         made, sent, sample_age, captured = issued
-        drive.applied.append(_make_applied(made, sent, arrived, now, until, sample_age, captured))
+        drive.applied.append(
+            _make_applied(
+                issued=made,
+                sent=sent,
+                arrived=arrived,
+                time=now,
+                until=until,
+                sample_age=sample_age,
+                captured=captured,
+            )
+        )
 
     def drive_ordered(self, drive: DriveLog) -> None:
         """An operator shall drive a robot."""

@@ -101,7 +101,15 @@ def run_part(
     alone = RunKeeping(options, options.read()) if outlet is None else None
     out = Outlet(alone.inlet() if alone is not None else outlet or 0)
     try:
-        _run_part(name, options, say, number, epoch, supervised, out)
+        _run_part(
+            name=name,
+            options=options,
+            say=say,
+            number=number,
+            epoch=epoch,
+            supervised=supervised,
+            out=out,
+        )
     finally:
         out.close()
         lost = None if alone is None else alone.finish()
@@ -224,16 +232,16 @@ class _Reporter:
         story, recorder.timeline = recorder.timeline, []
         clock = self._network.clock
         return Report(
-            self._name,
-            self._number,
-            clock.now,
-            part.rows(),
-            part.events() if isinstance(part, DvaPart) else [],
-            [list(moment) for moment in story],
-            dict(recorder.counters + self._network.counters),
-            part.settled(),
-            self._network.address(DVA) if self._name == "dva" else None,
-            clock.lateness,
+            part=self._name,
+            number=self._number,
+            time=clock.now,
+            rows=part.rows(),
+            events=part.events() if isinstance(part, DvaPart) else [],
+            story=[list(moment) for moment in story],
+            counters=dict(recorder.counters + self._network.counters),
+            settled=part.settled(),
+            dva=self._network.address(DVA) if self._name == "dva" else None,
+            lateness=clock.lateness,
         )
 
 

@@ -205,7 +205,21 @@ class Supervisor:
         found = [list(moment) for moment in self._keeping.news()] if self._keeping else []
         if found:
             now = time.monotonic() - self._epoch
-            self._hear("rules", Report("rules", 0, now, [], [], found, {}, True, None, 0.0))
+            self._hear(
+                "rules",
+                Report(
+                    part="rules",
+                    number=0,
+                    time=now,
+                    rows=[],
+                    events=[],
+                    story=found,
+                    counters={},
+                    settled=True,
+                    dva=None,
+                    lateness=0.0,
+                ),
+            )
 
     def _read(self, wait: float) -> None:
         for key, _ in self._selector.select(wait):

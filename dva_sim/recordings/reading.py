@@ -231,14 +231,14 @@ def _opened(raw: RawRecords) -> Opened:
         terms = terms_of(scenario, run[writing.HELD_TO])
         playback.recorder.facts = list(_facts(raw, run))
     return Opened(
-        playback,
-        raw.about or {},
-        tables,
-        run["duration_s"],
-        traces,
-        audit,
-        terms,
-        Counter(raw.written) - raw.found,
+        playback=playback,
+        about=raw.about or {},
+        tables=tables,
+        lasted=run["duration_s"],
+        traces=traces,
+        audit=audit,
+        terms=terms,
+        left_out=Counter(raw.written) - raw.found,
     )
 
 
@@ -271,7 +271,13 @@ def _incident(number: int, entry: Mapping[str, Any], told: Said) -> RunHazard:
         place = tuple(settings.pop("position"))
         hazard = KINDS[entry["kind"]](place, settings.pop("start"), **settings)
     return RunHazard(
-        entry["kind"], entry["room"], entry["start_s"], detected, None, hazard, entry["false_alarm"]
+        kind=entry["kind"],
+        room=entry["room"],
+        start=entry["start_s"],
+        detected=detected,
+        detector=None,
+        hazard=hazard,
+        false_alarm=entry["false_alarm"],
     )
 
 
@@ -394,10 +400,13 @@ def _drives(raw: RawRecords, run: Mapping[str, Any]) -> list[DriveLog]:
 def _applied(time: float, told: Mapping[str, Any]) -> Applied:
     until, captured = told["until_s"], told["captured_s"]
     return Applied(
-        *(told["made_s"], told["sent_s"], told["arrived_s"], time),
-        inf if until is None else until,
-        nan,
-        nan if captured is None else captured,
+        issued=told["made_s"],
+        sent=told["sent_s"],
+        arrived=told["arrived_s"],
+        time=time,
+        until=inf if until is None else until,
+        sample_age=nan,
+        captured=nan if captured is None else captured,
     )
 
 

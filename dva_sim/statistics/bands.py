@@ -181,7 +181,15 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
     reached = np.where(judged, critical, 0.0) * error
     lowest, highest = mean - down * error, mean + up * error
     low, high = np.minimum(mean - reached, lowest), np.maximum(mean + reached, highest)
-    return Band(mean, low, high, lowest, highest, critical, len(values))
+    return Band(
+        mean=mean,
+        low=low,
+        high=high,
+        pointwise_low=lowest,
+        pointwise_high=highest,
+        critical=critical,
+        n_persons=len(values),
+    )
 
 
 def _critical(ratio: Floats, count: Floats, level: float) -> Floats:

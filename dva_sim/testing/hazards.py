@@ -46,7 +46,9 @@ SLOW_PICTURE: Final = 0.5  # [s]
 CELL: Final = 1.0  # of a picture [m]
 
 # What a part is measured in is larger than this nowhere on earth.
-MOST: Final = Conditions(3000.0, 1e4, 1e4, 1e6, 1.0, 100.0, 1e3)
+MOST: Final = Conditions(
+    temperature=3000.0, heat_flux=1e4, extinction=1e4, co=1e6, gas=1.0, water=100.0, explosive=1e3
+)
 
 
 def check_hazard(

@@ -133,7 +133,9 @@ class _Trial:
             for number in range(LOOKS):
                 now += self._one_of(WAITS)
                 x, y, heading, speed, turn = (self._anything() for _ in range(5))
-                seen = Observation(number, x, y, heading, speed, turn, ())
+                seen = Observation(
+                    tick=number, x=x, y=y, heading=heading, speed=speed, turn_rate=turn, hazards=()
+                )
                 got = strategy.drive(route, View(now, seen, self._one_of(GUESSES)), STOP)
                 case = f"{got!r} on {seen!r}"
                 if not _is_pair(got):
@@ -226,7 +228,9 @@ class _Trial:
         strategy, route = strategy or self.new(person, reach), _way(WAYS[name])
         x = y = heading = 0.0
         late = round(delay / FRAME)
-        pictures = [Observation(0, 0.0, 0.0, 0.0, 0.0, 0.0, ())] * (late + 1)
+        pictures = [
+            Observation(tick=0, x=0.0, y=0.0, heading=0.0, speed=0.0, turn_rate=0.0, hazards=())
+        ] * (late + 1)
         track, spent = list[_Step](), 0.0
         for number in range(round(seconds / FRAME)):
             view = View(number * FRAME, pictures[-late - 1], max(delay, FRAME))

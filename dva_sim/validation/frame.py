@@ -46,7 +46,16 @@ def job_of(
         asked: What else its program has to know.
     """
     cell = tuple(asked.items())
-    return StudyJob(name, cell, 0, person, 0, seed, name, cast(AnyScenario, scenario))
+    return StudyJob(
+        part=name,
+        cell=cell,
+        index=0,
+        person=person,
+        trial=0,
+        seed=seed,
+        config=name,
+        scenario=cast(AnyScenario, scenario),
+    )
 
 
 def play_jobs(

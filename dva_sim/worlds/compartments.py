@@ -76,7 +76,9 @@ def _passage(
     if a is None:
         a, b = b, None
     if a is not None and a != b:
-        yield Opening(a, b, x1, y1, x2, y2, width, height, kind)
+        yield Opening(
+            room_a=a, room_b=b, x1=x1, y1=y1, x2=x2, y2=y2, width=width, height=height, kind=kind
+        )
 
 
 def _borders(
@@ -98,7 +100,9 @@ def _borders(
             if width >= LEAST_BORDER:
                 height = min(rooms[a].ceiling, rooms[b].ceiling)
                 names = rooms[a].name, rooms[b].name
-                yield Opening(*names, x1, y1, x2, y2, width, height, "border")
+                yield Opening(
+                    *names, x1=x1, y1=y1, x2=x2, y2=y2, width=width, height=height, kind="border"
+                )
 
 
 def _straight(lines: Any) -> Floats:
@@ -210,4 +214,6 @@ def _seams(grid: OccupancyGrid, labels: Labels, blocks: Sequence[Compartment]) -
             (x1, y1), (x2, y2) = (grid.to_xy(*(e[::-1] if turned else e)).tolist() for e in ends)
             a, b = divmod(int(code[row, left]), len(blocks))
             names = blocks[min(a, b)].name, blocks[max(a, b)].name
-            yield Opening(*names, x1, y1, x2, y2, width, CEILING, "border")
+            yield Opening(
+                *names, x1=x1, y1=y1, x2=x2, y2=y2, width=width, height=CEILING, kind="border"
+            )

@@ -183,7 +183,9 @@ def _cells(
             for start, end in zip(bounds[::2], bounds[1::2], strict=True):
                 cuts = _cuts(start, end, rng)
                 for x1, x2 in itertools.pairwise(cuts):
-                    yield FloorCell(x1, y1, x2, y2, wing, door_north, facade)
+                    yield FloorCell(
+                        x1=x1, y1=y1, x2=x2, y2=y2, wing=wing, door_north=door_north, facade=facade
+                    )
 
 
 def _cuts(start: float, end: float, rng: np.random.Generator) -> list[float]:

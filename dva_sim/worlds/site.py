@@ -272,9 +272,25 @@ def with_places(site: Site, seed: int, robots: int, guards: int, radius: float =
 @lru_cache(maxsize=64)
 def _settled(site: Site, seed: int, robots: int, guards: int, radius: float) -> Site:
     streams, bases, posts = Streams(seed), site.robot_bases, site.guard_posts
-    bases += _scatter(site, streams, "robot-base", robots, radius, bases, posts)
+    bases += _scatter(
+        site=site,
+        streams=streams,
+        what="robot-base",
+        count=robots,
+        radius=radius,
+        drawn=bases,
+        others=posts,
+    )
     person = min(radius, PASSED_BY)
-    posts += _scatter(site, streams, "guard-post", guards, person, posts, bases)
+    posts += _scatter(
+        site=site,
+        streams=streams,
+        what="guard-post",
+        count=guards,
+        radius=person,
+        drawn=posts,
+        others=bases,
+    )
     # The copy shares the grid and the cache of free cells: they depend on the plan alone.
     return replace(site, robot_bases=bases, guard_posts=posts)
 

@@ -229,14 +229,14 @@ class DriverSeat:
         """A frame as the person takes it: place and heading with an error."""
         person, error = self.person, self._errors
         return make_observation(
-            seen.tick,
-            seen.x + person.position_error * next(error),
-            seen.y + person.position_error * next(error),
-            seen.heading + person.heading_error * next(error),
-            seen.speed,
-            seen.turn_rate,
-            seen.hazards,
-            seen.visibility,
+            tick=seen.tick,
+            x=seen.x + person.position_error * next(error),
+            y=seen.y + person.position_error * next(error),
+            heading=seen.heading + person.heading_error * next(error),
+            speed=seen.speed,
+            turn_rate=seen.turn_rate,
+            hazards=seen.hazards,
+            visibility=seen.visibility,
         )
 
 

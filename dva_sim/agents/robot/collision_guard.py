@@ -77,7 +77,11 @@ def who_is_near(
         if sees(here, (x, y)):
             person = isinstance(other, PersonBody)
             kind, keep = ("person", PERSONAL) if person else ("robot", KEEP_ROBOT)
-            found.append(_make_nearby(kind, other.name, x, y, *other.velocity, other.radius, keep))
+            found.append(
+                _make_nearby(
+                    kind, other.name, x, y, *other.velocity, radius=other.radius, keep=keep
+                )
+            )
     return tuple(found)
 
 

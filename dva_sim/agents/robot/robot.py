@@ -130,15 +130,15 @@ class RobotAgent:
         # Who holds it, and how that fares, as was published last.
         self._told: tuple[str | None, int] = (None, m.WRONG_MODE)
         self.inbox = CommandQueue(
-            device.clock,
-            setup.service,
-            self._handle,
-            setup.pattern.newest_wins or setup.conflates,
-            setup.limit,
-            self._admit,
-            self._standing,
-            self._is_driven,
-            self._turn_away,
+            clock=device.clock,
+            service=setup.service,
+            handle=self._handle,
+            latest_wins=setup.pattern.newest_wins or setup.conflates,
+            limit=setup.limit,
+            read=self._admit,
+            standing=self._standing,
+            driven=self._is_driven,
+            refuse=self._turn_away,
         )
         self._confirmations = Confirmations(
             device,
@@ -175,8 +175,16 @@ class RobotAgent:
         x, y, heading = body.pose()
         hazards = view.look(x, y, heading, self._setup.hazards(now))
         visibility = view.visibility(x, y, heading)
-        motion = body.speed, body.turn_rate
-        return make_observation(tick, x, y, heading, *motion, hazards, visibility)
+        return make_observation(
+            tick=tick,
+            x=x,
+            y=y,
+            heading=heading,
+            speed=body.speed,
+            turn_rate=body.turn_rate,
+            hazards=hazards,
+            visibility=visibility,
+        )
 
     def expect(self, pattern: Pattern) -> None:
         """From the next drive on, commands come by another pattern.
@@ -407,7 +415,13 @@ class RobotAgent:
         number, recorder = message.message_id, self.device.recorder
         recorder.on_accepted(
             make_accepted(
-                self.device.id_tag, message.source, message.session, number, tick, arrived, now
+                robot=self.device.id_tag,
+                source=message.source,
+                session=message.session,
+                message_id=number,
+                seen_tick=tick,
+                arrived=arrived,
+                time=now,
             )
         )
         drive = self._drive_of(self.device.id_tag)

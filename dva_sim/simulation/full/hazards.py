@@ -91,7 +91,14 @@ def _draw(event: EventConfig, site: Site, streams: Streams, number: int) -> RunH
     luck = streams[f"event-{number}/hearsay"]
     hearsay = tuple(_hearsay(detected, (x, y), site, luck) for _ in range(event.reports - 1))
     return RunHazard(
-        hazard.reported_as, room, start, detected, detector, hazard, event.false_alarm, hearsay
+        kind=hazard.reported_as,
+        room=room,
+        start=start,
+        detected=detected,
+        detector=detector,
+        hazard=hazard,
+        false_alarm=event.false_alarm,
+        hearsay=hearsay,
     )
 
 

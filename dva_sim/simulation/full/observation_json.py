@@ -76,15 +76,15 @@ def _write_motion(robot: str, motion: o.RobotMotion) -> Plain:
 
 def _read_motion(told: Mapping[str, Any]) -> o.RobotMotion:
     return o.RobotMotion(
-        told["mode"],
-        _number(told["speed_m_s"], math.nan),
-        _number(told["turn_rate_rad_s"], math.nan),
-        _number(told["asked_speed_m_s"], math.nan),
-        _number(told["asked_turn_rate_rad_s"], math.nan),
-        _number(told["asked_until_s"], math.inf),
-        _number(told["touched_s"], -math.inf),
-        _number(told["grip"], math.nan),
-        bool(told["powered"]),
+        mode=told["mode"],
+        speed=_number(told["speed_m_s"], math.nan),
+        turn_rate=_number(told["turn_rate_rad_s"], math.nan),
+        asked_speed=_number(told["asked_speed_m_s"], math.nan),
+        asked_turn_rate=_number(told["asked_turn_rate_rad_s"], math.nan),
+        asked_until=_number(told["asked_until_s"], math.inf),
+        touched=_number(told["touched_s"], -math.inf),
+        grip=_number(told["grip"], math.nan),
+        powered=bool(told["powered"]),
     )
 
 

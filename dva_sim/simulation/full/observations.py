@@ -130,8 +130,15 @@ def motion_of(robot: RobotAgent) -> RobotMotion:
     body = robot.body
     speed, turn_rate, until = body.asked
     return RobotMotion(
-        *(robot.controller.mode.value, body.speed, body.turn_rate, speed, turn_rate, until),
-        *(body.last_touch, body.grip, body.powered),
+        mode=robot.controller.mode.value,
+        speed=body.speed,
+        turn_rate=body.turn_rate,
+        asked_speed=speed,
+        asked_turn_rate=turn_rate,
+        asked_until=until,
+        touched=body.last_touch,
+        grip=body.grip,
+        powered=body.powered,
     )
 
 
@@ -453,10 +460,13 @@ class _BookDiff:
         counts = {state.value: count for state, count in book.counts.items()}
         rights = list(page.rights)
         news = BookNews(
-            *(now, events, gone, book.total),
-            counts if counts != self._counts else None,
-            rights if rights != self._rights else None,
-            page.works,
+            time=now,
+            events=events,
+            gone=gone,
+            total=book.total,
+            counts=counts if counts != self._counts else None,
+            rights=rights if rights != self._rights else None,
+            works=page.works,
         )
         self._counts, self._rights = counts, rights
         return news

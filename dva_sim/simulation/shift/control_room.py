@@ -296,7 +296,17 @@ def hire(shift: Team, streams: Streams, stations: dict[str, Place]) -> list[Unit
             number = of_kind[group.kind]
             base = _base(shift, group, name, number, stations)
             device, speed = id_of(group.kind, number), _speed(streams, group, name)
-            units.append(Unit(shift, len(units), name, device, group, base, speed))
+            units.append(
+                Unit(
+                    world=shift,
+                    number=len(units),
+                    name=name,
+                    device=device,
+                    group=group,
+                    base=base,
+                    speed=speed,
+                )
+            )
     return units
 
 

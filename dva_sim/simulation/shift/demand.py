@@ -259,15 +259,15 @@ class Demand:
         now, luck, config = self._clock.now, self.luck[stream], self._scenario.demand[stream]
         place = luck.place(index)
         incident = Incident(
-            stream,
-            index,
-            next(self._numbers),
-            config.kind,
-            place,
-            luck.true(index),
-            luck.severity(index),
-            config.confidence,
-            now,
+            stream=stream,
+            index=index,
+            number=next(self._numbers),
+            kind=config.kind,
+            place=place,
+            true=luck.true(index),
+            severity=luck.severity(index),
+            confidence=config.confidence,
+            occurred=now,
         )
         self._happens(incident)
         after = luck.noticed_after(incident)

@@ -80,7 +80,17 @@ def _incident(shift: Shift, stream: int, index: int) -> Incident:
     """An incident again, as far as its way matters."""
     luck, kind = shift.demand.luck[stream], shift.scenario.demand[stream].kind
     place = luck.place(index)
-    return Incident(stream, index, 0, kind, place, True, 0.5, 0.5, 0.0)
+    return Incident(
+        stream=stream,
+        index=index,
+        number=0,
+        kind=kind,
+        place=place,
+        true=True,
+        severity=0.5,
+        confidence=0.5,
+        occurred=0.0,
+    )
 
 
 def _best(shift: Shift, incident: Incident, stations: list[Place]) -> float:

@@ -139,7 +139,15 @@ class DriveTrial(Trial[Observation]):
         """See `Trial`."""
         at = self.plant
         tick = round(1000 * self.now)
-        return Observation(tick, at.x, at.y, at.heading, at.speed, at.turn_rate, ())
+        return Observation(
+            tick=tick,
+            x=at.x,
+            y=at.y,
+            heading=at.heading,
+            speed=at.speed,
+            turn_rate=at.turn_rate,
+            hazards=(),
+        )
 
     def decide(self, driver: Driver, seen: Observation, now: float) -> None:
         """See `Trial`."""

@@ -183,7 +183,18 @@ class CursorTrial(Trial[Sighting]):
         vx, vy, tvx, tvy = self._motion.velocities()
         if self.goal.stands:
             tvx = tvy = 0.0
-        return Sighting(round(1000 * now), x, y, vx, vy, tx, ty, tvx, tvy, self.goal.tolerance)
+        return Sighting(
+            tick=round(1000 * now),
+            x=x,
+            y=y,
+            vx=vx,
+            vy=vy,
+            target_x=tx,
+            target_y=ty,
+            target_vx=tvx,
+            target_vy=tvy,
+            tolerance=self.goal.tolerance,
+        )
 
     def decide(self, driver: Driver, seen: Sighting, now: float) -> None:
         """See `Trial`."""

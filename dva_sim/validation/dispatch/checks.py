@@ -147,7 +147,19 @@ def check_identities(seed: int, progress: Progress = lambda done: None) -> list[
         for what, off in check_identity(name, seed):
             found, title = certain(off), name[0].upper() + name[1:]
             judged = verdict(found, 0.0)
-            checks.append(Check(name, title, what, 0.0, found, judged, "", 0, "identity"))
+            checks.append(
+                Check(
+                    case=name,
+                    title=title,
+                    measure=what,
+                    exact=0.0,
+                    found=found,
+                    verdict=judged,
+                    source="",
+                    events=0,
+                    kind="identity",
+                )
+            )
         progress(done)
     return checks
 
@@ -224,4 +236,14 @@ def _check(
     strict = kind == "result" and measure not in case.loosely
     judged = verdict(found, exact, PRECISION if strict else None)
     events = int(columns["events"].sum())
-    return Check(case.name, case.title, measure, exact, found, judged, case.source, events, kind)
+    return Check(
+        case=case.name,
+        title=case.title,
+        measure=measure,
+        exact=exact,
+        found=found,
+        verdict=judged,
+        source=case.source,
+        events=events,
+        kind=kind,
+    )

@@ -107,7 +107,15 @@ def _run(name: str, source: SourceConfig, row: dict[str, str], path: str, line: 
     except (ConfigError, ValueError, KeyError) as error:
         raise ConfigError(str(error), path, line, 1) from None
     own = source.independent is None or row["group"] in source.independent
-    return SocketRun(condition, name, row["group"], seed, own, realtime, values)
+    return SocketRun(
+        condition=condition,
+        source=name,
+        group=row["group"],
+        seed=seed,
+        independent=own,
+        realtime=realtime,
+        values=values,
+    )
 
 
 def _number(text: str) -> float:

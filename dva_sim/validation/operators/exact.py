@@ -153,7 +153,18 @@ def _person(gain: float = 1.0) -> Person:
 
 def _cursor(x: float, target: float) -> Sighting:
     """A cursor on a line, and a target that stands still [m]."""
-    return Sighting(0, x, 0.0, 0.0, 0.0, target, 0.0, 0.0, 0.0, 0.0)
+    return Sighting(
+        tick=0,
+        x=x,
+        y=0.0,
+        vx=0.0,
+        vy=0.0,
+        target_x=target,
+        target_y=0.0,
+        target_vx=0.0,
+        target_vy=0.0,
+        tolerance=0.0,
+    )
 
 
 Values = dict[str, float]

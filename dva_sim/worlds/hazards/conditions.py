@@ -60,11 +60,11 @@ def together(a: Conditions, b: Conditions) -> Conditions:
         H. Le Chatelier, Annales des Mines 19 (1891) 388: limits of mixed gases.
     """
     return make_conditions(
-        max(a.temperature, b.temperature, AMBIENT),
-        a.heat_flux + b.heat_flux,
-        a.extinction + b.extinction,
-        a.co + b.co,
-        min(1.0, a.gas + b.gas),
-        a.water + b.water,
-        a.explosive + b.explosive,
+        temperature=max(a.temperature, b.temperature, AMBIENT),
+        heat_flux=a.heat_flux + b.heat_flux,
+        extinction=a.extinction + b.extinction,
+        co=a.co + b.co,
+        gas=min(1.0, a.gas + b.gas),
+        water=a.water + b.water,
+        explosive=a.explosive + b.explosive,
     )

@@ -322,13 +322,13 @@ class FireField(SolvedField):
         heat += _glow(layer.temperature, layer.extinction * layer.depth)
         share = _within(layer.bottom)
         return make_conditions(
-            AMBIENT + share * (layer.temperature - AMBIENT),
-            heat,
-            share * layer.extinction,
-            share * layer.co,
-            0.0,
-            0.0,
-            0.0,
+            temperature=AMBIENT + share * (layer.temperature - AMBIENT),
+            heat_flux=heat,
+            extinction=share * layer.extinction,
+            co=share * layer.co,
+            gas=0.0,
+            water=0.0,
+            explosive=0.0,
         )
 
     def layer(self, space: int, time: float) -> Layer | None:
