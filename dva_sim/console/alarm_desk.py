@@ -192,5 +192,11 @@ def _of_events(events: Iterable[Line], now_ms: int) -> Iterator[AlarmCondition]:
             if now_ms - closed < 1000 * ESCALATED_FOR:
                 text = f"{kind.capitalize()}, {place}: escalated, others have to go"
                 yield AlarmCondition(
-                    *(f"escalated {number}", "escalation", "critical", place, text, closed, number)
+                    key=f"escalated {number}",
+                    kind="escalation",
+                    priority="critical",
+                    place=place,
+                    text=text,
+                    since_ms=closed,
+                    event=number,
                 )

@@ -109,7 +109,15 @@ def settings_of(line: dict[str, Any]) -> PhoneSettings:
         changes["filter"] = _one_of(line, "filter", known_filters())
     pipeline = _one_of(line, "pipeline", PIPELINES)
     keep = line.get("keep") is True
-    return PhoneSettings(measured, changes, pipeline, chosen, True, ios, keep)
+    return PhoneSettings(
+        reference=measured,
+        changes=changes,
+        pipeline=pipeline,
+        filter=chosen,
+        calibrated=True,
+        ios=ios,
+        keep=keep,
+    )
 
 
 def _number(line: dict[str, Any], key: str, limits: tuple[float, float]) -> float:

@@ -165,6 +165,14 @@ class RoomActions:
                 said(ok, text, **more)
 
             event = self._rooms.event_of(robot)
-            Takeover(room.agent, robot, reason, event, seat.device.id_tag, take, ended).begin()
+            Takeover(
+                agent=room.agent,
+                robot=robot,
+                reason=reason,
+                event=event,
+                seat=seat.device.id_tag,
+                take=take,
+                said=ended,
+            ).begin()
 
         self._room(client, line, said, begin)

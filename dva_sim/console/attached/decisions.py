@@ -81,7 +81,15 @@ class AttachedDecisions:
             else:
                 self._send(robot, event, said)
 
-        Takeover(agent, robot, str(line["reason"]), event, None, take, said).begin()
+        Takeover(
+            agent=agent,
+            robot=robot,
+            reason=str(line["reason"]),
+            event=event,
+            seat=None,
+            take=take,
+            said=said,
+        ).begin()
 
     def _robot(self, number: Any) -> str:
         """The id of a robot that pages know by a number.

@@ -82,11 +82,11 @@ async def run(options: argparse.Namespace) -> None:
     telling = asyncio.gather(cameras.keep_telling(), hub.keep_tidy())
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
-    app = make_app(access, hub, cameras, files, door, audit, options.report)
+    app = make_app(access, hub, cameras, files, door=door, audit=audit, report=options.report)
     listeners = 2 if phones else 1
     serves = [serve(make_server(app), sock, fitting_places(listeners), over)]
     if phones:
-        app = make_app(phones.access, hub, cameras, files, door, audit)
+        app = make_app(phones.access, hub, cameras, files, door=door, audit=audit)
         server = make_server(app, phones.certificate)
         serves.append(serve(server, phones.sock, fitting_places(listeners), over))
     await asyncio.gather(*serves)

@@ -108,7 +108,17 @@ def new_authority(machine: str, hosts: Hosts, now: datetime) -> Signed:
     key = ec.generate_private_key(ec.SECP256R1())
     name = _name(f"dva-sim on {machine}"[:64])
     builder = _builder(name, name, key, now, AUTHORITY_DAYS)
-    usage = x509.KeyUsage(False, False, False, False, False, True, True, False, False)
+    usage = x509.KeyUsage(
+        digital_signature=False,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=True,
+        crl_sign=True,
+        encipher_only=False,
+        decipher_only=False,
+    )
     builder = builder.add_extension(x509.BasicConstraints(True, 0), critical=True)
     builder = builder.add_extension(usage, critical=True)
     builder = builder.add_extension(_constraints(hosts), critical=True)
@@ -121,7 +131,17 @@ def new_leaf(authority: Signed, hosts: Hosts, now: datetime) -> Signed:
     key = ec.generate_private_key(ec.SECP256R1())
     issuer = authority.certificate.subject
     builder = _builder(_name("dva-sim console"), issuer, key, now, LEAF_DAYS)
-    usage = x509.KeyUsage(True, False, False, False, False, False, False, False, False)
+    usage = x509.KeyUsage(
+        digital_signature=True,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        key_cert_sign=False,
+        crl_sign=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
     server = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])
     known = x509.AuthorityKeyIdentifier.from_issuer_public_key(authority.key.public_key())
     builder = builder.add_extension(hosts.alternatives(), critical=False)

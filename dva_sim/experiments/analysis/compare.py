@@ -342,7 +342,13 @@ def _verdicts(
         _refuse_undecided(gate, group, first, second)
         bound = gate.bound.for_(first)
         yield GateVerdict(
-            gate, group.part, group.levels, first, second, bound, (shares[0], shares[1])
+            gate=gate,
+            part=group.part,
+            levels=group.levels,
+            first=first,
+            second=second,
+            bound=bound,
+            missing=(shares[0], shares[1]),
         )
 
 

@@ -148,7 +148,9 @@ def parse(text: str) -> Gate:
     bound = _bound(words, unit)
     if words.kind != "end":
         raise words.error(f"{words.word!r} is too much")
-    return Gate(text, statistic, measure, test, per, sign, bound)
+    return Gate(
+        text=text, statistic=statistic, measure=measure, test=test, per=per, sign=sign, bound=bound
+    )
 
 
 def percent_of(statistic: str) -> float | None:

@@ -201,13 +201,13 @@ def _compared(
     if pairs is None or found is None or not found.n_persons:
         return Compared(name, contrast, at)
     return Compared(
-        name,
-        contrast,
-        at,
-        found,
-        effect_size(*pairs),
-        pair_correlation(pairs.first, pairs.second),
-        permutation_test(*pairs),
+        name=name,
+        contrast=contrast,
+        at=at,
+        difference=found,
+        size=effect_size(*pairs),
+        correlation=pair_correlation(pairs.first, pairs.second),
+        p=permutation_test(*pairs),
     )
 
 

@@ -91,10 +91,19 @@ def typical_and_worst(
     for row in (int(rows[at]) for at in chosen):
         moments, incidents = _seen(files, tables.tracks, part, runs, row)
         where = {name: plain_level(runs[name][row]) for name in tables.names}
-        who = int(runs["person"][row]), int(runs["trial"][row])
         rank = float((every < values[row]).mean())
-        value = float(values[row])
-        episodes.append(KeptEpisode(where, *who, value, moments, incidents, len(rows), rank))
+        episodes.append(
+            KeptEpisode(
+                setting=where,
+                person=int(runs["person"][row]),
+                trial=int(runs["trial"][row]),
+                value=float(values[row]),
+                moments=moments,
+                incidents=incidents,
+                kept=len(rows),
+                rank=rank,
+            )
+        )
     return episodes[0], episodes[1]
 
 

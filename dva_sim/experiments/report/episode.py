@@ -91,13 +91,13 @@ class EpisodeRequest:
     ) -> EpisodeRequest:
         """From the options of `dva_sim.episode`; those that are not named here are of `Wanted`."""
         return cls(
-            str(scenario),
-            seed,
-            set,
-            None if side_by_side is None else joined(side_by_side),
-            Wanted.of(**pictures),
-            None if record is None else Path(record),
-            overwrite,
+            scenario=str(scenario),
+            seed=seed,
+            set=set,
+            side_by_side=None if side_by_side is None else joined(side_by_side),
+            pictures=Wanted.of(**pictures),
+            record=None if record is None else Path(record),
+            overwrite=overwrite,
         )
 
     def __post_init__(self) -> None:

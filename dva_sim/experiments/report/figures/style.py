@@ -220,7 +220,16 @@ def finish(
     FigureCanvasSVG(figure).print_svg(svg, metadata=metadata)  # type: ignore[no-untyped-call]
     table = numbers.csv() if numbers else b""
     told = tuple(filter(None, reads))
-    return Drawn(name, title, caption, svg.getvalue(), png.getvalue(), table, figure, told)
+    return Drawn(
+        name=name,
+        title=title,
+        caption=caption,
+        svg=svg.getvalue(),
+        png=png.getvalue(),
+        csv=table,
+        figure=figure,
+        reads=told,
+    )
 
 
 def axis_label(name: str, text: str | None = None) -> str:
