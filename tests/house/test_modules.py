@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -142,3 +143,105 @@ def test_each_package_says_what_it_is():
     for name, path in MODULES.items():
         if path.name == "__init__.py":
             assert ast.get_docstring(tree_of(path)), name
+
+
+# --- what no module does ---------------------------------------------------------------
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+FLOORS = {
+    room: floor
+    for floor, rooms in enumerate(reversed(CONTRACTS["contracts"][0]["layers"]))
+    for room in rooms.split(" | ")
+}
+MOST_ARGUMENTS = 6
+VARIADIC = {"_columns", "_new", "add_row", "attrgetter", "call_at", "chain", "pack"}
+"""What takes any number of arguments of one kind, or hands them on."""
+
+
+def faults_of(node: ast.AST, room: str) -> Iterator[str]:
+    """What a statement or expression does that none should; the room is where it stands."""
+    if isinstance(node, ast.Import):
+        yield from _faults_of_import([each.name for each in node.names])
+    elif isinstance(node, ast.ImportFrom) and not node.level:
+        yield from _faults_of_import([f"{node.module}.{each.name}" for each in node.names])
+    elif isinstance(node, ast.Assign | ast.Delete):
+        for target in map(ast.unparse, node.targets):
+            # The file of a user gets a name of its own there, as importlib's page shows it.
+            if re.match(r"(sys\.)?modules\[", target) and target != "sys.modules[unique]":
+                yield f"stands in for a module: {target}"
+    elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        if node.value.id == "ast" and node.attr != "literal_eval":
+            yield f"reads source: ast.{node.attr}"
+    elif isinstance(node, ast.Call):
+        yield from _faults_of_call(node)
+    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        named = re.findall(r"^dva_sim\.(\w+)(?:[\w.]*:\w+|\.[\w.]*)?$", node.value)
+        if room in FLOORS and any(FLOORS.get(each, -1) > FLOORS[room] for each in named):
+            yield f"names a room above it: {node.value}"
+
+
+def _faults_of_import(names: Iterable[str]) -> Iterator[str]:
+    for name in names:
+        package, *rest = name.split(".")
+        if package != "dva_sim" and any(re.match(r"_(?!_)", part) for part in rest):
+            yield f"is private: {name}"
+        if package == "ast" and rest:
+            yield f"reads source: {name}"
+
+
+def _faults_of_call(call: ast.Call) -> Iterator[str]:
+    called = ast.unparse(call.func)
+    if called in ("gc.set_threshold", "set_threshold"):
+        yield "sets when garbage is looked for"
+    given = 0
+    for each in call.args:
+        spread = isinstance(each, ast.Starred) and isinstance(each.value, ast.Tuple | ast.List)
+        given += len(each.value.elts) if spread else 1
+    if given > MOST_ARGUMENTS and called.rpartition(".")[2] not in VARIADIC:
+        yield f"may exchange arguments: {called} with {given} by their place"
+
+
+def test_no_module_does_what_none_should():
+    found = {}
+    for name, path in MODULES.items():
+        room = name.split(".")[1] if "." in name else ""
+        faults = [f for node in ast.walk(tree_of(path)) for f in faults_of(node, room)]
+        if faults:
+            found[name] = faults
+    assert found == {"dva_sim.kernel.rare_collection": ["sets when garbage is looked for"]}
+
+
+@pytest.mark.parametrize(
+    ("source", "fault"),
+    [
+        ("from scipy.ndimage._measurements import label", "private"),
+        ("import pymunk._chipmunk_cffi", "private"),
+        ("def f():\n    from typer.main import _main", "private"),
+        ("sys.modules['scipy'] = stand_in", "stands in"),
+        ("from sys import modules\nmodules[package] = module", "stands in"),
+        ("del sys.modules['numpy']", "stands in"),
+        ("import ast\nast.parse(text)", "reads source"),
+        ("from ast import parse", "reads source"),
+        ("class A:\n    teller = 'dva_sim.cli.stories:tell_any'", "above"),
+        ("page = 'dva_sim.experiments.report.shift_page:ShiftPage'", "above"),
+        ("import_module('dva_sim.api')", "above"),
+        ("Band(mean, low, high, lowest, highest, critical, count)", "exchange"),
+        ("Band(*(mean, low, high, lowest), highest, critical, count)", "exchange"),
+        ("gc.set_threshold(50_000)", "garbage"),
+    ],
+)
+def test_what_none_should_do_is_found_where_it_is_done(source, fault):
+    (found,) = [f for node in ast.walk(ast.parse(source)) for f in faults_of(node, "simulation")]
+    assert fault in found
+
+
+def test_what_looks_alike_is_no_fault():
+    source = """
+from __future__ import annotations
+import dva_sim.cli
+level = ast.literal_eval(word)
+sys.modules[unique] = module
+rooms = ["dva_sim.kernel.errors", "see dva_sim.cli for more"]
+Band(mean, low, high, lowest, highest=highest, critical=critical, count=count)
+table.add_row(a, b, c, d, e, f, g)
+"""
+    assert [f for node in ast.walk(ast.parse(source)) for f in faults_of(node, "simulation")] == []
