@@ -1,15 +1,10 @@
-"""A live run on the terminal: the table of devices, and the story as it happens.
-
-Keys for the devices of a scenario, by the names that people use.
-"""
+"""A live run on the terminal: the table of devices, and the story as it happens."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -20,16 +15,14 @@ from rich.text import Text
 
 from dva_sim.cli.verbosity import detail, is_verbose
 from dva_sim.core.registry import DETECTOR
-from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live import process
 from dva_sim.live.options import PARTS, LiveOptions
 from dva_sim.live.process import Report, run_part
 from dva_sim.live.supervisor import Summary, Supervisor
-from dva_sim.network.keys import create_keys
 from dva_sim.network.sockets import DEFAULT_PORT
-from dva_sim.simulation.full.stage import DVA, id_of, label_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict, refuse_broken
-from dva_sim.simulation.scenario import build, contradictions, load
+from dva_sim.simulation.scenario import contradictions
 
 STORY_LINES = 12
 ALWAYS_TOLD = "refused", "not sent", "form", "not recorded"  # in the names of counters
@@ -242,42 +235,3 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
 def _print_rules(console: Console, found: Sequence[Verdict]) -> None:
     for verdict in found:
         _print(console, str(verdict))
-
-
-_ID = re.compile(r"[0-9A-F]{2}(:[0-9A-F]{2}){5}")
-_LABEL = re.compile(r"(robot|guard|operator|detector|control-room)-([1-9][0-9]{0,3})")
-
-
-def make_keys(folder: Path, names: Iterable[str]) -> str:
-    """Make a pair of keys for each device that has none.
-
-    Args:
-        folder: Where keys are kept.
-        names: Ids, names such as `robot-1` or `dva`, or scenarios: all devices of one.
-
-    Returns:
-        What was done, in a line for people.
-
-    Raises:
-        ConfigError: a name that stands for nothing, or a folder that cannot be written.
-    """
-    wanted = dict.fromkeys(id_tag for name in names for id_tag in _ids(name))
-    made = create_keys(folder, wanted)
-    kept = len(wanted) - len(made)
-    return f"{folder}: made {len(made)} pairs of keys" + (f", {kept} were there" if kept else "")
-
-
-def _ids(name: str) -> Iterator[str]:
-    label = _LABEL.fullmatch(name)
-    if _ID.fullmatch(name):
-        yield name
-    elif name == label_of("dva", 1):
-        yield DVA
-    elif label:
-        yield id_of(label[1], int(label[2]))
-    else:
-        try:
-            scenario = build(load(name))
-        except ConfigError as error:
-            raise ConfigError(f"{name!r} is no device (dva, robot-1) and no scenario") from error
-        yield from team_of(scenario)

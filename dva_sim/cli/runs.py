@@ -416,6 +416,6 @@ def keys(
         dva-sim keys keys dva robot-1 operator-1  # for these devices
         dva-sim keys keys 56:2B:04:E4:56:D8  # for a device of another make
     """
-    from dva_sim.cli.live_screen import make_keys  # late: start-up
+    from dva_sim.cli.device_keys import make_keys  # late: start-up
 
     typer.echo(make_keys(folder, names))

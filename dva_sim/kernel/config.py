@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationErro
 from pydantic_core import CoreSchema
 
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.quantities import as_number
 from dva_sim.kernel.suggestions import either, guess, listed, plain_name, unknown
-from dva_sim.kernel.units import as_number
 from dva_sim.kernel.yaml_files import KeyPath
 
 Scalar = bool | int | float | str | None

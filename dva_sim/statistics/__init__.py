@@ -76,7 +76,8 @@ from dva_sim.statistics.paired_differences import (
 )
 from dva_sim.statistics.persons import LEVEL, Floats, Interval, person_means, students_t
 from dva_sim.statistics.proportions import quantile_interval, share_interval
-from dva_sim.statistics.sensitivity import Effect, SobolIndex, factorial_effects, sobol_indices
+from dva_sim.statistics.sensitivity import Effect, factorial_effects
+from dva_sim.statistics.sobol import SobolIndex, sobol_indices
 
 __all__ = [
     "CUT",

@@ -8,7 +8,7 @@ from helpers.wording import unnamed
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.units import as_number
+from dva_sim.kernel.quantities import as_number
 from dva_sim.simulation.scenario import Scenario
 
 

@@ -8,7 +8,7 @@ from helpers.processes.command_line import call
 from helpers.processes.programs import Program, Programs
 from helpers.wording import unnamed
 
-from dva_sim.cli.live_screen import make_keys
+from dva_sim.cli.device_keys import make_keys
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.keys import KeyRing
 from dva_sim.simulation.full.stage import DVA, id_of

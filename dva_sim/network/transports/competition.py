@@ -25,14 +25,8 @@ from dva_sim.kernel.config import Config, Key
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Direction, Link, LinkConfig, Serialiser
 from dva_sim.network.tcp import TcpConnection
-from dva_sim.network.transports.config import (
-    Ends,
-    Rtnp,
-    TransportConfig,
-    TransportMessage,
-    TransportSession,
-    Udp,
-)
+from dva_sim.network.transports.config import Rtnp, TransportConfig, Udp
+from dva_sim.network.transports.session import Ends, TransportMessage, TransportSession
 from dva_sim.network.transports.sessions import ALL, open_session
 
 WAYS: tuple[Direction, Direction] = ("up", "down")

@@ -2,20 +2,15 @@
 
 No option of a transport that is only in the manner of its paper has a default: its numbers are not
 the paper's, so who uses it sets them and says so.
-
-What a transport of teleoperation carries, and what every transport offers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from dva_sim.kernel.config import Config
-from dva_sim.network.link import Link
 
 Header = Annotated[int, Field(ge=0, le=200)]
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -154,51 +149,4 @@ class Zeromq(Config):
 TransportConfig = Annotated[
     Udp | Rtnp | Trinomial | Irtp | Btp | Tcp | Zeromq, Field(discriminator="kind")
 ]
-
-
-Deliver = Callable[[int], object]
 """Called with the number of a message once all of it has arrived."""
-
-
-@dataclass(frozen=True, slots=True)
-class TransportMessage:
-    """A command or a picture.
-
-    Attributes:
-        number: Counts the messages of its direction from 0.
-        size: Without any header [B].
-        crucial: Whether it must arrive, as a stop must.
-    """
-
-    number: int
-    size: int
-    crucial: bool = False
-
-
-@dataclass(frozen=True)
-class Ends:
-    """What a transport stands between.
-
-    Attributes:
-        up: The link that commands take.
-        down: The link that pictures take.
-        on_command: Told of every command at the robot.
-        on_picture: Told of every picture at the operator.
-    """
-
-    up: Link
-    down: Link
-    on_command: Deliver
-    on_picture: Deliver
-
-
-class TransportSession(NamedTuple):
-    """A session over a transport.
-
-    Attributes:
-        command: Sends a command to the robot.
-        picture: Sends a picture to the operator.
-    """
-
-    command: Callable[[TransportMessage], object]
-    picture: Callable[[TransportMessage], object]

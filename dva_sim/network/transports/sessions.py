@@ -10,14 +10,10 @@ from dva_sim.network.link import Link
 from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
 from dva_sim.network.transports.config import (
     Btp,
-    Deliver,
-    Ends,
     Irtp,
     Rtnp,
     Tcp,
     TransportConfig,
-    TransportMessage,
-    TransportSession,
     Trinomial,
     Zeromq,
 )
@@ -25,6 +21,7 @@ from dva_sim.network.transports.datagrams import DatagramSender
 from dva_sim.network.transports.feedback import Echo
 from dva_sim.network.transports.message_parts import IP_UDP, Assembly, parts_of
 from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
+from dva_sim.network.transports.session import Deliver, Ends, TransportMessage, TransportSession
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 
 

@@ -1,14 +1,6 @@
 """What one run consists of: site, team, network, phone, events; units are in the keys."""
 
-from dva_sim.simulation.scenario.contradictions import (
-    TRIPS_OF_A_START,
-    command_timeout_s,
-    contradictions,
-    mean_processing_s,
-    request_timeout_s,
-    start_needs_s,
-    time_out_s,
-)
+from dva_sim.simulation.scenario.contradictions import contradictions
 from dva_sim.simulation.scenario.loading import FOLDER, build, check_policy, load, locate_files
 from dva_sim.simulation.scenario.parts import (
     AccessConfig,
@@ -25,6 +17,14 @@ from dva_sim.simulation.scenario.scenario import (
     population,
     robot_profiles,
     site_of,
+)
+from dva_sim.simulation.scenario.time_outs import (
+    TRIPS_OF_A_START,
+    command_timeout_s,
+    mean_processing_s,
+    request_timeout_s,
+    start_needs_s,
+    time_out_s,
 )
 
 __all__ = [

@@ -14,7 +14,6 @@ from dva_sim.kernel.config import Fail
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
-from dva_sim.simulation.scenario.contradictions import command_timeout_s, request_timeout_s
 from dva_sim.simulation.scenario.parts import EventConfig
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
@@ -23,6 +22,7 @@ from dva_sim.simulation.scenario.scenario import (
     robot_profiles,
     site_of,
 )
+from dva_sim.simulation.scenario.time_outs import command_timeout_s, request_timeout_s
 from dva_sim.worlds.hazards import KINDS, find_hazard, make_hazard
 from dva_sim.worlds.site import load_site
 

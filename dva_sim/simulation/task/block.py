@@ -1,225 +1,26 @@
-"""Trials in which a vehicle is driven: around a corner, a slalom, a course.
-
-A block of trials: one person does what a scenario asks for, trial after trial.
-"""
+"""A block of trials: one person does what a scenario asks for, trial after trial."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
-from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import (
-    Driver,
-    Intent,
-    Oracle,
-    Reach,
-    Truth,
-    View,
     load_strategy,
 )
 from dva_sim.agents.population import Person, draw_person
-from dva_sim.agents.route_following import Route
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.simulation.scenario.scenario import population
-from dva_sim.simulation.task import measures
-from dva_sim.simulation.task.delays import RecordedChannel, RecordedDelays, normals
-from dva_sim.simulation.task.devices import Joystick, Pair, Unicycle
-from dva_sim.simulation.task.pointing import (
-    CursorTrial,
-    Goal,
-    PointGoal,
-    ReachGoal,
-    TrackGoal,
-    TunnelGoal,
-)
-from dva_sim.simulation.task.scenario import (
-    Corner,
-    Course,
-    Pointing,
-    ReachTask,
-    Slalom,
-    Task,
-    TaskScenario,
-    Tracking,
-    Tunnel,
-)
-from dva_sim.simulation.task.trial import Seat, Trace, Trial, WayKept
-
-RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
-MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
-CONE = 0.1  # radius in a picture [m]
-CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
-Points = list[Pair]
-
-
-def way_of(task: Task, first: float, width: float) -> Points:
-    """The middle of the way that a vehicle has to take, from (0, 0) along x at first [m].
-
-    Args:
-        task: A corner, slalom or course.
-        first: The condition's length or spacing [m].
-        width: Of the way [m].
-    """
-    if isinstance(task, Corner):
-        leg = 0.5 * first
-        return [(0.0, 0.0), (leg, 0.0), (leg, leg)]
-    if isinstance(task, Slalom):
-        end = task.cones * first
-        steps = np.linspace(0.0, end, max(2, round(end / CONE_STEP)) + 1)
-        return [(float(x), task.swing_m * math.sin(math.pi * x / first)) for x in steps]
-    assert isinstance(task, Course)
-    return list(task.points_m)
-
-
-def length_of(points: Points) -> float:
-    """Way along the corners [m]."""
-    return sum(math.dist(a, b) for a, b in pairwise(points))
-
-
-def extended(points: Points, by: float) -> Route:
-    """The way, going straight on after its end [m]."""
-    (ax, ay), (bx, by_) = points[-2:]
-    step = math.dist((ax, ay), (bx, by_))
-    on = bx + by * (bx - ax) / step, by_ + by * (by_ - ay) / step
-    return Route(np.array([*points, on]))
-
-
-class DriveTrial(Trial[Observation]):
-    """One drive with a joystick: forward is speed, sideways is turn rate.
-
-    The body is as wide as `plant.width_m`; that it crosses the edge of the way is counted once
-    until it is back, and nothing holds it.
-
-    Args:
-        scenario: Vehicle, links, frames.
-        seat: Who drives.
-        condition: See the kinds of tasks.
-        streams: The luck of this trial.
-        reaction: See `Trial`.
-    """
-
-    STEP = 0.01
-    plant: Unicycle
-
-    def __init__(
-        self,
-        scenario: TaskScenario,
-        seat: Seat,
-        condition: tuple[float, float],
-        streams: Streams,
-        reaction: float = 0.0,
-    ) -> None:
-        plant = scenario.plant
-        assert plant.speed_mps is not None
-        self._top = plant.speed_mps, math.radians(plant.turn_rate_deg_s)
-        unit = scenario.device.model_copy(update={"gain": 1.0})
-        device = Joystick(unit, seat.person, streams, self.STEP)
-        super().__init__(scenario, seat, Reach(*self._top), device, streams, reaction)
-        self.points = way_of(scenario.task, *condition)
-        self.length, self.width = length_of(self.points), condition[1]
-        self._kept = WayKept(0.5 * (self.width - plant.width_m))
-        self._seen_way, self._way = (extended(self.points, RUN_OUT) for _ in range(2))
-        self.plant = Unicycle(plant.lag_s, *self._top)
-        self.plant.heading = math.atan2(self.points[1][1], self.points[1][0])
-        self._errors = normals(streams.fresh("judgement"))
-
-    def replay(self, recording: RecordedDelays, begin: float) -> None:
-        """Take the link from a recording, from `begin` [s] in it on; no link reaches the oracle."""
-        if not self.is_oracle:
-            self._up = RecordedChannel(recording.up, begin, 0.0)
-            self._frames = RecordedChannel(recording.down, begin, self._late)
-
-    def sight(self) -> Observation:
-        """See `Trial`."""
-        at = self.plant
-        tick = round(1000 * self.now)
-        return Observation(
-            tick=tick,
-            x=at.x,
-            y=at.y,
-            heading=at.heading,
-            speed=at.speed,
-            turn_rate=at.turn_rate,
-            hazards=(),
-        )
-
-    def decide(self, driver: Driver, seen: Observation, now: float) -> None:
-        """See `Trial`."""
-        delay = self.seat.delay
-        delay.see(now, seen.speed, seen.turn_rate)
-        if isinstance(driver, Oracle):
-            intent = driver.drive(self._seen_way, Truth(seen), 0.0)
-        else:
-            intent = driver.drive(self._seen_way, View(now, self._judged(seen), delay.value), 0.0)
-        self.device.aim(intent.speed / self._top[0], intent.turn_rate / self._top[1])
-        self.intended(now, intent.speed, intent.turn_rate)
-
-    def _judged(self, seen: Observation) -> Observation:
-        """As the person takes it: place and heading with an error."""
-        person, error = self.seat.person, self._errors
-        return seen._replace(
-            x=seen.x + person.position_error * next(error),
-            y=seen.y + person.position_error * next(error),
-            heading=seen.heading + person.heading_error * next(error),
-        )
-
-    def advance(self, dt: float) -> None:
-        """See `Trial`."""
-        plant = self.plant
-        speed, turn = self.commanded(dt)
-        wanted = Intent(speed * self._top[0], turn * self._top[1])
-        if self.scenario.automation:
-            wanted = self._corrected(self.scenario.automation, wanted)
-        plant.step(wanted.speed, wanted.turn_rate, dt)
-        self.path += plant.speed * dt
-        ahead = self._way.ahead(plant.x, plant.y, 0.0, 0.0)
-        self._kept.note(ahead.offset, (plant.x, plant.y), dt)
-        self.over = ahead.remaining <= RUN_OUT
-
-    def _corrected(self, share: float, wanted: Intent) -> Intent:
-        """The machine helps to steer (pure pursuit); the speed stays the person's."""
-        at = self.plant
-        ahead = self._way.ahead(at.x, at.y, at.heading, MACHINE_LOOK)
-        own = at.speed * 2.0 * math.sin(ahead.bearing) / max(ahead.distance, 0.1)
-        return Intent(wanted.speed, (1.0 - share) * wanted.turn_rate + share * own)
-
-    def row(self) -> dict[str, Any]:
-        """What is measured."""
-        return {
-            "steering_id": measures.steering_id(self.length, self.width),
-            "movement_time_s": self.now,
-            "completed": float(self.over),
-            **self._kept.row(self.now),
-        }
-
-    def draw_goal(self) -> None:
-        """Add the geometry to the trace."""
-        self.trace.touched += self._kept.touched
-        for side in (-1.0, 1.0):
-            self.trace.walls.append(beside(self.points, side * 0.5 * self.width))
-        task = self.scenario.task
-        if isinstance(task, Slalom):
-            spacing = self.points[-1][0] / task.cones
-            self.trace.marks += [((n + 0.5) * spacing, 0.0, CONE) for n in range(task.cones)]
-
-
-def beside(points: Points, aside: float) -> Points:
-    """A line to the left of another one, mitred at its corners [m]."""
-    steps = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(points)]
-    before, after = [steps[0], *steps], [*steps, steps[-1]]
-    line = []
-    for (x, y), first, second in zip(points, before, after, strict=True):
-        half = 0.5 * math.remainder(second - first, 2.0 * math.pi)
-        far = aside / max(math.cos(half), 0.2)
-        line.append((x - far * math.sin(first + half), y + far * math.cos(first + half)))
-    return line
-
+from dva_sim.simulation.task.driving import DriveTrial
+from dva_sim.simulation.task.pointing import CursorTrial, Goal
+from dva_sim.simulation.task.recorded_delays import RecordedDelays
+from dva_sim.simulation.task.scenario import TaskScenario
+from dva_sim.simulation.task.target_goals import PointGoal, ReachGoal, TrackGoal
+from dva_sim.simulation.task.tasks import Pointing, ReachTask, Tracking, Tunnel
+from dva_sim.simulation.task.trial import Seat, Trace
+from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
 Row = dict[str, Any]
 PAUSE = 1.0  # between two trials, nothing is done [s]

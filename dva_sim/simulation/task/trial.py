@@ -23,7 +23,8 @@ from dva_sim.agents.operator.strategies import Driver, Oracle, Reach, Strategy
 from dva_sim.agents.population import Person
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.delays import Channel
-from dva_sim.simulation.task.devices import Cursor, HandDevice, Pair, Unicycle
+from dva_sim.simulation.task.devices import HandDevice
+from dva_sim.simulation.task.plants import Cursor, Pair, Unicycle
 from dva_sim.simulation.task.scenario import OneWayDelay, TaskScenario
 
 S = TypeVar("S")  # what a frame shows

@@ -44,7 +44,8 @@ from dva_sim.simulation.shift.distributions import Exponential, Law
 from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.validation.dispatch.exact import cobham
 from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, one_server
-from dva_sim.validation.dispatch.queues import LawMoments, gm1, laplace
+from dva_sim.validation.dispatch.queues import LawMoments, gm1
+from dva_sim.validation.dispatch.transforms import laplace
 
 CheckVerdict = Literal["agrees", "too rough", "differs"]
 

@@ -1,7 +1,5 @@
 """One waiting line, one or more servers: what queueing theory says of it, exactly.
 
-Laplace transforms of the laws that times can follow stand below.
-
 A server is a responder or an operator, a customer an event. Every formula takes rates per
 second and times in seconds, and gives its measures by name:
 
@@ -26,54 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.simulation.shift import distributions
-
-_NODES = 128
-
-
-def laplace(law: distributions.Law, s: float) -> float:
-    """The expected value of `exp(-s X)`, for `s >= 0` [1/s].
-
-    References:
-        Kleinrock, Queueing Systems, vol. 1 (1975), appendix I. The lognormal and the Weibull
-        law have no closed form: they are integrated over the chance they are made from.
-    """
-    if isinstance(law, distributions.Constant):
-        return math.exp(-s * law.mean_s)
-    if isinstance(law, distributions.Exponential):
-        return 1 / (1 + s * law.mean_s)
-    if isinstance(law, distributions.Uniform):
-        width = s * (law.high_s - law.low_s)
-        return math.exp(-s * law.low_s) * (-math.expm1(-width) / width if width else 1.0)
-    if isinstance(law, distributions.Erlang):
-        return (1 + s * law.mean_s / law.phases) ** -law.phases
-    if isinstance(law, distributions.Gamma):
-        return float((1 + s * law.mean_s / law.shape) ** -law.shape)
-    if isinstance(law, distributions.Hyperexponential):
-        fast, slow = 0.5 / law.share, 0.5 / (1 - law.share)  # times the mean
-        rest = 1 - law.share
-        return law.share / (1 + s * law.mean_s * fast) + rest / (1 + s * law.mean_s * slow)
-    if isinstance(law, distributions.Lognormal):
-        return _over_normal(law, s)
-    return _over_exponential(law, s)
-
-
-def _over_normal(law: distributions.Lognormal, s: float) -> float:
-    """The mean over a standard normal number, whose exponential the time is."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(_NODES)
-    times = law.median * np.exp(law.spread * nodes)
-    return float(weights @ np.exp(-s * times) / weights.sum())
-
-
-def _over_exponential(law: distributions.Weibull, s: float) -> float:
-    """The mean over a unit exponential number, a power of which the time is."""
-    scale = law.mean_s / math.gamma(1 + 1 / law.shape)
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    ends = np.array([0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.5, 1, 2, 4, 8, 16, 32, 64])
-    starts, widths = ends[:-1, None], np.diff(ends)[:, None]
-    e = starts + widths * (nodes + 1) / 2
-    inner = np.exp(-s * scale * e ** (1 / law.shape) - e)
-    return float((widths[:, 0] / 2) @ (inner @ weights))
-
+from dva_sim.validation.dispatch.transforms import laplace
 
 Measures = dict[str, float]
 Floats = NDArray[np.float64]

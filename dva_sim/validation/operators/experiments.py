@@ -20,10 +20,10 @@ from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.models import Tables
 from dva_sim.simulation.task import TaskScenario, build, play
-from dva_sim.simulation.task.measures import fit_line
+from dva_sim.simulation.task.movement_laws import fit_line
 from dva_sim.validation.frame import Progress, job_of, play_jobs
 from dva_sim.validation.operators.exact import EXACT
-from dva_sim.validation.operators.verdicts import (
+from dva_sim.validation.operators.trials import (
     Cells,
     Floats,
     Found,

@@ -14,19 +14,13 @@ import numpy as np
 from dva_sim.agents.operator.published import LineKind, TargetLine
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.report.figures.style import Drawn, panels, styled
-from dva_sim.simulation.task.measures import FittedLine, fit_line
+from dva_sim.simulation.task.movement_laws import FittedLine, fit_line
 from dva_sim.validation.frame import captioned
-from dva_sim.validation.operators import exact
+from dva_sim.validation.operators import app_filters, control_loops
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators.exact import SMITH
-from dva_sim.validation.operators.verdicts import (
-    Cells,
-    Floats,
-    LineVerdict,
-    Trials,
-    mean,
-    person_means,
-)
+from dva_sim.validation.operators.trials import Cells, Floats, Trials, mean, person_means
+from dva_sim.validation.operators.verdicts import LineVerdict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,16 +35,16 @@ _SHOWN = 24  # delays
 
 def _loops() -> Drawn:
     figure, [axes] = panels(1, 3, 2.7)
-    _around(axes[0], exact.integrator, math.pi / 2, "Cursor: gain x delay")
-    _around(axes[1], exact.pure_pursuit, 0.5205, "Pursuit: speed x delay / look-ahead")
+    _around(axes[0], control_loops.integrator, math.pi / 2, "Cursor: gain x delay")
+    _around(axes[1], control_loops.pure_pursuit, 0.5205, "Pursuit: speed x delay / look-ahead")
     axes[0].set_ylabel("error, first one = 1")
     _smith(axes[2])
     return captioned(figure, "loops")
 
 
-def _around(axes: Axes, loop: exact.Loop, critical: float, title: str) -> None:
+def _around(axes: Axes, loop: control_loops.Loop, critical: float, title: str) -> None:
     """Errors over time for values around the critical one."""
-    times = np.arange(1, _SHOWN * exact.STEPS + 1) / exact.STEPS
+    times = np.arange(1, _SHOWN * control_loops.STEPS + 1) / control_loops.STEPS
     for share, colour in reversed(_SHARES.items()):
         errors = np.array(loop(share * critical))[: len(times)]
         axes.plot(times, errors / abs(errors[0]), color=colour, lw=1.3, label=f"{share:g}")
@@ -62,8 +56,8 @@ def _around(axes: Axes, loop: exact.Loop, critical: float, title: str) -> None:
 
 def _smith(axes: Axes) -> None:
     gain, delay, at = SMITH
-    places = np.array(exact.smith_response(gain, delay, 2.0))
-    times = np.arange(1, len(places) + 1) * delay / exact.SMITH_STEPS
+    places = np.array(control_loops.smith_response(gain, delay, 2.0))
+    times = np.arange(1, len(places) + 1) * delay / control_loops.SMITH_STEPS
     theory = np.where(times > delay, 1.0 - np.exp(-gain * (times - delay)), 0.0)
     axes.plot(times, theory, color=SOFT, lw=4, alpha=0.35, label="theory")
     axes.plot(times, places, color=BLUE, lw=1.3, label="simulated")
@@ -75,10 +69,12 @@ def _smith(axes: Axes) -> None:
 def _median() -> Drawn:
     figure, [axes] = panels(1, 2, 2.7, width_ratios=[2.2, 1])
     steps, ages = axes
-    levels, look = np.array(exact.STEP_LEVELS), exact.STEP_LOOK
-    steps.plot(np.arange(len(levels)) / exact.RATE, levels, color=SOFT, lw=1.2, label="asked for")
-    for name, colour in ((exact.COPY, BLUE), (exact.IN_PLACE, ORANGE)):
-        outputs = exact.step_outputs(name)
+    levels, look = np.array(app_filters.STEP_LEVELS), app_filters.STEP_LOOK
+    steps.plot(
+        np.arange(len(levels)) / app_filters.RATE, levels, color=SOFT, lw=1.2, label="asked for"
+    )
+    for name, colour in ((app_filters.COPY, BLUE), (app_filters.IN_PLACE, ORANGE)):
+        outputs = app_filters.step_outputs(name)
         times = look * np.arange(1, len(outputs) + 1)
         steps.step(times, outputs, where="post", color=colour, lw=1.8, label=name)
     steps.set(
@@ -91,7 +87,7 @@ def _median() -> Drawn:
 
 def _ages(axes: Axes) -> None:
     bands = {"clean": (0.44, 0.50), "stale": (0.485, 0.545)}
-    for place, (name, age) in enumerate(exact.ages().items()):
+    for place, (name, age) in enumerate(app_filters.ages().items()):
         low, high = bands[name]
         axes.bar([place], [high - low], 0.7, bottom=low, color=SOFT, alpha=0.25, lw=0)
         axes.plot([place], [age], "o", color=BLUE, ms=7)

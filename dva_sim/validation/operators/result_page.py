@@ -15,7 +15,8 @@ from dva_sim.agents.operator.published import LineKind, TargetLine
 from dva_sim.validation.frame import ResultSheet, Row, ValidationResult, short_number
 from dva_sim.validation.operators.experiments import TRIED
 from dva_sim.validation.operators.figures import draw_all
-from dva_sim.validation.operators.verdicts import Cells, LineVerdict, Tally, mean
+from dva_sim.validation.operators.trials import Cells, mean
+from dva_sim.validation.operators.verdicts import LineVerdict, Tally
 
 NAME = "operators"
 HEADS = ("line", "what", "published (band)", "simulated (95 % interval)", "verdict")

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.simulation.task.measures import (
+from dva_sim.simulation.task.movement_laws import (
     crossover,
     effective_width,
     fit_line,

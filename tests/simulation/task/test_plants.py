@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from dva_sim.simulation.task.devices import Cursor, Unicycle
+from dva_sim.simulation.task.plants import Cursor, Unicycle
 
 
 def test_a_cursor_without_lag_goes_as_it_is_told():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dva_sim.simulation.task import build, play
-from dva_sim.simulation.task.delays import FrameStream, RecordedChannel, RecordedDelays
+from dva_sim.simulation.task.recorded_delays import FrameStream, RecordedChannel, RecordedDelays
 
 STRAIGHT = {
     "model": "task",

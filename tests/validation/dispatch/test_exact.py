@@ -16,7 +16,8 @@ from dva_sim.simulation.shift.distributions import (
     Weibull,
 )
 from dva_sim.validation.dispatch import exact
-from dva_sim.validation.dispatch.queues import erlang_b, laplace
+from dva_sim.validation.dispatch.queues import erlang_b
+from dva_sim.validation.dispatch.transforms import laplace
 
 
 def gamma(mean, shape=1.0):

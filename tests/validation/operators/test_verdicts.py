@@ -11,16 +11,15 @@ from helpers.wording import unnamed
 from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.validation.operators import experiments as of
 from dva_sim.validation.operators import result_page
-from dva_sim.validation.operators.verdicts import (
+from dva_sim.validation.operators.trials import (
     Found,
     Trials,
     certain,
     collect,
-    judge,
     mean,
-    outcome_of,
     with_intervals,
 )
+from dva_sim.validation.operators.verdicts import judge, outcome_of
 
 LINES = {line.id: line for line in lines_of(load_targets(), load_split())}
 RULE = load_split().rule

@@ -1,0 +1,57 @@
+"""How long an answer takes over a link, and how long one should wait for it."""
+
+from __future__ import annotations
+
+from dva_sim.agents.robot.command_queue import mean_of
+from dva_sim.simulation.scenario.scenario import (
+    Scenario,
+    robot_profiles,
+)
+
+TRIPS_OF_A_START = 4  # round trips: three until a new connection stands, one for the request
+USUAL_S = 9.0  # time-out, where the link leaves time for an answer
+LONGEST_S = 120.0
+_ROOM = 1.25  # over what is needed, beyond the usual
+
+
+def time_out_s(needed_s: float) -> float:
+    """The time-out of a request that nobody gave one [s]: the usual one, or longer.
+
+    Args:
+        needed_s: What the first answer over a new connection takes [s].
+    """
+    return USUAL_S if needed_s < USUAL_S else min(_ROOM * needed_s, LONGEST_S)
+
+
+def request_timeout_s(scenario: Scenario) -> float:
+    """Time-out of a request: as given, else as the link needs it [s]."""
+    given = scenario.request.timeout_s
+    return time_out_s(start_needs_s(scenario)) if given is None else given
+
+
+def command_timeout_s(scenario: Scenario) -> float:
+    """Time-out of a command that is to be answered, likewise [s]."""
+    given = scenario.command.timeout_s
+    return time_out_s(start_needs_s(scenario)) if given is None else given
+
+
+def start_needs_s(scenario: Scenario) -> float:
+    """What the first answer over a new connection to a robot takes [s]."""
+    return TRIPS_OF_A_START * round_trip_s(scenario) + mean_processing_s(scenario)
+
+
+def command_needs_s(scenario: Scenario) -> float:
+    """What the reply to a command takes, over a connection that stands [s]."""
+    return round_trip_s(scenario) + mean_processing_s(scenario)
+
+
+def round_trip_s(scenario: Scenario) -> float:
+    """Mean delay there and back, without queues and losses [s]."""
+    return sum(scenario.link.toward(way).delay_s for way in ("up", "down"))
+
+
+def mean_processing_s(scenario: Scenario) -> float:
+    """Mean time that a message takes the slowest robot's computer [s]."""
+    if scenario.robot.processing_s is not None:
+        return mean_of(scenario.robot.processing_s)
+    return max((mean_of(robot.processing_s) for robot in robot_profiles(scenario)), default=0.0)

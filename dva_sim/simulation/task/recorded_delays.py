@@ -1,0 +1,87 @@
+"""Drives with the delays and losses of a link as they were recorded, or simulated beforehand.
+
+A recording says of each message of a regular stream when it was made and when it arrived. A drive
+begins at any place of it and goes on from its beginning when it comes to its end.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.simulation.task.delays import EARLY, Channel, T
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FrameStream:
+    """What became of the messages of one direction.
+
+    Attributes:
+        period: Between two messages [s].
+        delays: Of each message, from when it was made until it was there [s], shape `(n,)`;
+            infinity if it never was. Recorded from its first message on, without a gap.
+    """
+
+    period: float
+    delays: Floats
+
+    def delay_at(self, time: float) -> float:
+        """Of the message made at `time` since the recording began, or just before [s]."""
+        return float(self.delays[math.floor(time / self.period + EARLY) % len(self.delays)])
+
+
+@dataclass(frozen=True)
+class RecordedDelays:
+    """Both directions of a link.
+
+    Attributes:
+        up: What became of commands.
+        down: What became of frames.
+    """
+
+    up: FrameStream
+    down: FrameStream
+
+    @property
+    def length(self) -> float:
+        """How long the commands were recorded [s]."""
+        return self.up.period * len(self.up.delays)
+
+
+class RecordedChannel(Channel[T]):
+    """One direction of a recording; what newer things have overtaken is thrown away.
+
+    Args:
+        stream: What became of its messages.
+        begin: Where in the recording the trial begins [s].
+        extra: On top of the delays, always [s].
+    """
+
+    def __init__(self, stream: FrameStream, begin: float, extra: float) -> None:
+        self._stream, self._begin, self._extra = stream, begin, extra
+        self._numbers, self._newest = count(), -1
+        self._coming: list[tuple[float, int, T]] = []
+
+    def put(self, now: float, item: T) -> None:
+        """See `Channel`."""
+        delay = self._stream.delay_at(self._begin + now)
+        if math.isfinite(delay):
+            arrival = now + delay + self._extra
+            heapq.heappush(self._coming, (arrival, next(self._numbers), item))
+
+    def take(self, now: float) -> list[T]:
+        """See `Channel`."""
+        out, due = [], now + EARLY
+        while self._coming and self._coming[0][0] <= due:
+            _, number, item = heapq.heappop(self._coming)
+            if number > self._newest:
+                self._newest = number
+                out.append(item)
+        return out

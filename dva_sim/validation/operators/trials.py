@@ -1,0 +1,149 @@
+"""Trials of many persons as columns, and numbers of them with intervals.
+
+A number is worth as much as it stays the same when other persons are drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Values = dict[str, float]
+
+RESAMPLES = 300
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Trials of one cell, one after the other.
+
+    Attributes:
+        person: Whose each trial is, from 0 `(n,)`.
+        columns: What was measured, by name `(n,)`; nan where nothing was.
+    """
+
+    person: Ints
+    columns: Mapping[str, Floats]
+
+    def __getitem__(self, name: str) -> Floats:
+        return self.columns[name]
+
+    def __len__(self) -> int:
+        return len(self.person)
+
+    def where(self, keep: NDArray[np.bool_]) -> Trials:
+        """Those of the trials that a mask `(n,)` keeps."""
+        return Trials(self.person[keep], {n: c[keep] for n, c in self.columns.items()})
+
+    def by(self, *names: str) -> list[tuple[tuple[float, ...], Trials]]:
+        """The trials of each combination of values of some columns, in rising order."""
+        keys = np.column_stack([self.columns[name] for name in names])
+        found = np.unique(keys, axis=0)
+        return [(tuple(key.tolist()), self.where((keys == key).all(axis=1))) for key in found]
+
+    def drawn(self, persons: Ints) -> Trials:
+        """The trials of some persons, who count as often as they are drawn."""
+        rows = np.concatenate([self._rows[p] for p in persons])
+        number = np.concatenate([np.full(len(self._rows[p]), i) for i, p in enumerate(persons)])
+        return Trials(number, {n: c[rows] for n, c in self.columns.items()})
+
+    @cached_property
+    def _rows(self) -> dict[int, Ints]:
+        return {int(p): np.flatnonzero(self.person == p) for p in np.unique(self.person)}
+
+
+Cells = Mapping[str, Trials]
+Measure = Callable[[Cells], Values]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A simulated number.
+
+    Attributes:
+        value: The number.
+        low: Where it may be with other persons: 95 % Monte Carlo interval, given the model.
+        high: Its other end; both equal `value` where nothing is left to chance.
+        persons: How many it rests on; 0: none.
+    """
+
+    value: float
+    low: float
+    high: float
+    persons: int = 0
+
+
+def certain(value: float) -> Found:
+    """A number that rests on no persons."""
+    return Found(value, value, value)
+
+
+def collect(rows: Sequence[tuple[int, Sequence[Mapping[str, Any]]]]) -> Trials:
+    """Rows of each person as columns; what is no number is left out.
+
+    Args:
+        rows: Number of the person, and the rows.
+    """
+    person = np.array([p for p, own in rows for _ in own], dtype=np.int64)
+    flat = [row for _, own in rows for row in own]
+    names = [n for n, v in flat[0].items() if v is None or isinstance(v, int | float)]
+    columns = {n: np.array([_number(row[n]) for row in flat]) for n in names}
+    return Trials(person, columns)
+
+
+def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> dict[str, Found]:
+    """What is measured, and its interval over draws of as many persons.
+
+    Args:
+        measure: From trials to numbers.
+        cells: Trials of the same persons in each.
+        rng: Draws the persons.
+    """
+    persons = np.unique(next(iter(cells.values())).person)
+    values = measure(cells)
+    draws: dict[str, list[float]] = {name: [] for name in values}
+    for _ in range(RESAMPLES):
+        who = rng.choice(persons, len(persons))
+        again = measure({name: trials.drawn(who) for name, trials in cells.items()})
+        for name, drawn in draws.items():
+            drawn.append(again[name])
+    return {
+        name: Found(value, *_middle(draws[name]), len(persons)) for name, value in values.items()
+    }
+
+
+def _middle(draws: Sequence[float]) -> tuple[float, float]:
+    """From where to where the middle of some draws lies, without those that are no number."""
+    known = [draw for draw in draws if not math.isnan(draw)]
+    if not known:
+        return math.nan, math.nan
+    tail = 0.5 * (1.0 - LEVEL)
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return float(low), float(high)
+
+
+def person_means(trials: Trials, name: str) -> Floats:
+    """The mean of each person `(persons,)`, without what is missing."""
+    values, known = trials[name], np.isfinite(trials[name])
+    total = np.bincount(trials.person[known], values[known])
+    count = np.bincount(trials.person[known])
+    return np.asarray(total[count > 0] / count[count > 0])
+
+
+def mean(trials: Trials, name: str) -> float:
+    """The mean over persons of their means."""
+    means = person_means(trials, name)
+    return float(means.mean()) if len(means) else float("nan")
+
+
+def _number(value: Any) -> float:
+    return float("nan") if value is None else float(value)
