@@ -33,11 +33,11 @@ from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.measures import RUN_COLUMNS
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.models import Tables, model_for
-from dva_sim.simulation.shift import TimedRecording, TimedScenario
-from dva_sim.simulation.shift.recording import OUTCOMES
-from dva_sim.simulation.shift.simulation import CHECKED_OF_SHIFTS
 from dva_sim.simulation.task import TaskScenario
-from dva_sim.simulation.transport import TransportScenario
+from dva_sim.simulation.timed import TimedRecording, TimedScenario
+from dva_sim.simulation.timed.recording import OUTCOMES
+from dva_sim.simulation.timed.simulation import CHECKED_OF_SHIFTS
+from dva_sim.simulation.transports import TransportScenario
 
 Row = Mapping[str, Any]
 

@@ -21,19 +21,19 @@ from dva_sim.kernel.measure import Columns, names_of
 from dva_sim.kernel.plugins import Plugins, stamp_of
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document
-from dva_sim.simulation import full, shift, task, transport
+from dva_sim.simulation import full, task, timed, transports
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import measures as of_full
 from dva_sim.simulation.full import workload
 from dva_sim.simulation.full.drive_tables import COMMAND_COLUMNS, DRIVE_COLUMNS
 from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
-from dva_sim.simulation.shift import TimedScenario
-from dva_sim.simulation.shift import measures as of_shift
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.task import measures as of_task
-from dva_sim.simulation.transport import TransportScenario
-from dva_sim.simulation.transport import measures as of_transport
+from dva_sim.simulation.timed import TimedScenario
+from dva_sim.simulation.timed import measures as of_timed
+from dva_sim.simulation.transports import TransportScenario
+from dva_sim.simulation.transports import measures as of_transports
 
 Tables = dict[str, list[dict[str, Any]]]
 
@@ -206,19 +206,19 @@ class _Timed(Model[TimedScenario]):
 
     scenario = TimedScenario
     columns: ClassVar[Columns] = {
-        "runs": of_shift.RUN_COLUMNS,
-        "events": of_shift.EVENT_COLUMNS,
-        "responders": of_shift.RESPONDER_COLUMNS,
+        "runs": of_timed.RUN_COLUMNS,
+        "events": of_timed.EVENT_COLUMNS,
+        "responders": of_timed.RESPONDER_COLUMNS,
     }
-    build = staticmethod(shift.build)
-    rehearse = staticmethod(shift.rehearse_timed)
-    simulate = staticmethod(shift.simulate_timed)
+    build = staticmethod(timed.build)
+    rehearse = staticmethod(timed.rehearse_timed)
+    simulate = staticmethod(timed.simulate_timed)
 
     def measures(self, scenario: TimedScenario | None = None) -> tuple[str, ...]:
-        return super().measures() if scenario is None else of_shift.measures_of(scenario)
+        return super().measures() if scenario is None else of_timed.measures_of(scenario)
 
-    def rows(self, recording: shift.TimedRecording, with_tracks: bool = False) -> Tables:
-        return of_shift.tables(recording)
+    def rows(self, recording: timed.TimedRecording, with_tracks: bool = False) -> Tables:
+        return of_timed.tables(recording)
 
 
 class _Task(_Operated[TaskScenario]):
@@ -244,17 +244,17 @@ class _Transports(_Operated[TransportScenario]):
 
     scenario = TransportScenario
     columns: ClassVar[Columns] = {
-        "runs": of_transport.RUN_COLUMNS,
-        "flows": of_transport.FLOW_COLUMNS,
+        "runs": of_transports.RUN_COLUMNS,
+        "flows": of_transports.FLOW_COLUMNS,
     }
-    build = staticmethod(transport.build)
-    simulate = staticmethod(transport.simulate_session)
+    build = staticmethod(transports.build)
+    simulate = staticmethod(transports.simulate_session)
 
     def rehearse(self, scenario: TransportScenario, seed: int) -> None:
-        transport.rehearse(scenario)
+        transports.rehearse(scenario)
 
-    def rows(self, recording: transport.SessionRecording, with_tracks: bool = False) -> Tables:
-        return transport.tables(recording)
+    def rows(self, recording: transports.SessionRecording, with_tracks: bool = False) -> Tables:
+        return transports.tables(recording)
 
 
 SHIPPED: Final[dict[str, type[Model[Any]]]] = {

@@ -31,9 +31,9 @@ from dva_sim.protocol.mistakes import Problem
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import OwnScenario, model_of
 from dva_sim.simulation.scenario import Scenario
-from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.task import TaskScenario
-from dva_sim.simulation.transport import TransportScenario
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.transports import TransportScenario
 from dva_sim.validation.dispatch.cases import CaseFile, load_cases
 from dva_sim.validation.network.reference import PlanConfig, load_plan
 from dva_sim.worlds.drawn_plan import make_plan

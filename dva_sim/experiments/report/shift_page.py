@@ -16,7 +16,7 @@ from dva_sim.experiments.report.cell_table import CellTable, Summary, cell_table
 from dva_sim.experiments.report.model_page import ModelPage, correlated
 from dva_sim.experiments.report.prose import paragraphs
 from dva_sim.kernel.wording import listing, number, percent
-from dva_sim.simulation.shift.simulation import CHECKED_OF_SHIFTS
+from dva_sim.simulation.timed.simulation import CHECKED_OF_SHIFTS
 
 SUMMARIES: tuple[Summary, ...] = (
     ("on_scene_share", "on scene by T", np.mean, percent),

@@ -26,9 +26,9 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario
 from dva_sim.simulation.scenario import Scenario
-from dva_sim.simulation.shift.scenario import TimedScenario
 from dva_sim.simulation.task import TaskScenario
-from dva_sim.simulation.transport import TransportScenario
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.transports import TransportScenario
 from dva_sim.worlds.maps import RosMap
 from dva_sim.worlds.site import SiteFile
 

@@ -19,9 +19,9 @@ from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document, load_yaml
-from dva_sim.simulation.shift import distributions
-from dva_sim.simulation.shift import scenario as timed
-from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.timed import distributions
+from dva_sim.simulation.timed import scenario as timed
+from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.validation.dispatch.exact import FORMULAS
 from dva_sim.validation.dispatch.measures import check_name
 from dva_sim.validation.dispatch.queues import Measures

@@ -12,8 +12,8 @@ import numpy as np
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.simulation.models import Tables
-from dva_sim.simulation.shift import simulate_timed
-from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.timed import simulate_timed
+from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.validation.dispatch.cases import Case
 from dva_sim.validation.dispatch.estimation import (
     PRECISION,

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
-from dva_sim.simulation.shift import TimedRecording
-from dva_sim.simulation.shift.recording import OUTCOMES, TIMES
-from dva_sim.simulation.shift.scenario import TimedScenario
+from dva_sim.simulation.timed import TimedRecording
+from dva_sim.simulation.timed.recording import OUTCOMES, TIMES
+from dva_sim.simulation.timed.scenario import TimedScenario
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -23,7 +23,7 @@ from typing import Annotated, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.simulation.shift import distributions
+from dva_sim.simulation.timed import distributions
 from dva_sim.validation.dispatch.transforms import laplace
 
 Measures = dict[str, float]

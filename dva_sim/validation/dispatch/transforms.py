@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dva_sim.simulation.shift import distributions
+from dva_sim.simulation.timed import distributions
 
 _NODES = 128
 

@@ -15,8 +15,8 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.simulation.shift import scenario as timed
-from dva_sim.simulation.shift import simulate_timed
+from dva_sim.simulation.timed import scenario as timed
+from dva_sim.simulation.timed import simulate_timed
 from dva_sim.validation.operators.app_filters import ages, smoothing, steps
 from dva_sim.validation.operators.control_loops import (
     critical,

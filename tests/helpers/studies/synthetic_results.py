@@ -241,7 +241,7 @@ def reading(folder: Path, rows: Rows, facts: dict[str, Any], **tables: Rows) -> 
 
 def write_shifts(folder: Path, shifts: int) -> Path:
     """Of shifts of an hour, which ARE simulated: three policies at two loads."""
-    from dva_sim.simulation.shift import build, measures, simulate_timed
+    from dva_sim.simulation.timed import build, measures, simulate_timed
 
     tables: dict[str, Rows] = {"runs": [], "events": []}
     policies, rates = ["random", "nearest_idle", "min_eta"], [1, 3]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dva_sim.simulation.shift.distributions import (
+from dva_sim.simulation.timed.distributions import (
     Constant,
     Erlang,
     Exponential,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.shift import build, simulate_timed
+from dva_sim.simulation.timed import build, simulate_timed
 from dva_sim.validation.dispatch.estimation import controls, inputs
 from dva_sim.validation.dispatch.measures import (
     Batches,

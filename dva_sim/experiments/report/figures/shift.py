@@ -33,7 +33,7 @@ from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
-from dva_sim.simulation.shift import measures
+from dva_sim.simulation.timed import measures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,8 +18,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift.distributions import Floats, Law
-from dva_sim.simulation.shift.scenario import Point, TimedScenario
+from dva_sim.simulation.timed.distributions import Floats, Law
+from dva_sim.simulation.timed.scenario import Point, TimedScenario
 from dva_sim.worlds.geo import GeoFrame, Pose
 from dva_sim.worlds.hazards import KINDS, first_detection, make_hazard
 from dva_sim.worlds.planning import Planner

@@ -7,7 +7,7 @@ from helpers.wording import unnamed
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.simulation.shift import build, rehearse_timed
+from dva_sim.simulation.timed import build, rehearse_timed
 
 GOOD: dict[str, Any] = {
     "model": "timed",

@@ -10,7 +10,7 @@ from helpers.processes.second_process import told_here_and_elsewhere
 
 from dva_sim.core.dispatch import known_policies
 from dva_sim.kernel.yaml_files import load_yaml
-from dva_sim.simulation.shift import TimedRecording, build, simulate_timed
+from dva_sim.simulation.timed import TimedRecording, build, simulate_timed
 from dva_sim.worlds.hazards import make_hazard
 
 AREA = {"width_m": 100.0, "height_m": 60.0}
@@ -153,7 +153,7 @@ def test_each_room_of_the_site_is_reached_by_the_planner_s_way():
 
 
 def test_from_half_way_nine_ways_in_ten_are_as_long_as_the_planner_finds_within_a_tenth():
-    from dva_sim.simulation.shift.travel import Rooms
+    from dva_sim.simulation.timed.travel import Rooms
 
     rooms = Rooms("caparica", 1, "path")
     start, goal, luck = rooms.spots(3)[0], rooms.spots(12)[0], np.random.default_rng(1)
@@ -347,7 +347,7 @@ def test_a_look_takes_as_long_whoever_looks_and_whenever():
 
 
 PROGRAM = """
-from dva_sim.simulation.shift import build, simulate_timed
+from dva_sim.simulation.timed import build, simulate_timed
 recording = simulate_timed(build({scenario!r}), 7)
 print([c.tobytes() for c in recording.columns.values()])
 print(recording.counters, [dict(u.spent) for u in recording.units])

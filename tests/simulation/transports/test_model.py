@@ -13,7 +13,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.simulation.models import model_of
-from dva_sim.simulation.transport import build, simulate_session, tables
+from dva_sim.simulation.transports import build, simulate_session, tables
 
 SHORT = {
     "warm_up_s": 5,

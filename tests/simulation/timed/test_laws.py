@@ -7,7 +7,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.simulation.shift.distributions import BLOCK, Law, times
+from dva_sim.simulation.timed.distributions import BLOCK, Law, times
 
 ADAPTER: TypeAdapter[Law] = TypeAdapter(Law)
 

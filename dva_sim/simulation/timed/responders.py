@@ -21,9 +21,9 @@ from typing import Any, Protocol
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift.demand import Incident
-from dva_sim.simulation.shift.scenario import Group
-from dva_sim.simulation.shift.travel import Place, Terrain
+from dva_sim.simulation.timed.demand import Incident
+from dva_sim.simulation.timed.scenario import Group
+from dva_sim.simulation.timed.travel import Place, Terrain
 
 HALVINGS = 30
 

@@ -26,7 +26,7 @@ from dva_sim.simulation.task.measures import DRIVEN_COLUMNS
 from dva_sim.simulation.task.recorded_delays import FrameStream, RecordedDelays
 from dva_sim.simulation.task.scenario import PlantConfig
 from dva_sim.simulation.task.tasks import Corner, Course, Slalom
-from dva_sim.simulation.transport.measures import Row, contest_row, flow_rows
+from dva_sim.simulation.transports.measures import Row, contest_row, flow_rows
 
 
 class DriveConfig(Config):

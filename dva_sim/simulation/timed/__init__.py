@@ -5,9 +5,9 @@ clock are the real ones. It serves the study of policies over whole shifts, and 
 of the dispatch against what theory says exactly.
 """
 
-from dva_sim.simulation.shift.recording import TimedRecording, UnitRecord
-from dva_sim.simulation.shift.run import rehearse_timed, simulate_timed
-from dva_sim.simulation.shift.scenario import TimedScenario, build
+from dva_sim.simulation.timed.recording import TimedRecording, UnitRecord
+from dva_sim.simulation.timed.run import rehearse_timed, simulate_timed
+from dva_sim.simulation.timed.scenario import TimedScenario, build
 
 __all__ = [
     "TimedRecording",

@@ -8,8 +8,8 @@ from pydantic import TypeAdapter
 from scipy.optimize import linear_sum_assignment
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.simulation.shift import TimedRecording, build, simulate_timed
-from dva_sim.simulation.shift.distributions import Law, times
+from dva_sim.simulation.timed import TimedRecording, build, simulate_timed
+from dva_sim.simulation.timed.distributions import Law, times
 
 POISSON = {"law": "exponential", "mean_s": 10.0}
 

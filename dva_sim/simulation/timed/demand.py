@@ -16,9 +16,9 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift.distributions import ZERO, Always, Draws, shares, times
-from dva_sim.simulation.shift.scenario import EventStream, Severity, TimedScenario
-from dva_sim.simulation.shift.travel import Place, Rooms, Terrain
+from dva_sim.simulation.timed.distributions import ZERO, Always, Draws, shares, times
+from dva_sim.simulation.timed.scenario import EventStream, Severity, TimedScenario
+from dva_sim.simulation.timed.travel import Place, Rooms, Terrain
 from dva_sim.worlds.hazards import Hazard, make_hazard
 
 

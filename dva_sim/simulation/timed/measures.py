@@ -38,12 +38,12 @@ from numpy.typing import ArrayLike, NDArray
 from dva_sim.core.dispatch import load_policy
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure, names_of, text
-from dva_sim.simulation.shift.demand import Incident
-from dva_sim.simulation.shift.recording import OUTCOMES, TimedRecording, UnitRecord
-from dva_sim.simulation.shift.responders import Unit
-from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.simulation.shift.simulation import Shift
-from dva_sim.simulation.shift.travel import Place
+from dva_sim.simulation.timed.demand import Incident
+from dva_sim.simulation.timed.recording import OUTCOMES, TimedRecording, UnitRecord
+from dva_sim.simulation.timed.responders import Unit
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.timed.simulation import Shift
+from dva_sim.simulation.timed.travel import Place
 from dva_sim.statistics import Band, Incidence, band, first_of, incidence
 
 Floats = NDArray[np.float64]

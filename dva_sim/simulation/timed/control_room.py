@@ -24,11 +24,11 @@ from dva_sim.core.travel_times import SiteKnowledge, Start, WaitingPlace
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift.demand import CALLERS, Demand
-from dva_sim.simulation.shift.recording import Floats
-from dva_sim.simulation.shift.responders import DONE, ShiftWorld, Unit
-from dva_sim.simulation.shift.scenario import Group, Point, TimedScenario, limit_of
-from dva_sim.simulation.shift.travel import Place, Terrain
+from dva_sim.simulation.timed.demand import CALLERS, Demand
+from dva_sim.simulation.timed.recording import Floats
+from dva_sim.simulation.timed.responders import DONE, ShiftWorld, Unit
+from dva_sim.simulation.timed.scenario import Group, Point, TimedScenario, limit_of
+from dva_sim.simulation.timed.travel import Place, Terrain
 
 DVA = "02:00:00:00:00:01"
 NOON = "12:00:00"  # for people, who are not here to read it

@@ -11,10 +11,10 @@ from dva_sim.core.dispatch import Policy, load_policy
 from dva_sim.core.dispatch.oracle import Instance, OraclePolicy, solve
 from dva_sim.core.dispatch.situation import Advice, Situation
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.shift.demand import Incident
-from dva_sim.simulation.shift.recording import TimedRecording
-from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.simulation.shift.simulation import Shift
+from dva_sim.simulation.timed.demand import Incident
+from dva_sim.simulation.timed.recording import TimedRecording
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.timed.simulation import Shift
 
 MOST_EVENTS, MOST_UNITS = 12, 4  # an exact plan for more takes too long
 

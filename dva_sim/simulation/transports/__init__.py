@@ -1,6 +1,6 @@
 """The model `transports`: a session on a congested link, and a drive over what it delivers."""
 
-from dva_sim.simulation.transport.scenario import (
+from dva_sim.simulation.transports.scenario import (
     SessionRecording,
     TransportScenario,
     build,

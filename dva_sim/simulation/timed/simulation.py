@@ -19,11 +19,11 @@ from dva_sim.core.events import Event, State
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
-from dva_sim.simulation.shift import control_room
-from dva_sim.simulation.shift.control_room import Mail
-from dva_sim.simulation.shift.demand import CALLERS, Demand, Incident
-from dva_sim.simulation.shift.distributions import Draws, Law, times
-from dva_sim.simulation.shift.recording import (
+from dva_sim.simulation.timed import control_room
+from dva_sim.simulation.timed.control_room import Mail
+from dva_sim.simulation.timed.demand import CALLERS, Demand, Incident
+from dva_sim.simulation.timed.distributions import Draws, Law, times
+from dva_sim.simulation.timed.recording import (
     CODES,
     STEPS_IN_ORDER,
     Ledger,
@@ -32,9 +32,9 @@ from dva_sim.simulation.shift.recording import (
     TimedRecording,
     UnitRecord,
 )
-from dva_sim.simulation.shift.responders import Job, Unit
-from dva_sim.simulation.shift.scenario import TimedScenario
-from dva_sim.simulation.shift.travel import Occurrence, Place, Terrain, terrain_of
+from dva_sim.simulation.timed.responders import Job, Unit
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.timed.travel import Occurrence, Place, Terrain, terrain_of
 
 SLACK = 1e-3  # deadlines are looked at exactly, but for the clock's step [s]
 CHECKS = 64  # of the balance in a run
