@@ -12,7 +12,7 @@ from dva_sim.experiments.analysis.predictions import Cadence
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.answer_table import spread_table
-from dva_sim.experiments.report.figures.budget import DelayBudget
+from dva_sim.experiments.report.figures.budget import DelayBudget, stages_of
 from dva_sim.experiments.report.figures.contrast import AnswerFigure
 from dva_sim.experiments.report.figures.effect import CommandRate, Differences, _band
 from dva_sim.experiments.report.figures.factorial import FactorialEffects, HeatMap
@@ -36,6 +36,7 @@ from dva_sim.statistics import band
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))
 PATTERN = Factor("pattern", ("req-rep", "pub-sub", "latest-wins"))
 PROFILE = Factor("profile", ("default", "dissertation"))
+DRAWN = ("delay_period_s", "delay_wait_s")  # of the delay budget, not of a table
 blank = blank_pictures()  # for figures that are asked for their numbers, words and axes
 NOTHING_ELSE = SimpleNamespace(scenario_of=lambda part: {"command": "unknown"})
 
@@ -325,6 +326,34 @@ def test_who_does_not_drive_has_no_delay_budget(view):
         figure = DelayBudget().draw(with_columns(view, **stages), NOTHING_ELSE).figure
     titles = [ax.get_title("left").rpartition(", ")[2] for ax in figure.axes]
     assert titles == ["REQ/REP", "latest-wins"] * 2
+
+
+def test_what_a_command_stands_longer_while_a_request_is_open_is_the_patterns_cost(view):
+    """At a phone of 10 Hz: every run made 100 commands, of which 20 went under REQ/REP."""
+    runs, asks = view.part.treated, view.part.treated["pattern"] == "req-rep"
+    stands = np.where(asks, 0.25, 0.05)
+    fates = {"sent": np.where(asks, 20, 100), "superseded": np.where(asks, 80, 0)}
+    fates |= {"applied": fates["sent"]}
+    known = {f"commands_{fate}": values for fate, values in fates.items()}
+    changed = with_columns(view, delay_sampling_s=stands, delay_pattern_s=0 * stands, **known)
+    stages = stages_of(changed)
+    loop = sum(np.nan_to_num(runs[n]) for n in runs if n.startswith("delay_") and n not in DRAWN)
+    grid = changed.part.laid_out(loop - runs["delay_sampling_s"] + stands)
+    np.testing.assert_allclose(sum(stages.values()), grid)  # as the columns add up
+    for level, wait in (("req-rep", 0.2), ("latest-wins", 0.0)):
+        where = {"pattern": level, "profile": "default"}
+        period, waits = (changed.part.where(stages[name], where) for name in DRAWN)
+        assert period == pytest.approx(np.full_like(period, 0.05))
+        assert waits == pytest.approx(np.full_like(waits, wait))
+
+
+def test_what_a_slow_robot_skips_of_the_commands_that_came_is_no_wait_of_the_pattern(view):
+    """Latest-wins: all 100 went, the robot took 20 of them."""
+    fates = {"sent": 100.0, "superseded": 80.0, "applied": 20.0}
+    count = len(view.part.treated["part"])
+    known = {f"commands_{fate}": np.full(count, value) for fate, value in fates.items()}
+    changed = with_columns(view, delay_sampling_s=np.full(count, 0.25), **known)
+    assert np.nanmax(stages_of(changed)["delay_wait_s"]) == 0.0
 
 
 @pytest.mark.system

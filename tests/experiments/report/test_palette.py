@@ -15,6 +15,7 @@ from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.report.figures import outcomes, palette
 from dva_sim.experiments.report.figures import shift as dispatch
 from dva_sim.experiments.report.figures.palette import FATES, LOOKS, STAGES, colours, looks
+from dva_sim.network.patterns import PATTERNS
 
 ROOM = Path(dva_sim.experiments.report.figures.__file__).parent.parent
 # Machado, Oliveira & Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1.
@@ -99,7 +100,7 @@ def test_text_has_the_contrast_of_small_print(colour):
 STACKS = {
     "delay budget": list(STAGES.values()),
     "events of runs": [FATES[fate] for fate in outcomes._FATES],
-    "events of shifts": [FATES[fate] for fate in dispatch._FATES],
+    "events of shifts": list(dispatch.FILLS.values()),
     "ways to end": [FATES[way] for way in WAYS],
 }
 
@@ -131,6 +132,22 @@ def test_a_level_keeps_its_look_when_another_is_left_out_or_joins():
     mixed = looks(Factor("system", ("faster", "req-rep", "long-filter", "pub-sub")))
     assert mixed["req-rep"] == alone
     assert len(set(mixed.values())) == 4
+
+
+def test_beside_patterns_nothing_has_a_colour_of_theirs():
+    patterns = {c.lower() for c in colours(Factor("pattern", tuple(PATTERNS))).values()}
+    fills = {fill.colour for fill in (*FATES.values(), *STAGES.values())}
+    agents = {palette.look_of(kind).colour for kind in ("robot", "guard", "bystander")}
+    others = set(colours(Factor("filter", tuple(f"filter-{n}" for n in range(10)))).values())
+    rest = {colour.lower() for colour in (*agents, *others, *fills)}
+    assert len(patterns) == 4
+    assert patterns & {palette.ONE.colour.lower(), *rest} == set()
+    assert palette.ONE.colour.lower() not in rest
+
+
+def test_who_confirmed_has_the_colour_of_its_agents():
+    for kind in ("robot", "guard"):
+        assert FATES[f"confirmed by a {kind}"].colour == palette.look_of(kind).colour
 
 
 def test_policies_and_every_pattern_have_looks_that_no_other_of_them_has():

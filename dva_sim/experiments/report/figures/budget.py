@@ -146,8 +146,8 @@ _NAMES = {
     "delay_human_s": "human (perception)",
     "delay_hand_s": "hand",
     "delay_filter_s": "filter",
-    "delay_sampling_s": "sampling (command period)",
-    "delay_pattern_s": "pattern (waits to be sent)",
+    "delay_period_s": "command period (until the next)",
+    "delay_wait_s": "pattern (waits for the reply)",
     "delay_uplink_s": "up-link",
     "delay_processing_s": "processing",
     "delay_motor_s": "motor",
@@ -165,14 +165,14 @@ class DelayBudget(style.ReportFigure):
 
     def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
         """Draw it."""
-        stages = [column for column in _NAMES if view.part.has(column)]
-        if not stages:
+        grids = stages_of(view)
+        if not grids:
             return None
-        view = _driven(view, stages[0])
-        stacks, numbers = Stacks(view, "Delay [s]", _parts(stages)), style.Numbers()
+        view = _driven(view, next(iter(grids.values())))
+        stacks, numbers = Stacks(view, "Delay [s]", _parts(list(grids))), style.Numbers()
         for ax, panel, level in stacks.panels():
-            means = {stage: _means(view, stage, panel, level) for stage in stages}
-            measured = _means(view, _MEASURED, panel, level)
+            means = {stage: _means(view, grid, panel, level) for stage, grid in grids.items()}
+            measured = _means(view, view.part.grid(_MEASURED), panel, level)
             stack(ax, means, STAGES)
             _mark(ax, measured)
             told = view.along_x() | means | {_MEASURED: measured}
@@ -181,18 +181,41 @@ class DelayBudget(style.ReportFigure):
         return self.finish(stacks.figure, caption("delay_budget"), numbers)
 
 
-def _driven(view: StudyView, stage: str) -> StudyView:
+def stages_of(view: StudyView) -> dict[str, Floats]:
+    """Each stage run by run, in the order of the loop; their sum is that of the columns.
+
+    While a request is open no command goes: the phone's newer ones are replaced by the newest. So
+    the command in force stands longer than the phone's own period, which is the pattern's doing
+    and not the sampling's. In a run of which `commands_sent` went and others were replaced before
+    they were sent, the phone alone would have filled that time with all of them.
+    """
+    part = view.part
+    found = {name: part.grid(name) for name in _NAMES if part.has(name)}
+    if not part.has("delay_sampling_s"):
+        return found
+    stands, wait = part.grid("delay_sampling_s"), np.zeros_like(part.grid("delay_sampling_s"))
+    if part.has("commands_superseded"):
+        fates = ("sent", "superseded", "applied")
+        sent, replaced, applied = (np.nan_to_num(part.grid(f"commands_{fate}")) for fate in fates)
+        unsent = np.maximum(replaced - (sent - applied), 0.0)  # the robot replaces sent ones, too
+        wait = stands * unsent / np.maximum(sent + unsent, 1.0)
+    before = part.grid("delay_pattern_s") if part.has("delay_pattern_s") else 0.0
+    found |= {"delay_period_s": stands - wait, "delay_wait_s": wait + before}
+    return {name: found[name] for name in _NAMES if name in found}
+
+
+def _driven(view: StudyView, grid: Floats) -> StudyView:
     """Without the lines under which nobody drove, such as guards without robots."""
     if view.line is None:
         return view
-    name, grid = view.line.name, view.part.grid(stage)
+    name = view.line.name
     there = [v for v in view.lines if np.isfinite(view.part.where(grid, {name: v})).any()]
     return replace(view, line=Factor(name, tuple(there)))
 
 
-def _means(view: StudyView, column: str, panel: Setting, level: Level) -> Floats:
+def _means(view: StudyView, grid: Floats, panel: Setting, level: Level) -> Floats:
     """Over all runs of each stop."""
-    values = view.curve(view.part.grid(column), panel, level)
+    values = view.curve(grid, panel, level)
     return nan_mean(values.reshape(len(values), -1), axis=1)
 
 

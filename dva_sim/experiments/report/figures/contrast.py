@@ -15,7 +15,7 @@ from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, Repe
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT, colours
+from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE, PAPER, SOFT
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import STRATEGY
 from dva_sim.kernel.wording import capital, number
@@ -203,20 +203,19 @@ def _own(ax: Axes, stop: RepeatedStop) -> None:
 def _groups(ax: Axes, stop: RepeatedStop, strategies: tuple[str, ...]) -> None:
     """A block of rows for each strategy, named at its middle."""
     names = strategies or ("",)
-    paint = colours(Factor(STRATEGY, names))
     row, ticks = 0.0, []
     for name in names:
         block = sorted((r for r in stop.repeats if r.strategy == name), key=lambda r: r.mean)
         for place, repeat in enumerate(block):
-            _row(ax, row + place, repeat, paint[name])
+            _row(ax, row + place, repeat)
         ticks.append(row + (len(block) - 1) / 2)
         row += len(block) + _GAP
     ax.set_yticks(ticks, [level_name(STRATEGY, name) if name else "" for name in names])
     ax.set_ylim(row - _GAP, -1)
 
 
-def _row(ax: Axes, y: float, repeat: Repeat, colour: str) -> None:
-    colour = INK if repeat.is_own else colour
+def _row(ax: Axes, y: float, repeat: Repeat) -> None:
+    colour = INK if repeat.is_own else SOFT
     ax.hlines(y, repeat.low, repeat.high, color=colour, lw=1, alpha=0.6)
     usual = repeat.parameters == 0
     edge = colour if repeat.is_beyond else INK if usual else SOFT

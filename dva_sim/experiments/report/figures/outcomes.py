@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,16 @@ from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_flo
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.budget import Stacks, stack
-from dva_sim.experiments.report.figures.palette import FATES, PAPER, Look, box, key, legend, looks
+from dva_sim.experiments.report.figures.palette import (
+    FATES,
+    PAPER,
+    Fill,
+    Look,
+    box,
+    key,
+    legend,
+    looks,
+)
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
@@ -106,11 +115,13 @@ def shares_of(curve: Incidence, ways: Sequence[str], rest: str, times: Floats) -
     return shares | {rest: 1.0 - sum(shares.values(), np.zeros_like(times))}
 
 
-def stack_in_time(ax: Axes, shares: dict[str, Floats], times: Floats) -> None:
+def stack_in_time(
+    ax: Axes, shares: dict[str, Floats], times: Floats, fills: Mapping[str, Fill] = FATES
+) -> None:
     """Shares that add up to one, one above the other."""
     floor = np.zeros_like(times)
     for way, share in shares.items():
-        fill, top = FATES[way], floor + share
+        fill, top = fills[way], floor + share
         look: dict[str, Any] = {"facecolor": fill.colour, "hatch": fill.hatch, "edgecolor": PAPER}
         ax.fill_between(times, floor, top, step="post", lw=0.6, **look)
         floor = top

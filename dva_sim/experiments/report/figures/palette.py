@@ -56,8 +56,13 @@ LOOKS = (
     *(_BLUE, _VERMILION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK, _VIOLET),
     *(_BROWN, _OLIVE, _PLUM, _CRIMSON, _NAVY, _MINT, _LILAC),
 )
-ONE = _BLUE  # where there is nothing to be told apart
+ONE = Look(_VIOLET.colour, "o")  # a difference, or what stands alone
 
+_OF_PATTERNS = (_VERMILION, _PURPLE, _BLUE, _GREEN)
+_FREE = (  # of levels without a look of their own, in turn; those of patterns come last
+    *(look for look in LOOKS if look not in (*_OF_PATTERNS, _VIOLET)),
+    *(_OF_PATTERNS),
+)
 _NAMED = {
     "vermilion": _VERMILION,
     "purple": _PURPLE,
@@ -65,12 +70,13 @@ _NAMED = {
     "green": _GREEN,
 }  # as patterns say
 
-# Levels that look the same in every figure of every study.
+# Levels that look the same in every figure of every study. Beside patterns nothing else has a
+# pattern's colour; only policies do, of which there are too many, and which shifts alone have.
 _OWN: Mapping[str, Look] = {
     **{name: _NAMED[kind.colour] for name, kind in PATTERNS.items()},
-    "robot": _BLUE,
-    "guard": _VERMILION,
-    "bystander": _GREEN,
+    "robot": Look(_NAVY.colour, "o"),
+    "guard": Look(_ORANGE.colour, "s"),
+    "bystander": Look(_OLIVE.colour, "^"),
     "random": _BLACK,
     "nearest_idle": _BROWN,
     "min_eta": _BLUE,
@@ -79,7 +85,7 @@ _OWN: Mapping[str, Look] = {
     "auction": _ORANGE,
     "preemptive": _PURPLE,
     "hazard_team": _VERMILION,
-    "operator_aware": _VIOLET,
+    "operator_aware": _LILAC,
     "coverage": _PLUM,
     "preference": _OLIVE,
     "oracle": _CRIMSON,
@@ -87,35 +93,36 @@ _OWN: Mapping[str, Look] = {
 
 # What may become of an event, the best first. In a stack neighbours differ in a print, too.
 FATES: Mapping[str, Fill] = {
-    "confirmed by a robot": Fill("#0072B2"),
-    "confirmed by a guard": Fill("#D55E00", "////"),
-    "confirmed": Fill("#009E73"),
+    "confirmed by a robot": Fill(_NAVY.colour),
+    "confirmed by a guard": Fill(_ORANGE.colour, "////"),
+    "confirmed": Fill("#87c5a6"),
     "cleared": Fill("#56B4E9", "////"),
-    "refuted": Fill("#CC79A7", "...."),
-    "false alarm confirmed": Fill("#CC79A7", "xxxx"),
-    "link lost": Fill("#da0b3f", "////"),
+    "refuted": Fill(HAZARD, "...."),
+    "false alarm confirmed": Fill(HAZARD, "xxxx"),
+    "link lost": Fill("#91086f", "////"),
     "given up": Fill("#777777", "----"),
-    "escalated": Fill("#E69F00", "\\\\\\\\"),
+    "escalated": Fill("#906ef7", "\\\\\\\\"),
     "open": Fill("#dedede"),
-    "expired": Fill("#613305", "xxxx"),
+    "expired": Fill("#613305", "++++"),
     "undetected": Fill("#222222"),
     "never reported": Fill("#222222", "||||"),
-    "other": Fill("#f0f0f0", "++++"),
+    "other": Fill("#f0f0f0", "****"),
     "nothing": Fill("#dedede"),
 }
 
 # The way around the loop, from what the camera saw: blue the link, grey the person, orange the
-# phone, each of them pale or dark. Hatched is what holds a value until the next one comes.
+# phone, each of them pale or dark; red is what the pattern costs. Hatched is what holds a value
+# until the next one comes.
 STAGES: Mapping[str, Fill] = {
     "delay_frame_s": Fill("#d3ebf8", "////"),
     "delay_downlink_s": Fill("#56b4e9"),
     "delay_human_s": Fill("#d4d4d4"),
     "delay_hand_s": Fill("#777777"),
     "delay_filter_s": Fill("#e69f00"),
-    "delay_sampling_s": Fill("#fbe3a6", "////"),
-    "delay_pattern_s": Fill("#d55e00"),
+    "delay_period_s": Fill("#fbe3a6", "////"),
+    "delay_wait_s": Fill("#da0b3f"),
     "delay_uplink_s": Fill("#00507d"),
-    "delay_processing_s": Fill("#cc79a7"),
+    "delay_processing_s": Fill("#b4b464"),
     "delay_motor_s": Fill("#222222"),
 }
 
@@ -125,7 +132,8 @@ def looks(factor: Factor | None) -> dict[Level, Look]:
     if factor is None:
         return {None: ONE}
     own = {level: _OWN[str(level)] for level in factor.levels if str(level) in _OWN}
-    free = [look for look in LOOKS if look not in own.values()] or list(LOOKS)
+    taken = {look.colour for look in own.values()}
+    free = [look for look in _FREE if look.colour not in taken] or list(_FREE)
     others = [level for level in factor.levels if level not in own]
     found = own | {level: free[i % len(free)] for i, level in enumerate(others)}
     return {level: found[level] for level in factor.levels}

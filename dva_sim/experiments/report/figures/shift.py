@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 _FATES = ("confirmed", "refuted", "open", "expired", "escalated")  # as they are stacked
 _NAMES = {"refuted": "cleared as a false alarm", "open": "still open"}
+FILLS = {fate: FATES["cleared" if fate == "refuted" else fate] for fate in _FATES}
 _QUANTILES = (0.5, 0.9, 0.95)
 
 
@@ -185,7 +186,7 @@ class FatesOfEvents(ShiftFigure):
                 events = dict(shifts.events_of(policy, stop))
                 if len(events["event_id"]):
                     shares = shares_of(measures.fates(events), measures.FATES, "open", times)
-                    stack_in_time(ax, {fate: shares[fate] for fate in _FATES}, times)
+                    stack_in_time(ax, {fate: shares[fate] for fate in _FATES}, times, FILLS)
                     where = {"at": shifts.titles[stop], "dispatch.policy": policy}
                     numbers.add(where, {"t_s": times} | shares)
                 ax.set_xlim(0, shifts.follow)
@@ -196,7 +197,7 @@ class FatesOfEvents(ShiftFigure):
             row[0].set_ylabel(f"{capital(shifts.titles[stop])}\nshare of events")
         for ax in axes[-1]:
             ax.set_xlabel("Time since the report [s]")
-        key(figure, [box(FATES[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
+        key(figure, [box(FILLS[fate]) for fate in _FATES], [_NAMES.get(f, f) for f in _FATES])
         return self.finish(figure, caption("fates", follow=shifts.follow), numbers)
 
 
