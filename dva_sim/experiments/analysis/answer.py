@@ -126,6 +126,8 @@ class Finding:
         high: Its upper edge `(k,)`.
         persons: How many persons (clusters) the band rests on.
         smallest_effect: Smallest difference declared to matter, in the measure's unit.
+        usual: Median of the measure itself under the second level `(k,)`: what the difference is
+            held against where none was declared to matter.
         missed: Runs without confirmation at the last level, per level of `factor`.
         horizon: What such a run counts with [s], if all count with the same.
         cluster: What the band rests on: persons, or shifts.
@@ -149,6 +151,7 @@ class Finding:
     high: Floats
     persons: int
     smallest_effect: float | None = None
+    usual: Floats | None = None
     missed: tuple[Missed, ...] = ()
     horizon: float | None = None
     cluster: str = "person"
@@ -162,6 +165,31 @@ class Finding:
     def unit(self) -> str:
         """Unit of the measure."""
         return unit_of(self.measure)
+
+    @property
+    def differs(self) -> NDArray[np.bool_]:
+        """Where the band does not hold zero `(k,)`."""
+        return np.asarray((self.low > 0) | (self.high < 0))
+
+    @property
+    def is_open(self) -> NDArray[np.bool_]:
+        """Where the band holds zero and differences that matter, too `(k,)`.
+
+        Those that matter were declared to; else they are as large as the measure usually is.
+        """
+        least = np.inf if self.usual is None else np.where(self.usual > 0, self.usual, np.inf)
+        holds_zero = (self.low <= 0) & (self.high >= 0)
+        return np.asarray(holds_zero & (_bounds(self) > (self.smallest_effect or least)))
+
+    @property
+    def has_too_few(self) -> bool:
+        """Return True if nothing is found, and somewhere nothing that matters is ruled out."""
+        return bool(not self.differs.any() and self.is_open.any())
+
+
+def too_few(persons: int, cluster: str = "person") -> str:
+    """`too few persons (4) to tell`."""
+    return f"too few {cluster}s ({persons}) to tell"
 
 
 @dataclass(frozen=True)
@@ -199,6 +227,10 @@ def _effect(f: Finding) -> str:
     if len(where):
         return capital(f"{condition(f)}{_size(f, _telling_level(f, where))}.")
     first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
+    if f.has_too_few:
+        place = f", {condition(f, inside=True)}".removesuffix(", ")
+        few = f"{too_few(f.persons, f.cluster)} whether {first} and {second} differ"
+        return capital(f"{few}{place} (95 % {_interval_name(f)}).")
     anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
     return capital(
         f"{condition(f)}no difference between {first} and {second} was found{anywhere} "
@@ -260,10 +292,6 @@ def _bounds(f: Finding) -> Floats:
     return np.asarray(np.maximum(-f.low, f.high))
 
 
-def _limit(f: Finding) -> float:
-    return np.inf if f.smallest_effect is None else f.smallest_effect
-
-
 def _equal(f: Finding) -> list[str]:
     where = np.flatnonzero(_holds_zero(f) & (_bounds(f) == 0))
     return [f"{_there(f, where)}both are equal"] if len(where) else []
@@ -272,7 +300,7 @@ def _equal(f: Finding) -> list[str]:
 def _settled(f: Finding) -> list[str]:
     """Where an effect of some size is ruled out."""
     bounds = _bounds(f)
-    where = np.flatnonzero(_holds_zero(f) & (bounds > 0) & (bounds <= _limit(f)))
+    where = np.flatnonzero(_holds_zero(f) & (bounds > 0) & ~f.is_open)
     if not len(where):
         return []
     bound = quantity(max(float(bounds[where].max()), _LEAST), f.unit)
@@ -283,7 +311,7 @@ def _settled(f: Finding) -> list[str]:
 def _undecided(f: Finding) -> list[str]:
     """Nothing is ruled out: say how large an effect may be, unless as large as it ever can."""
     bounds = _bounds(f)
-    where = np.flatnonzero(_holds_zero(f) & (bounds > _limit(f)))
+    where = np.flatnonzero(f.is_open)
     if not len(where):
         return []
     bound, still = float(bounds[where].max()), f"{_there(f, where)}the question stays open"

@@ -43,12 +43,14 @@ class Judged:
         expected: What it says of a contrast; empty if it does not.
         found: The same as measured; empty if not run.
         verdict: Whether it held.
+        persons: How many that rests on.
     """
 
     text: str
     expected: str
     found: str
     verdict: Verdict
+    persons: int = 0
 
 
 def judge_all(study: Mapping[str, Any], view: StudyView | None) -> list[Judged]:
@@ -110,7 +112,7 @@ def _judge(prediction: Prediction, view: StudyView | None) -> Judged:
     verdict = verdict_of(prediction.direction, prediction.expected, view.smallest_effect, found)
     low, high = max(found.low, -view.widest), min(found.high, view.widest)
     words = f"{quantity(found.mean, unit)} ({number(low)} to {quantity(high, unit)})"
-    return Judged(text, expected, words, verdict)
+    return Judged(text, expected, words, verdict, found.n_persons)
 
 
 def _asked(

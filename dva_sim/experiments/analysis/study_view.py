@@ -338,6 +338,7 @@ def finding_of(view: StudyView) -> Finding | None:
         high=np.minimum(found.high, view.widest),
         persons=found.n_persons,
         smallest_effect=view.smallest_effect,
+        usual=_usual(view, view.contrast[1]),
         missed=_missed(view),
         horizon=_horizon(view),
         widest=view.widest,
@@ -346,6 +347,13 @@ def finding_of(view: StudyView) -> Finding | None:
         everywhere="on average over the ranges" if view.averages_points else "",
         part=view.part.name,
     )
+
+
+def _usual(view: StudyView, level: Level) -> Floats:
+    """The median of all runs under a level `(stops,)`; nan where there is none."""
+    values = view.curve(view.part.grid(view.measure), view.panels[0], level)
+    seen = [present(runs) for runs in values]
+    return np.array([float(np.median(runs)) if len(runs) else math.nan for runs in seen])
 
 
 def possible_values(measure: str, scenario: Mapping[str, Any]) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.analysis.answer import Finding, too_few
 from dva_sim.experiments.analysis.hypothesis_tests import (
     Compared,
     Judgement,
@@ -43,7 +43,7 @@ _VERDICTS: dict[Verdict, str] = {
 _LEAST_P = 0.001
 
 
-def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
+def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellTable:
     """Each hypothesis: the claim, what was found, the adjusted test, the verdict."""
     heads = ["hypothesis", "claim", "found (95 % interval)"]
     heads += ["p by Holm", "p of the opposite", "verdict"]
@@ -54,11 +54,27 @@ def hypothesis_table(tested: Sequence[Tested]) -> CellTable:
             _interval(t.difference, t.contrast.measure),
             _p(t.adjusted),
             _p(t.against),
-            _VERDICTS[t.verdict],
+            _verdict(t, cluster),
         ]
         for t in tested
     ]
     return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
+
+
+def _verdict(tested: Tested, cluster: str) -> str:
+    """`? open: too few persons (4) to tell`, where they are."""
+    word, found = _VERDICTS[tested.verdict], tested.difference
+    least = tested.contrast.smallest or tested.hypothesis.margin or None
+    if tested.verdict == "open" and found is not None and _are_few(found, least):
+        return f"{word}: {too_few(found.n_persons, cluster)}"
+    return word
+
+
+def _are_few(found: Interval, smallest: float | None) -> bool:
+    """Whether more persons are needed: for the test, or to rule out what was declared to matter."""
+    if 2.0 ** (1 - found.n_persons) > 1 - LEVEL:  # the least p that a permutation test can give
+        return True
+    return smallest is not None and max(-found.low, found.high) > smallest
 
 
 _SETTLED: dict[Verdict, str] = {
@@ -79,7 +95,7 @@ def verdict_sentences(tested: Sequence[Tested]) -> list[str]:
     ]
 
 
-def comparison_table(found: Judgement) -> CellTable:
+def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
     """Each comparison at each level it runs over."""
     compared = found.compared
     heads = ["comparison", "difference in", "at", "first minus second (95 % interval)"]
@@ -94,7 +110,7 @@ def comparison_table(found: Judgement) -> CellTable:
             number(c.correlation),
             _p(c.p),
             _p(c.adjusted),
-            _apart(c),
+            _apart(c, cluster),
         ]
         for c in compared
     ]
@@ -159,10 +175,14 @@ def _p(value: float) -> str:
     return f"< {_LEAST_P:g}" if value < _LEAST_P else f"{value:.3f}"
 
 
-def _apart(compared: Compared) -> str:
-    if not math.isfinite(compared.adjusted):
+def _apart(compared: Compared, cluster: str) -> str:
+    found = compared.difference
+    if not math.isfinite(compared.adjusted) or found is None:
         return "–"
-    return "✓ yes" if compared.adjusted <= 1 - LEVEL else "? not shown"
+    if compared.adjusted <= 1 - LEVEL:
+        return "✓ yes"
+    is_few = _are_few(found, compared.contrast.smallest)
+    return f"? {too_few(found.n_persons, cluster)}" if is_few else "? not shown"
 
 
 _DIGITS = 16

@@ -13,6 +13,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dva_sim.experiments.analysis.answer import too_few
 from dva_sim.experiments.analysis.conditions import conditions, timeout_remark
 from dva_sim.experiments.analysis.predictions import Judged, judge_all
 from dva_sim.experiments.analysis.robustness import sentences
@@ -127,7 +128,7 @@ def _claims(reading: Reading) -> Iterator[Block]:
     hypotheses = reading.judgement.tested
     if hypotheses:
         yield Heading(_whose_claims(status))
-        yield Printed(hypothesis_table(hypotheses), is_words=True)
+        yield Printed(hypothesis_table(hypotheses, reading.cluster), is_words=True)
     if status.registration:
         yield Heading("Registration")
         if status.kind != "confirmatory":
@@ -138,7 +139,7 @@ def _claims(reading: Reading) -> Iterator[Block]:
     predictions = judge_all(reading.study, reading.view)
     if predictions:
         yield Heading("Predictions made before the run")
-        yield Printed(_prediction_table(predictions), is_words=True)
+        yield Printed(_prediction_table(predictions, reading.cluster), is_words=True)
 
 
 def _whose_claims(status: Status) -> str:
@@ -149,16 +150,20 @@ def _whose_claims(status: Status) -> str:
     )
 
 
-def _prediction_table(predictions: Sequence[Judged]) -> CellTable:
+def _prediction_table(predictions: Sequence[Judged], cluster: str) -> CellTable:
     heads = ["predicted", "of the contrast", "found (95 % interval)", "verdict"]
-    rows = [[p.text, p.expected, p.found, p.verdict] for p in predictions]
+    few = [f": {too_few(p.persons, cluster)}" * (p.verdict == "open") for p in predictions]
+    rows = [
+        [p.text, p.expected, p.found, f"{p.verdict}{why}"]
+        for p, why in zip(predictions, few, strict=True)
+    ]
     return CellTable("", heads, len(heads), rows)
 
 
 def _comparisons(reading: Reading) -> Iterator[Block]:
     if reading.judgement.compared:
         yield Heading("Named comparisons")
-        yield Printed(comparison_table(reading.judgement), is_words=True)
+        yield Printed(comparison_table(reading.judgement, reading.cluster), is_words=True)
 
 
 def _endings(reading: Reading) -> Iterator[Block]:

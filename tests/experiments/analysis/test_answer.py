@@ -19,6 +19,7 @@ def measured(found):
 GROWING = [0.1, 0.2, 0.3, 3.0, 6.0, 14.2]
 
 
+USUAL = np.full(6, 35.0)
 WIDE = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 80.0])
 IN_WORDS = {
     "a growing effect: contrast, conditions, interval, reach, and what is ruled out below it": (
@@ -37,8 +38,20 @@ IN_WORDS = {
         ["; without delay both", " 50 ms", " 100 ms", "below 1.2 s"],
     ),
     "a band too wide to rule out what matters: more persons": (
-        finding([0] * 6, half_width=5),
-        ["every one-way delay", "up to 5.0 s", "more persons"],
+        finding([0] * 6, half_width=5, persons=4),
+        ["Too few persons (4)", "every one-way delay", "up to 5.0 s", "more persons"],
+    ),
+    "few persons who rule out less than what is usual, where nothing was declared to matter": (
+        finding([9] * 6, half_width=80, persons=4, smallest_effect=None, usual=USUAL),
+        ["Too few persons (4)", "profile default (95 %", "up to 89.0 s", "more persons"],
+    ),
+    "few shifts": (
+        finding([0, 0], 5, persons=6, cluster="shift", levels=(0.5, 0.9), over="load"),
+        ["Too few shifts (6)"],
+    ),
+    "enough persons for what is usual, where nothing was declared to matter": (
+        finding([9] * 6, half_width=20, smallest_effect=None, usual=USUAL),
+        ["no difference", "any effect is below 29.0 s"],
     ),
     "one wide level beside what the others rule out": (
         finding([0, 0, 0, 0, 6.0, 20.0], half_width=WIDE),
@@ -83,6 +96,7 @@ IN_WORDS = {
 @pytest.mark.parametrize(("found", "names"), IN_WORDS.values(), ids=IN_WORDS)
 def test_the_answer_tells(found, names):
     assert unnamed(text := lead(found), *names) == []
+    assert not ("no difference" in text and text.startswith("Too few"))
     assert ("but stays" in text) == ("but" in names)  # what matters is not said to be small
 
 

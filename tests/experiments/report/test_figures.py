@@ -14,13 +14,22 @@ from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.answer_table import spread_table
 from dva_sim.experiments.report.figures.budget import DelayBudget, stages_of
 from dva_sim.experiments.report.figures.contrast import AnswerFigure
-from dva_sim.experiments.report.figures.effect import CommandRate, Differences, _band
+from dva_sim.experiments.report.figures.distribution import Distributions
+from dva_sim.experiments.report.figures.effect import (
+    CommandAge,
+    CommandRate,
+    Differences,
+    Levels,
+    _band,
+    _possible,
+)
 from dva_sim.experiments.report.figures.factorial import FactorialEffects, HeatMap
 from dva_sim.experiments.report.figures.outcomes import Events, StoryOutcomes, StoryTimes, fates
 from dva_sim.experiments.report.figures.palette import ONE, apart, columns_of
 from dva_sim.experiments.report.figures.scatter import trend
 from dva_sim.experiments.report.figures.site_map import DrivenWays
 from dva_sim.experiments.report.figures.style import (
+    ASIDE,
     fit_to,
     is_to_scale,
     log_axis,
@@ -173,7 +182,7 @@ def test_four_settings_stand_two_by_two_with_the_answers_levels_first():
 def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
     few = np.array([[40.0, 60.0], [80.0, 90.0]])  # two persons, so bands of hundreds of seconds
     _, ((ax,),) = panels(1, 1, 3.0)
-    _band(ax, band(few), ONE, 0.0, (0.0, 240.0))
+    _band(ax, _possible(band(few), 0.0, 240.0), ONE, 0.0)
     heights = ax.collections[0].get_paths()[0].vertices[:, 1]
     assert (heights.min(), heights.max()) == (0.0, 240.0)
     assert "are cut" in fit_to(ax, few.ravel())
@@ -183,7 +192,7 @@ def test_bands_end_where_nothing_is_possible_and_do_not_flatten_the_lines():
 def test_narrow_bands_are_shown_whole():
     _, ((ax,),) = panels(1, 1, 3.0)
     many = np.linspace([40.0, 45.0], [60.0, 65.0], 24)
-    _band(ax, band(many), ONE, 0.0, (0.0, 240.0))
+    _band(ax, band(many), ONE, 0.0)
     before = ax.get_ylim()
     assert fit_to(ax, many.ravel()) == ""
     assert ax.get_ylim() == before
@@ -291,18 +300,104 @@ def of_links(view, count):
     return StudyView(part, "drive_time_s", PATTERN, factors[1], contrast, {"profile": "default"})
 
 
+def of_steps(view):
+    """The same runs, at six delays with equal steps."""
+    even = Factor("link.delay_s", tuple(n / 5 for n in range(6)))
+    delays = np.searchsorted(DELAY.levels, view.part.treated["link.delay_s"]) / 5
+    part = RunGrid(view.part.treated | {"link.delay_s": delays}, "drive", [PATTERN, even, PROFILE])
+    return replace(view, part=part, over=even, contrast=("req-rep", "latest-wins"))
+
+
+def joined(axes):
+    """What leads from one of six stops to the next."""
+    lines = [line for line in axes.lines if len(line.get_xdata()) == 6]
+    return [line for line in lines if line.get_linestyle() == "-"]
+
+
 @blank
-def test_lines_lead_from_number_to_number_and_never_from_word_to_word(view):
-    def joined(view):
+def test_lines_lead_over_equal_steps_and_never_where_their_slope_would_mean_nothing(view):
+    uneven = replace(view, contrast=("req-rep", "latest-wins"))
+    for kind in (Differences, Levels):
         with styled():
-            figure = Differences().draw(view, NOTHING_ELSE).figure
-        return [line for line in figure.axes[0].lines if len(line.get_xdata()) == 6 and solid(line)]
+            axes = [
+                kind().draw(v, NOTHING_ELSE).figure.axes[0]
+                for v in (of_steps(view), uneven, of_links(view, 6))
+            ]
+        assert [len(joined(ax)) > 0 for ax in axes] == [True, False, False]
+    means = (0.0, 1.0, 2.0)
+    for delays, leads in (((0.0, 0.5, 1.0), True), ((0.0, 0.1, 1.0), False)):
+        ax = drawn_answer(answered(means, levels=delays)).figure.axes[0]
+        assert (
+            any(line.get_linestyle() == "-" and len(line.get_xdata()) == 3 for line in ax.lines)
+            == leads
+        )
 
-    def solid(line):
-        return line.get_linestyle() == "-"
 
-    assert len(joined(replace(view, contrast=("req-rep", "latest-wins")))) == 2
-    assert joined(of_links(view, 6)) == []
+@blank
+def test_an_axis_that_is_logarithmic_says_so_and_has_a_tick_at_what_matters(view):
+    wide = replace(view, contrast=("req-rep", "latest-wins"), smallest_effect=0.2)
+    with styled():
+        drawn = [kind().draw(wide, NOTHING_ELSE).figure for kind in (Differences, CommandAge)]
+        times = wide.part.treated["drive_time_s"]
+        slow = np.where(wide.part.treated["link.delay_s"] == 1.0, 10 * times, times)
+        spread = Distributions().draw(with_columns(wide, drive_time_s=slow), NOTHING_ELSE).figure
+    for figure in (*drawn, spread):
+        ax = figure.axes[0]
+        assert ax.get_yscale() in ("log", "symlog")
+        assert "log scale" in ax.get_ylabel()
+    assert {-0.2, 0.0, 0.2} <= set(drawn[0].axes[0].get_yticks())
+
+
+def arrow_heads(axes):
+    """Marks at the edges, and the numbers beside them."""
+    heads = [line for line in axes.lines if line.get_marker() in ("^", "v", "<", ">")]
+    texts = [t.get_text() for t in axes.texts if t.get_fontsize() == 7.5]
+    marks = [(h.get_marker(), *map(float, h.get_xydata()[0])) for h in heads]
+    return marks, texts
+
+
+@blank
+def test_a_bar_that_is_cut_has_an_arrow_head_and_its_true_bound_at_the_edge():
+    wide = answered(low=np.array([-1.0, -40.0, -129.0]), high=np.array([1.0, 9.0, 294.0]))
+    ax = drawn_answer(wide, spread=0.1).figure.axes[0]
+    low, high = ax.get_ylim()
+    marks, texts = arrow_heads(ax)
+    assert marks == [("v", 1.0, low), ("v", 2.0, low), ("^", 2.0, high)]
+    assert texts == ["−40.0", "−129", "294"]
+    assert arrow_heads(drawn_answer(answered()).figure.axes[0]) == ([], [])
+
+
+@blank
+@pytest.mark.parametrize("figure", [Differences, Levels])
+def test_bands_of_two_persons_are_cut_with_their_bounds(view, figure):
+    asked = replace(view, contrast=("req-rep", "latest-wins"), possible=(0.0, 300.0))
+    with styled():
+        drawn = figure().draw(asked, NOTHING_ELSE)
+    (ax, *_), rows = drawn.figure.axes, drawn.csv.decode().splitlines()
+    heads = [h for h in ax.lines if len(h.get_xdata()) == 1 and h.get_label() == ASIDE]
+    bounds = [rows[0].split(",").index(f"band_{end}_s") for end in ("low", "high")]
+    low, high = ax.get_ylim()
+    ends = [
+        np.clip([float(row.split(",")[i] or 0) for i in bounds], -300.0, 300.0)
+        for row in rows[1:]
+        if "default" in row
+    ]
+    assert len(heads) == sum(int(a < low) + int(b > high) for a, b in ends) > 0
+
+
+@blank
+def test_the_key_of_the_figure_that_answers_tells_open_from_little():
+    many = answered((0.0, 5.0, 9.0), smallest_effect=2.0)
+    few = replace(many, low=many.mean - 80.0, high=many.mean + 80.0, persons=4)
+
+    def told(found):
+        drawn = drawn_answer(found)
+        return [text.get_text() for text in drawn.figure.legends[0].get_texts()], drawn.caption
+
+    assert told(many)[0] == ["differs from zero", "too little to matter"]
+    names, words = told(few)
+    assert names == ["open: too few persons (4) to tell"]
+    assert words.startswith("Too few persons (4)")
 
 
 def overlapping(figure, texts):
@@ -403,9 +498,12 @@ def answered(means=(0.0, 5.0, 9.0), **changes):
     return synthetic_results.finding(means, 2.0, **(ANSWER | {"smallest_effect": None} | changes))
 
 
-def drawn_answer(found):
+def drawn_answer(found, spread=1.0):
+    """Of persons who differ as widely as the band is, or by a share of that."""
+    steps = spread * np.linspace(-1.0, 1.0, found.persons)[:, np.newaxis]
     with styled():
-        return AnswerFigure().contrast(found, np.tile(found.mean, (found.persons, 1)))
+        differences = found.mean + steps * (found.high - found.low) / 2
+        return AnswerFigure().contrast(found, differences)
 
 
 @blank

@@ -5,12 +5,11 @@ The contrast under other models of the persons: every repeat with its interval.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.answer import Finding, condition
+from dva_sim.experiments.analysis.answer import Finding, condition, too_few
 from dva_sim.experiments.analysis.robustness import Repeat, RepeatedAnswer, RepeatedStop
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
@@ -74,13 +73,16 @@ class AnswerFigure(style.ReportFigure):
         cut = style.fit_to(ax, present(np.append(differences, 0.0)))
         grey = _too_small(ax, finding)
         _values(ax, finding)
+        x = np.arange(len(finding.mean), dtype=np.float64)
+        style.mark_cuts([style.Bars(ax, x, finding.low, finding.high, ONE.colour)])
         first, second = _names(finding)
         unit = f" [{finding.unit}]" if finding.unit else ""
         ax.set_ylabel(style.wrapped(f"{capital(first)} minus {second}{unit}", 34))
         title = f"{capital(first)} minus {second}: {measure_name(finding.measure)}"
         within = condition(finding, inside=True).removesuffix(", ")
         title = f"{title}, {within}" if within else title
-        words = caption("answer", finding=finding, first=first, grey=grey)
+        few = too_few(finding.persons, finding.cluster) if finding.has_too_few else ""
+        words = caption("answer", finding=finding, first=first, grey=grey, few=few)
         return self.finish(figure, words, _table(finding), title=title, reads=(cut,))
 
 
@@ -89,18 +91,29 @@ def _names(f: Finding) -> tuple[str, str]:
 
 
 def _marks(ax: Axes, f: Finding, over: Factor | None) -> None:
-    """A bar for the band, a mark for the mean: filled where it differs from zero."""
-    x, differs = np.arange(len(f.mean)), _differs(f)
+    """A bar for the band, a mark for the mean: what it tells is its filling, named in a key."""
+    from matplotlib.lines import Line2D
+
+    x, (differs, is_open) = np.arange(len(f.mean)), (f.differs, f.is_open)
     ax.axhline(0, color=INK, lw=0.8, zorder=1)
-    if over is not None and over.is_numeric:
+    if over is not None and over.is_numeric and style.is_to_scale(over):
         ax.plot(x, f.mean, color=ONE.colour, lw=1, alpha=0.5, zorder=2)
     ax.vlines(x, f.low, f.high, color=ONE.colour, lw=2.2, zorder=3)
-    for chosen, fill in ((differs, ONE.colour), (~differs, PAPER)):
-        ax.plot(x[chosen], f.mean[chosen], "o", color=ONE.colour, mfc=fill, ms=7, mew=1.5, zorder=4)
-
-
-def _differs(f: Finding) -> NDArray[np.bool_]:
-    return np.asarray((f.low > 0) | (f.high < 0))
+    has_band = np.isfinite(f.low)
+    little = "too little to matter" if f.smallest_effect else "not shown to differ"
+    kinds = {
+        "differs from zero": (differs, ONE.colour),
+        f"open: {too_few(f.persons, f.cluster)}": (is_open, PAPER),
+        little: (has_band & ~differs & ~is_open, FAINT),
+        "without an interval": (np.isfinite(f.mean) & ~has_band, PAPER),
+    }
+    look: dict[str, Any] = {"color": ONE.colour, "ms": 7, "mew": 1.5, "marker": "o", "ls": ""}
+    handles = []
+    for name, (chosen, fill) in kinds.items():
+        if chosen.any():
+            ax.plot(x[chosen], f.mean[chosen], mfc=fill, zorder=4, **look)
+            handles.append(Line2D([], [], mfc=fill, label=name, **look))
+    ax.figure.legend(handles=handles, loc="outside upper left", ncols=2, fontsize=8.5)
 
 
 def _too_small(ax: Axes, f: Finding) -> bool:
@@ -119,7 +132,7 @@ def _values(ax: Axes, f: Finding) -> None:
         return
     there = present(f.mean)
     rises = bool(f.over) and there[-1] > there[0]  # then the line is in the way on the right
-    for x, (mean, differs) in enumerate(zip(f.mean, _differs(f), strict=True)):
+    for x, (mean, differs) in enumerate(zip(f.mean, f.differs, strict=True)):
         if np.isfinite(mean):
             sign = "+" if mean > 0 and number(mean) != "0" else ""
             ax.annotate(

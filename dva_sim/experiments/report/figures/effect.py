@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dva_sim.experiments.analysis.answer import too_few
 from dva_sim.experiments.analysis.predictions import Cadence, cadence
 from dva_sim.experiments.analysis.run_grid import (
     Factor,
@@ -81,13 +83,14 @@ class Differences(style.ReportFigure):
         name = level_name(view.line.name, baseline)
         label = style.axis_label(view.measure, f"Difference against\n{name}")
         limit = view.widest
-        figure, axes, ends, cut, numbers = _curves(
+        figure, axes, ends, bars, cut, numbers = _curves(
             view, others, curve, label, (-limit, limit), home=0.0
         )
         for ax, found in zip(axes, there, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
             mark_boundary(ax, view.over, found, text=True)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
+        style.mark_cuts(bars)
         _name(view, others, figure, axes, ends)
         title = f"Difference against {name} in {_what(view)}"
         words = caption(
@@ -97,7 +100,7 @@ class Differences(style.ReportFigure):
             is_marked=view.smallest_effect is not None,
             has_boundary=any(_boundary(view.over, found) is not None for found in there),
         )
-        reads = (_intervals_words(view), style.hatch_words(view), cut)
+        reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
@@ -123,17 +126,33 @@ class Levels(style.ReportFigure):
         what = capital(_what(view))
         label = style.axis_label(view.measure, style.wrapped(what))
         limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
-        figure, axes, ends, cut, numbers = _curves(view, view.lines, curve, label, limits)
+        figure, axes, ends, bars, cut, numbers = _curves(view, view.lines, curve, label, limits)
+        style.mark_cuts(bars)
         _name(view, view.lines, figure, axes, ends)
         words = caption("levels", in_excess=_in_excess(view))
-        reads = (_intervals_words(view), style.hatch_words(view), cut)
+        reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
         title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
+def _few_words(reading: Reading) -> str:
+    """That what cannot be told is no evidence, where nothing else was found."""
+    found = getattr(reading, "told", None)
+    if found is None or not found.has_too_few:
+        return ""
+    few = capital(too_few(found.persons, found.cluster))
+    return f"{few}: where bars overlap or hold zero, nothing is shown to be equal."
+
+
 def _boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
-    """Where along x the wanted rate becomes too high; None if it is not among the levels."""
-    return style.place_of(over, cadence.boundary_s) if over and cadence else None
+    """Where along x the wanted rate becomes too high; None if it is not among the levels.
+
+    Where places are not to scale, between two levels is the middle between them.
+    """
+    place = style.place_of(over, cadence.boundary_s) if over and cadence else None
+    if place is None or over is None or style.is_to_scale(over) or place.is_integer():
+        return place
+    return math.floor(place) + 0.5
 
 
 def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
@@ -162,7 +181,7 @@ def _curves(
     ylabel: str,
     limits: tuple[float, float],
     home: float = math.nan,
-) -> tuple[Figure, list[Axes], list[Ends], str, style.Numbers]:
+) -> tuple[Figure, list[Axes], list[Ends], list[style.Bars], str, style.Numbers]:
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
@@ -174,24 +193,39 @@ def _curves(
         home: A value that must be seen, such as zero.
 
     Returns:
-        The figure, its axes, the end of each line, what a caption must say of cut bands, and the
-        numbers drawn.
+        The figure, its axes, the end of each line, the bars, what a caption must say of those
+        that are cut, and the numbers drawn.
     """
     figure, axes = style.panel_grid(view, 3.4)
     look, every, seen, numbers = looks(view.line), [], [np.array([home])], style.Numbers()
+    bars: list[style.Bars] = []
     draw = _band if style.has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for level, shift in _side_by_side(view, lines):
             matrix = curve(panel, level)
-            bands = band(matrix)
+            bands = _possible(band(matrix), *limits)
             seen.append(matrix.ravel())
-            ends[level] = draw(ax, bands, look[level], shift, limits)
+            ends[level] = draw(ax, bands, look[level], shift)
+            at = _places(bands, shift)
+            bars.append(style.Bars(ax, at, bands.low, bands.high, look[level].colour))
             numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
         style.hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     style.label_panels(axes, view, ylabel)
-    return figure, axes, every, style.fit_to(axes[0], present(np.concatenate(seen))), numbers
+    cut = style.fit_to(axes[0], present(np.concatenate(seen)))
+    return figure, axes, every, bars, cut, numbers
+
+
+def _possible(bands: Band, least: float, most: float) -> Band:
+    """Its limits within what is possible."""
+    edges = ("low", "high", "pointwise_low", "pointwise_high")
+    return replace(bands, **{edge: np.clip(getattr(bands, edge), least, most) for edge in edges})
+
+
+def _places(bands: Band, shift: float) -> Floats:
+    """Along x, beside each stop."""
+    return np.arange(len(bands.mean), dtype=np.float64) + shift
 
 
 def _columns(measure: str, bands: Band) -> dict[str, Floats]:
@@ -215,8 +249,12 @@ def _zoom_on_small(axes: list[Axes], smallest: float) -> bool:
         return False
     bottom, top = (_WIDER * end if abs(end) > smallest else end for end in (bottom, top))
     digits = (1, 2, 5) if max(-bottom, top) < 100 * smallest else (1,)
-    steps = [k * 10.0**n for n in range(-3, 7) for k in digits if smallest <= k * 10.0**n]
+    steps = [smallest, *(k * 10.0**n for n in range(-3, 7) for k in digits)]
+    steps = [step for step in dict.fromkeys(steps) if smallest <= step]
     axes[0].set_yscale("symlog", linthresh=2 * smallest)
+    for ax in axes:
+        if label := ax.get_ylabel():
+            ax.set_ylabel(f"{label},\nlog scale beyond ±{2 * smallest:g}")
     ticks = [0.0, *steps, *(-step for step in steps)]
     axes[0].set_yticks([tick for tick in ticks if bottom <= tick <= top])
     axes[0].set_ylim(bottom, top)
@@ -250,24 +288,20 @@ def _name(
         legend(figure, view.line, lines)
 
 
-def _points(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, float]) -> float:
+def _points(ax: Axes, bands: Band, look: Look, shift: float) -> float:
     """A mark with two bars at each stop: the wide interval thin, the narrow one thick."""
-    x = np.arange(len(bands.mean)) + shift
-    ax.vlines(x, *np.clip([bands.low, bands.high], *limits), color=look.colour, lw=1)
-    narrow = np.clip([bands.pointwise_low, bands.pointwise_high], *limits)
-    ax.vlines(x, *narrow, color=look.colour, lw=2.6)
+    x = _places(bands, shift)
+    ax.vlines(x, bands.low, bands.high, color=look.colour, lw=1)
+    ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=look.colour, lw=2.6)
     ax.plot(x, bands.mean, look.mark, color=look.colour, ms=6, mec=PAPER, mew=0.6, zorder=3)
     return math.nan  # no line, so no end
 
 
-def _band(ax: Axes, bands: Band, look: Look, shift: float, limits: tuple[float, float]) -> float:
+def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
     """One line with its band and bars; gives the height of its end."""
-    x, colour = np.arange(len(bands.mean)) + shift, look.colour
-    low, high = np.clip([bands.low, bands.high], *limits)
-    ax.fill_between(x, low, high, color=colour, alpha=0.16, lw=0)
-    ax.vlines(
-        x, *np.clip([bands.pointwise_low, bands.pointwise_high], *limits), color=colour, lw=1.2
-    )
+    x, colour = _places(bands, shift), look.colour
+    ax.fill_between(x, bands.low, bands.high, color=colour, alpha=0.16, lw=0)
+    ax.vlines(x, bands.pointwise_low, bands.pointwise_high, color=colour, lw=1.2)
     ax.plot(x, bands.mean, "-", marker=look.mark, color=colour, ms=4.5)
     seen = present(bands.mean)
     return float(seen[-1]) if len(seen) else float("nan")
@@ -373,10 +407,14 @@ def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], look: Look) -> Non
 
 
 def _closed_form(ax: Axes, view: StudyView, cadence: Cadence | None) -> None:
+    """A dash at each stop where a pattern stands that is bound by it."""
     if cadence is None or view.over is None or not view.over.is_numeric:
         return
-    delays = np.array([float(v) for v in view.over.levels if isinstance(v, int | float)])
-    x = np.linspace(0, len(delays) - 1, 40 * len(delays))
-    rates = [cadence.lock_step_rate(d) for d in np.interp(x, np.arange(len(delays)), delays)]
-    ax.plot(x, rates, color=INK, lw=1, ls=(0, (4, 2)), zorder=3)
+    delays = [float(v) for v in view.over.levels if isinstance(v, int | float)]
+    rates = [cadence.lock_step_rate(d) for d in delays]
+    has_lines, half = style.has_lines(view), 0.4 / len(view.lines)
+    for level, place in style.dodge(view.lines):
+        if level in PATTERNS and PATTERNS[str(level)].in_step:
+            x = np.arange(len(delays)) + (0.0 if has_lines else place)
+            ax.hlines(rates, x - half, x + half, color=INK, lw=1, ls=(0, (4, 2)), zorder=3)
     mark_boundary(ax, view.over, cadence, text=False)

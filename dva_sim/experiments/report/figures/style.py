@@ -9,6 +9,7 @@ import csv
 import io
 import textwrap
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +23,7 @@ from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.csv_cells import harmless, harmless_row
 from dva_sim.kernel.units import ending_of, unit_of
-from dva_sim.kernel.wording import capital
+from dva_sim.kernel.wording import capital, number
 from dva_sim.simulation.labels import brief, factor_name, level_name, measure_name
 
 if TYPE_CHECKING:
@@ -97,6 +98,8 @@ _CROWDED = 45  # characters of ticks that fit beside each other in the width
 _DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
 _LEAST_TICK = 8  # characters of a tick's name in a line
 _ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
+_HAIR = 1e-3  # of an axis, below which what is cut cannot be seen
+_LINE_PT = 9.0  # height of a line of small print [pt]
 _ROW_LABEL = 28  # characters that the height of a row holds
 ASIDE = "_aside"  # label of what is drawn but is no result: the site, a scale, a heading
 LEAST_WORDS = 6.0  # [pt] in this width
@@ -207,6 +210,7 @@ def finish(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
+    _name_logarithmic(figure)
     layout = figure.get_layout_engine()
     if layout is not None:
         layout.execute(figure)
@@ -230,6 +234,16 @@ def finish(
         figure=figure,
         reads=told,
     )
+
+
+def _name_logarithmic(figure: Figure) -> None:
+    """Say of each logarithmic axis that it is one."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            label = axis.get_label_text()
+            if label and axis.get_scale() in ("log", "symlog") and "log scale" not in label:
+                gap = "\n" if axis is ax.yaxis else " "
+                axis.set_label_text(f"{label},{gap}log scale")
 
 
 def axis_label(name: str, text: str | None = None) -> str:
@@ -308,7 +322,10 @@ def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
 
 
 def fit_to(axes: Axes, values: Floats) -> str:
-    """Cut bands far beyond what any person did, lest they flatten all else; says if it did."""
+    """Cut bands far beyond what any person did, lest they flatten all else; says if it did.
+
+    To be followed by `mark_cuts`, once the limits are settled.
+    """
     bottom, top = axes.get_ylim()
     if not len(values):
         return ""
@@ -317,7 +334,71 @@ def fit_to(axes: Axes, values: Floats) -> str:
     axes.set_ylim(low, high)
     if (low, high) == (bottom, top):
         return ""
-    return "Bands and bars that go far beyond what any person did are cut."
+    return (
+        "Bands and bars that go far beyond what any person did are cut: an arrow head at the edge "
+        "of the axes, with the number at which they end."
+    )
+
+
+@dataclass(frozen=True)
+class Bars:
+    """What may be longer than the axes are: where each bar stands `(n,)`, and from where to where.
+
+    Attributes:
+        axes: In which they are drawn.
+        at: Place of each, across it.
+        low: Where it begins.
+        high: Where it ends.
+        colour: Of all of them.
+        along: The axis along which they lie.
+    """
+
+    axes: Axes
+    at: Floats
+    low: Floats
+    high: Floats
+    colour: str
+    along: Literal["x", "y"] = "y"
+
+
+def mark_cuts(every: Sequence[Bars]) -> None:
+    """An arrow head where an edge of the axes cuts a bar, with the bound that cannot be seen.
+
+    To be called last: the limits must be settled.
+    """
+    beside: Counter[tuple[Axes, str, int, int]] = Counter()
+    for bars in every:
+        is_up = bars.along == "y"
+        low, high = sorted(bars.axes.get_ylim() if is_up else bars.axes.get_xlim())
+        for ends, edge, side in ((bars.low, low, -1), (bars.high, high, 1)):
+            for at, end in zip(bars.at, ends, strict=True):
+                if side * (end - edge) > _HAIR * (high - low):
+                    spot = (bars.axes, bars.along, side, round(at))
+                    _arrow_head(bars, float(at), edge, side, beside[spot], number(float(end)))
+                    beside[spot] += 1
+
+
+def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: str) -> None:
+    """At an edge; of several bounds at one stop one stands below the other."""
+    look: dict[str, Any] = {"color": bars.colour, "label": ASIDE, "clip_on": False, "zorder": 6}
+    if bars.along == "y":
+        place, mark, offset = (at, edge), "v^"[side > 0], (6.0, -side * (2 + _LINE_PT * row))
+        across, up = "left", "top" if side > 0 else "bottom"
+    else:
+        place, mark, offset = (edge, at), "<>"[side > 0], (-2.0 * side, 6 + _LINE_PT * row)
+        across, up = "right" if side > 0 else "left", "bottom"
+    bars.axes.plot(*place, mark, ms=6, **look)
+    bars.axes.annotate(
+        bound,
+        place,
+        xytext=offset,
+        textcoords="offset points",
+        ha=across,
+        va=up,
+        fontsize=7.5,
+        color=bars.colour,
+        zorder=6,
+    )
 
 
 def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:
@@ -389,7 +470,12 @@ def _make_room(axes: Axes, columns: int) -> None:
 
 
 def has_lines(view: StudyView) -> bool:
-    """Lines lead from number to number; between words there is nothing to lead through."""
+    """Lines lead from number to number, if all steps are equal: else their slope means nothing."""
+    return leads_on(view) and view.over is not None and is_to_scale(view.over)
+
+
+def leads_on(view: StudyView) -> bool:
+    """Whether one stop comes after the other; between words there is nothing to lead through."""
     return view.over is not None and view.over.is_numeric and len(view.stops) > 1
 
 

@@ -42,11 +42,11 @@ class TradeOff(style.ReportFigure):
         if columns is None:
             return None
         figure, axes = style.panel_grid(view, 3.6)
-        numbers, ends = style.Numbers(), []
+        numbers, ends, bars = style.Numbers(), [], list[style.Bars]()
         for ax, panel in zip(axes, view.shown, strict=True):
             for level in view.lines:
                 bands = [_band(view, column, panel, level) for column in columns]
-                _line(ax, view, level, *bands)
+                bars += _line(ax, view, level, *bands)
                 ends.append((ax, bands[0].mean, bands[1].mean))
                 told = {
                     style.with_unit(f"{word}_{edge}", column): getattr(found, name)
@@ -60,6 +60,7 @@ class TradeOff(style.ReportFigure):
             ax.grid(True, axis="both")
             ax.margins(0.12)
         _fit(axes[0], view, columns)
+        style.mark_cuts(bars)
         for ax, x, y in ends:
             _name_stops(ax, view, x, y)
         figure.supxlabel(style.axis_label(columns[0]), fontsize="medium")
@@ -67,7 +68,7 @@ class TradeOff(style.ReportFigure):
         legend(figure, view.line)
         title = f"The trade-off: {measure_name(columns[1])} against {measure_name(columns[0])}"
         along = (
-            factor_name(view.over.name) if style.has_lines(view) and view.over is not None else ""
+            factor_name(view.over.name) if style.leads_on(view) and view.over is not None else ""
         )
         return self.finish(figure, caption("tradeoff", along=along), numbers, title=title)
 
@@ -104,13 +105,17 @@ def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
         ax.set(**{f"{name}lim": (low, high)})
 
 
-def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band) -> None:
-    """A mark at each stop, joined where stops are numbers."""
+def _line(
+    ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band
+) -> list[style.Bars]:
+    """A mark at each stop, joined where stops are numbers; gives the bars of its crosses."""
     paint, mark = looks(view.line)[level]
     x, y = exposure.mean, response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
-    ax.plot(x, y, "-" if style.has_lines(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
+    ax.plot(x, y, "-" if style.leads_on(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
+    across = style.Bars(ax, y, exposure.pointwise_low, exposure.pointwise_high, paint, "x")
+    return [across, style.Bars(ax, x, response.pointwise_low, response.pointwise_high, paint)]
 
 
 def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
@@ -119,7 +124,7 @@ def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:
         return
     wide, high = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
     named: list[int] = []
-    for stop in (0, len(x) - 1) if style.has_lines(view) else range(len(x)):
+    for stop in (0, len(x) - 1) if style.leads_on(view) else range(len(x)):
         gaps = [(abs(x[i] - x[stop]) / wide, abs(y[i] - y[stop]) / high) for i in named]
         if any(max(gap) < _NEAR for gap in gaps):
             continue
