@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_floats, plain_level
 from dva_sim.experiments.execution.kept_recordings import FOLDER
+from dva_sim.simulation.labels import measure_called
 
 
 class Tables(NamedTuple):
@@ -21,20 +23,31 @@ class Tables(NamedTuple):
         runs: All of them.
         tracks: Who was where, of some.
         names: Columns that name a cell: its factors.
+        events: When each happened, was found and was dealt with, and in which room.
     """
 
     runs: Table
     tracks: Table
     names: Sequence[str]
+    events: Table | None = None
 
 
 class SeenIncident(NamedTuple):
-    """What happened, when [s] and where [m]."""
+    """What happened, when [s] and where [m], or where only that is known in which room."""
 
     kind: str
     start: float
     x: float
     y: float
+    room: str = ""
+
+
+class Span(NamedTuple):
+    """What of a run a measure is the length of: from when, until when [s], what ends it."""
+
+    begins: float
+    ends: float
+    by: str
 
 
 @dataclass(frozen=True)
@@ -50,6 +63,7 @@ class KeptEpisode:
         incidents: Kind, start [s] and place [m] of each, where a recording tells them.
         kept: How many runs were kept, of which it is one.
         rank: What share of all runs had a smaller value.
+        span: What of the run the measure is the length of; None where it is none, or never ended.
     """
 
     setting: Setting
@@ -60,6 +74,7 @@ class KeptEpisode:
     incidents: tuple[SeenIncident, ...]
     kept: int
     rank: float
+    span: Span | None = None
 
 
 def typical_and_worst(
@@ -90,18 +105,20 @@ def typical_and_worst(
     episodes = []
     for row in (int(rows[at]) for at in chosen):
         moments, incidents = _seen(files, tables.tracks, part, runs, row)
+        events = _of_run(tables.events, part, runs, row)
         where = {name: plain_level(runs[name][row]) for name in tables.names}
-        rank = float((every < values[row]).mean())
+        value = float(values[row])
         episodes.append(
             KeptEpisode(
                 setting=where,
                 person=int(runs["person"][row]),
                 trial=int(runs["trial"][row]),
-                value=float(values[row]),
+                value=value,
                 moments=moments,
-                incidents=incidents,
+                incidents=incidents or _told(events),
                 kept=len(rows),
-                rank=rank,
+                rank=float((every < value).mean()),
+                span=_span(events, measure, value),
             )
         )
     return episodes[0], episodes[1]
@@ -144,11 +161,39 @@ def _seen(
         places = [(i, i.hazard.position) for i in lapse.incidents]
         found = (SeenIncident(i.kind, float(i.start), float(x), float(y)) for i, (x, y) in places)
         return lapse.tracks, tuple(found)
-    cell, person, trial = _key(runs, row)
-    mine = np.asarray(tracks["part"]) == part
-    for name, value in (("cell", cell), ("person", person), ("trial", trial)):
-        mine &= np.asarray(tracks[name]) == value
-    return {name: np.asarray(values)[mine] for name, values in tracks.items()}, ()
+    return _of_run(tracks, part, runs, row), ()
+
+
+def _of_run(table: Table | None, part: str, runs: Table, row: int) -> Table:
+    """The rows of another table that are about a run."""
+    if not table or "cell" not in table:
+        return {}
+    mine = np.asarray(table["part"]) == part
+    for name, value in zip(("cell", "person", "trial"), _key(runs, row), strict=True):
+        mine &= np.asarray(table[name]) == value
+    return {name: np.asarray(values)[mine] for name, values in table.items()}
+
+
+def _told(events: Table) -> tuple[SeenIncident, ...]:
+    """What happened, by the table of events: of each the room is known."""
+    if "t_occurred_s" not in events:
+        return ()
+    columns = (events["kind"], as_floats(events["t_occurred_s"]), events["room"], events["is_true"])
+    rows = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
+    real = [(kind, t, math.nan, math.nan, room or "") for kind, t, room, true in rows if true]
+    return tuple(SeenIncident(*told) for told in real)
+
+
+_ENDS = {"confirmation": "t_confirmed_s", "response": "t_arrived_s"}
+
+
+def _span(events: Table, measure: str, value: float) -> Span | None:
+    """Of a run with one event, what a measure that waits for something of it is the length of."""
+    by = measure_called(measure).awaits
+    ends = as_floats(events[_ENDS[by]]) if _ENDS.get(by) in events else np.array([])
+    if len(ends) != 1 or not np.isfinite(ends[0]) or ends[0] < value:
+        return None
+    return Span(float(ends[0]) - value, float(ends[0]), by)
 
 
 def agents_of(moments: Table) -> list[str]:
@@ -165,7 +210,8 @@ def way_of(moments: Table, agent: str) -> tuple[Floats, Floats]:
     return times[order], np.column_stack(columns)[order]
 
 
-def instants(moments: Table, count: int) -> Sequence[float]:
-    """Times [s] spread evenly from the first moment to the last."""
-    times = as_floats(np.asarray(moments["t_s"]))
-    return [float(t) for t in np.linspace(times.min(), times.max(), count)]
+def instants(episode: KeptEpisode, count: int) -> Sequence[float]:
+    """Times [s] spread evenly over what the measure is the length of, else over the whole run."""
+    times = as_floats(np.asarray(episode.moments["t_s"]))
+    begins, ends = episode.span[:2] if episode.span else (times.min(), times.max())
+    return [float(t) for t in np.linspace(begins, ends, count)]

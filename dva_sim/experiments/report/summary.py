@@ -347,7 +347,8 @@ class Reading:
         if self.view is None:
             return None
         names = [n for n in self.study.get("factors", {}) if n != POINT and n in self.runs]
-        tables = Tables(self.runs, self.table("tracks"), [*names, *self.points])
+        columns = [*names, *self.points]
+        tables = Tables(self.runs, self.table("tracks"), columns, self.table("events"))
         part = self.view.part.name
         return typical_and_worst(self.results.folder, part, self.view.measure, tables)
 

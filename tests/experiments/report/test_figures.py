@@ -110,15 +110,30 @@ def test_names_of_lines_that_end_together_are_moved_apart_within_the_axes():
 
 
 def test_every_event_has_a_fate_even_one_nobody_foresaw():
-    outcome = np.array(["confirmed", "confirmed", "expired", "open", "stolen"])
-    kind = np.array(["robot", "guard", "robot", "none", "none"])
-    assert fates(outcome, kind).tolist() == [
-        "confirmed by a robot",
-        "confirmed by a guard",
-        "expired",
-        "open",
-        "other",
-    ]
+    told = {
+        ("confirmed", "robot", True): "confirmed by a robot",
+        ("confirmed", "guard", True): "confirmed by a guard",
+        ("confirmed", "guard", False): "false alarm confirmed",
+        ("refuted", "robot", True): "refuted",
+        ("refuted", "robot", False): "cleared",
+        ("expired", "robot", True): "expired",
+        ("open", "none", True): "open",
+        ("stolen", "none", True): "other",
+    }
+    assert fates(*map(np.array, zip(*told, strict=True))).tolist() == list(told.values())
+
+
+@blank
+def test_a_real_event_that_was_refuted_is_missed_and_what_one_event_weighs_is_said(view):
+    rows = synthetic_results.columns(synthetic_results.story_rows(4))
+    rows["is_true"] = np.arange(len(rows["part"])) % 2 == 0
+    rows["outcome"] = np.where(np.arange(len(rows["part"])) % 4 < 2, "refuted", "confirmed")
+    rows["responder_kind"] = np.full(len(rows["part"]), "robot")
+    drawn = StoryOutcomes().draw(view, SimpleNamespace(table={"events": rows}.get))
+    (key,) = drawn.figure.legends
+    names = " ".join(text.get_text() for text in key.get_texts())
+    assert unnamed(names, "missed", "cleared", "false alarm confirmed", "by a robot") == []
+    assert unnamed(drawn.caption, "8 events", "12.5") == []
 
 
 def test_shares_of_outcomes_add_up_to_one(view):

@@ -137,17 +137,25 @@ _TIMES = {
     "Guard confirms": ("guard", "confirmation_s"),
     "Robot confirms": ("robot", "confirmation_s"),
 }
-_NAMES = {"open": "open at the end"}
+_NAMES = {
+    "refuted": "missed: refuted though real",
+    "cleared": "cleared as a false alarm",
+    "open": "open at the end",
+}
 _FATES = (  # as they are stacked
-    *("confirmed by a robot", "confirmed by a guard", "refuted", "escalated", "expired"),
-    *("undetected", "open", "other"),
+    *("confirmed by a robot", "confirmed by a guard", "cleared", "refuted"),
+    *("false alarm confirmed", "escalated", "expired", "undetected", "open", "other"),
 )
 
 
-def fates(outcome: NDArray[Any], responder_kind: NDArray[Any]) -> NDArray[np.str_]:
+def fates(
+    outcome: NDArray[Any], responder_kind: NDArray[Any], is_true: NDArray[np.bool_]
+) -> NDArray[np.str_]:
     """What became of each event, in words of `_FATES`; outcomes it does not know are `other`."""
     words = np.char.add("confirmed by a ", responder_kind.astype(str))
+    words = np.where(is_true, words, "false alarm confirmed")
     words = np.where(np.isin(outcome, ("confirmed", "contained")), words, outcome.astype(str))
+    words = np.where((words == "refuted") & ~is_true, "cleared", words)
     return np.where(np.isin(words, _FATES), words, "other")
 
 
@@ -166,6 +174,8 @@ class Events:
         here = (rows["part"] == part) & ~rows["is_reference"].astype(bool)
         self.rows = {key: values[here] for key, values in rows.items()}
         self._view = view
+        is_true = self.rows.get("is_true", np.ones(len(self), dtype=bool)).astype(bool)
+        self._fates = fates(self.rows["outcome"], self.rows["responder_kind"], is_true)
         self._codes = {
             factor.name: (factor, codes_of(self.rows, factor))
             for factor in view.part.factors
@@ -196,7 +206,7 @@ class Events:
         """Share of each fate; they add up to one, or all are nan where nothing happened."""
         if not mask.any():
             return dict.fromkeys(_FATES, np.nan)
-        found = fates(self.rows["outcome"][mask], self.rows["responder_kind"][mask])
+        found = self._fates[mask]
         return {fate: float(np.mean(found == fate)) for fate in _FATES}
 
     def kinds_of_times(self) -> dict[str, tuple[str, str]]:
@@ -209,7 +219,7 @@ class Events:
 
     def one_fate(self) -> str | None:
         """What became of every event, if it was the same for all."""
-        found = np.unique(fates(self.rows["outcome"], self.rows["responder_kind"]))
+        found = np.unique(self._fates)
         return str(found[0]) if len(found) == 1 else None
 
 
@@ -283,8 +293,11 @@ class StoryOutcomes(_Story):
         met = events.shares(np.ones(len(events), dtype=bool))
         parts = {_NAMES.get(fate, fate): box(FATES[fate]) for fate in _FATES if met[fate]}
         stacks, numbers = Stacks(view, "Share of events", parts), style.Numbers()
+        counts: list[int] = []
         for ax, panel, level in stacks.panels():
-            shares = [events.shares(events.under(panel, level, v)) for v in view.stops]
+            masks = [events.under(panel, level, v) for v in view.stops]
+            shares = [events.shares(mask) for mask in masks]
+            counts += [int(mask.sum()) for mask in masks if mask.any()]
             told = {fate: np.array([share[fate] for share in shares]) for fate in _FATES}
             stack(ax, told, FATES)
             numbers.add(view.setting(panel, level), view.along_x() | told)
@@ -292,7 +305,8 @@ class StoryOutcomes(_Story):
         stacks.axes[0].set_xlim(0, 1)
         stacks.axes[0].set_xticks([0, 0.5, 1])
         stacks.axes[0].xaxis.set_major_formatter(lambda share, _: f"{100 * share:.0f} %")
-        words = caption("story_outcomes", events=len(events), part=events.part)
+        few = (min(counts), max(counts))
+        words = caption("story_outcomes", events=len(events), part=events.part, few=few)
         title = f"Part {events.part}: what became of the events"
         return self.finish(stacks.figure, words, numbers, title=title)
 

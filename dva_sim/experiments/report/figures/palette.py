@@ -96,7 +96,7 @@ FATES: Mapping[str, Fill] = {
     "confirmed by a robot": Fill(_NAVY.colour),
     "confirmed by a guard": Fill(_ORANGE.colour, "////"),
     "confirmed": Fill("#87c5a6"),
-    "cleared": Fill("#56B4E9", "////"),
+    "cleared": Fill("#56B4E9", "----"),
     "refuted": Fill(HAZARD, "...."),
     "false alarm confirmed": Fill(HAZARD, "xxxx"),
     "link lost": Fill("#91086f", "////"),

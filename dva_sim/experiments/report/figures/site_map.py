@@ -5,6 +5,7 @@ One run as a strip of moments on the map: a typical one, and the worst.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -12,7 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, agents_of, instants, way_of
+from dva_sim.experiments.analysis.kept_episodes import (
+    KeptEpisode,
+    SeenIncident,
+    agents_of,
+    instants,
+    way_of,
+)
 from dva_sim.experiments.analysis.run_grid import Floats, Table, as_floats, codes_of
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import (
@@ -254,22 +261,26 @@ class _TimeLapse(ReportFigure):
             return None
         site = site_of(scenario)
         points = np.vstack([places[:, :2] for _, places in moved.values()])
-        low, high = frame_of(np.vstack([points, *((i.x, i.y) for i in episode.incidents)]))
+        incidents = [(i, *_place_of(i, site)) for i in episode.incidents]
+        known = [(x, y) for _, x, y in incidents if math.isfinite(x)]
+        low, high = frame_of(np.vstack([points, *known]))
         size = high - low
         abreast = _MOMENTS if size[1] > _TALL * size[0] else _STRIPS_ABREAST
         height = row_height(size, columns=abreast)
         figure, rows = panels(_MOMENTS // abreast, abreast, height, sharex=True, sharey=True)
         nose, numbers = _NOSE * float(size[0]), Numbers()
-        times, numbered = instants(episode.moments, _MOMENTS), _numbered(list(moved))
+        times, numbered = instants(episode, _MOMENTS), _numbered(list(moved))
         for ax, time in zip((ax for row in rows for ax in row), times, strict=True):
             draw_ground(ax, site)
             for name, (when, places) in moved.items():
-                _agent(ax, places[when <= time], look_of(kind_of(name)), nose)
-                if name in numbered and (when <= time).any():
-                    _number(ax, name, places[when <= time][-1])
-            for incident in (i for i in episode.incidents if i.start <= time):
-                ax.plot(incident.x, incident.y, "X", ms=7, color=HAZARD, mec=PAPER, zorder=8)
-            ax.set_title(f"{number(time)} s")
+                so_far = _until(when, places, time)
+                _agent(ax, so_far, look_of(kind_of(name)), nose)
+                if name in numbered and len(so_far):
+                    _number(ax, name, so_far[-1])
+            for incident, x, y in incidents:
+                if incident.start <= time and math.isfinite(x):
+                    _incident(ax, incident, x, y)
+            ax.set_title(_clock(episode, time))
             ax.label_outer()
         for name, (when, places) in moved.items():
             x, y, heading = places.T
@@ -277,8 +288,8 @@ class _TimeLapse(ReportFigure):
             numbers.add({"agent": name}, told)
         rows[0][0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         scale_bar(rows[-1][0], low)
-        _key(figure, list(moved), len(episode.incidents) > 0)
-        title = f"{capital(self.which)} run: {_what(view, episode)}"
+        _key(figure, list(moved), any(not i.room for i in episode.incidents))
+        title = f"{capital(self.which)} run {_OF_ALL[self.which]}: {_what(view, episode)}"
         words = caption("time_lapse", episode=episode, which=self.which, runs=len(view.part))
         return self.finish(figure, words, numbers, title=title, reads=(_READS,))
 
@@ -299,14 +310,61 @@ class WorstRun(_TimeLapse):
     which = "worst"
 
 
+def _clock(episode: KeptEpisode, time: float) -> str:
+    """`30.0 s`, as the measure counts where it is a time; the last with what ended it."""
+    span = episode.span
+    if span is None:
+        return f"{number(time)} s"
+    end = f": {span.by}" if time >= span.ends else ""
+    return f"{number(time - span.begins)} s{end}"
+
+
+def _until(when: Floats, places: Floats, time: float) -> Floats:
+    """The way up to a moment, the last step as far as it was gone `(n, 3)`."""
+    so_far, after = places[when <= time], places[when > time]
+    if not len(so_far) or not len(after) or when[len(so_far) - 1] == time:
+        return so_far
+    before, following = when[len(so_far) - 1], when[len(so_far)]
+    x, y, heading = so_far[-1]
+    dx, dy = (after[0, :2] - (x, y)) * (time - before) / (following - before)
+    return np.vstack([so_far, (x + dx, y + dy, heading)])
+
+
+def _place_of(incident: SeenIncident, site: Site | None) -> tuple[float, float]:
+    """Where it is [m]; of one whose room alone is known, a place in that, for its name."""
+    if not incident.room or site is None:
+        return incident.x, incident.y
+    boxes = [room.box for room in site.rooms if room.name == incident.room]
+    if not boxes:
+        return incident.x, incident.y
+    left, bottom, right, top = boxes[0]
+    return (left + right) / 2, (bottom + top) / 2
+
+
+def _incident(ax: Axes, incident: SeenIncident, x: float, y: float) -> None:
+    """Its kind, beside a cross where its place is known, else in its room."""
+    words: dict[str, Any] = {"fontsize": 7, "color": HAZARD, "zorder": 8, "clip_on": True}
+    if incident.room:
+        ax.text(x, y, f"{incident.kind}\nin here", ha="center", va="center", **words)
+        return
+    ax.plot(x, y, "X", ms=7, color=HAZARD, mec=PAPER, zorder=8)
+    ax.annotate(incident.kind, (x, y), xytext=(5, 3), textcoords="offset points", **words)
+
+
 def _what(view: StudyView, episode: KeptEpisode) -> str:
     value = quantity(episode.value, unit_of(view.measure))
     where = f", {setting(episode.setting)}" if episode.setting else ""
     return f"{measure_name(view.measure)} {value}{where}"
 
 
+_OF_ALL = {
+    "typical": "(nearest to the median over all configurations)",
+    "worst": "of all configurations",
+}
 _READS = (
-    "Typical and worst run: six moments with the way so far; a nose shows where an agent heads."
+    "Typical and worst run: six moments with the way so far; a nose shows where an agent heads. "
+    "Where the measure is a time, they count from where it does, and the last is where it ends; "
+    "else they are times of the run."
 )
 
 
