@@ -63,11 +63,14 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
 
 def _verdict(tested: Tested, cluster: str) -> str:
     """`? open: too few persons (4) to tell`, where they are."""
-    word, found = _VERDICTS[tested.verdict], tested.difference
-    least = tested.contrast.smallest or tested.hypothesis.margin or None
-    if tested.verdict == "open" and found is not None and _are_few(found, least):
-        return f"{word}: {too_few(found.n_persons, cluster)}"
-    return word
+    return ": ".join(filter(None, (_VERDICTS[tested.verdict], _few(tested, cluster))))
+
+
+def _few(tested: Tested, cluster: str) -> str:
+    """Why it is open, where that is for want of persons."""
+    found, least = tested.difference, tested.contrast.smallest or tested.hypothesis.margin or None
+    is_few = tested.verdict == "open" and found is not None and _are_few(found, least)
+    return too_few(found.n_persons, cluster) if is_few and found is not None else ""
 
 
 def _are_few(found: Interval, smallest: float | None) -> bool:
@@ -85,10 +88,12 @@ _SETTLED: dict[Verdict, str] = {
 }
 
 
-def verdict_sentences(tested: Sequence[Tested]) -> list[str]:
+def verdict_sentences(tested: Sequence[Tested], cluster: str = "person") -> list[str]:
     """One sentence with the verdict on each hypothesis, for the top of a report."""
     return [
-        f"Registered hypothesis {t.name} {_SETTLED[t.verdict]}: {_claim(t)}"
+        f"Registered hypothesis {t.name} "
+        + ", ".join(filter(None, (_SETTLED[t.verdict], _few(t, cluster))))
+        + f": {_claim(t)}"
         + (f"; found {_interval(t.difference, t.contrast.measure)}" if t.difference else "")
         + (f", p {_p(t.adjusted)} by Holm." if t.difference else ".")
         for t in tested

@@ -376,7 +376,8 @@ class Reading:
         if why := self.distrusted.get(self.view.part.name):
             return Answer(f"The answer is withheld: {why}. Mend it, and run the study again.")
         found = self.page.answer(self.finding)
-        verdicts = verdict_sentences(self.judgement.tested) if self._confirms else []
+        tested = self.judgement.tested if self._confirms else []
+        verdicts = verdict_sentences(tested, self.cluster)
         if verdicts:
             lead = f"Not registered, over all levels at once: {found.lead}"
             found = replace(found, lead=" ".join([*verdicts, lead]))
