@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dva_sim.simulation.timed.measures import evenness
+from dva_sim.simulation.timed.bounds import evenness
 from dva_sim.statistics import CUT, first_of, incidence
 
 CONFIRMED, ESCALATED = 1, 2

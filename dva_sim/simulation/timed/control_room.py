@@ -1,14 +1,13 @@
-"""The DVA in a shift: who is registered, what it may know of the ground, and its mail.
+"""The DVA in a shift: who is registered, and what it may know of the ground.
 
 Responders are hired as the scenario says, operators drive one robot each at a time, and all are
 registered with the DVA; it knows ways, lists of preference, stations, and where to expect events.
-Messages reach it at once, in order, and without a network.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Protocol
@@ -19,134 +18,16 @@ from dva_sim.core.assignments import Rules
 from dva_sim.core.dispatch import Policy
 from dva_sim.core.dva import Dva
 from dva_sim.core.registry import DETECTOR, GUARD, OPERATOR, ROBOT
-from dva_sim.core.sessions import Permissions, Send, Sessions
+from dva_sim.core.sessions import Permissions, Sessions
 from dva_sim.core.travel_times import SiteKnowledge, Start, WaitingPlace
-from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.timed.demand import CALLERS, Demand
+from dva_sim.simulation.timed.mail import Mail
 from dva_sim.simulation.timed.recording import Floats
 from dva_sim.simulation.timed.responders import DONE, ShiftWorld, Unit
 from dva_sim.simulation.timed.scenario import Group, Point, TimedScenario, limit_of
 from dva_sim.simulation.timed.travel import Place, Terrain
-
-DVA = "02:00:00:00:00:01"
-NOON = "12:00:00"  # for people, who are not here to read it
-TICK = 1.0  # how often the desk looks by itself on a network [s]
-LEAST = 1e-6  # the clock's own step: a deadline is never looked at twice at one time [s]
-
-
-class Taker(Protocol):
-    """Somebody the DVA speaks to."""
-
-    def take(self, body: m.Body) -> bool:
-        """Hear the DVA; False declines."""
-
-
-class Mail:
-    """Carries messages to the desk and from it, one after the other, at once.
-
-    What is said while the desk is busy waits until it is not. The desk looks at deadlines
-    exactly when they are due. Where one decision can make the next possible, it also looks again
-    a second after it has sent something, as it would on its network, until nothing is left to say.
-
-    Args:
-        desk: The DVA's.
-        clock: Tells the time.
-        changed: Called when the desk has done something, with whom the message was about.
-        moved: Called before the desk decides anything, so that it can be told who is where.
-        attentive: Whether one decision can make the next possible.
-
-    Attributes:
-        takers: Who hears what is sent to an id.
-        sent: How many messages the desk took.
-        refused: Answers other than OK, by text.
-    """
-
-    def __init__(
-        self,
-        desk: Dva,
-        clock: Clock,
-        changed: Callable[[object], None],
-        moved: Callable[[], None],
-        attentive: bool,
-    ) -> None:
-        self.desk, self._clock = desk, clock
-        self._changed, self._moved = changed, moved
-        self.takers: dict[str, Taker] = {}
-        self.sent = 0
-        self.refused: Counter[str] = Counter()
-        self._waiting: deque[tuple[str, m.Body, object]] = deque()
-        self._numbers: dict[str, int] = {}
-        self._due = self._again = math.inf
-        self._attentive = attentive
-
-    def say(self, source: str, body: m.Body, about: object = None) -> None:
-        """Put a message to the desk into the box; `carry` brings it."""
-        self._waiting.append((source, body, about))
-
-    def publish(self, source: str, body: m.Body) -> None:
-        """Tell the desk something that nobody answers."""
-        self.desk.note(self._message(source, body), self._clock.now)
-
-    def carry(self) -> None:
-        """Bring everything that was said, and what was said in answer, until all is quiet."""
-        waiting, desk, now = self._waiting, self.desk, self._clock.now
-        while waiting:
-            source, body, about = waiting.popleft()
-            self._moved()
-            reply, sends = desk.handle(self._message(source, body), now)
-            self.sent += 1
-            if reply.code != m.OK:
-                self.refused[f"{type(body).__name__}: {m.CODE_NAMES[reply.code]}"] += 1
-            self._changed(about)
-            if sends:
-                self._deliver(sends)
-        self._look_again()
-
-    def tick(self) -> None:
-        """Let the desk look at what time has brought."""
-        self._moved()
-        sends = self.desk.tick(self._clock.now)
-        self._changed(None)
-        self._deliver(sends)
-        self.carry()
-
-    def _message(self, source: str, body: m.Body) -> m.Message:
-        number = self._numbers[source] = self._numbers.get(source, 0) + 1
-        return m.Message(DVA, number, source, NOON, 0, body)
-
-    def _deliver(self, sends: list[Send]) -> None:
-        """Hand over what the desk wants delivered, and tell it how that went."""
-        queue = deque(sends)
-        now = self._clock.now
-        if self._attentive and sends:
-            self._again = now + TICK
-        while queue:
-            send = queue.popleft()
-            taker = self.takers.get(send.to)
-            taken = taker is not None and taker.take(send.body)
-            answer = self.desk.delivered if taken else self.desk.undelivered
-            queue.extend(answer(send, now))
-        self._changed(None)
-
-    def _look_again(self) -> None:
-        """Be there at the next deadline."""
-        due = min(self.desk.next_deadline(), self._again)
-        if due < self._due:
-            self._due = max(due, self._clock.now + LEAST)
-            self._clock.call_at(self._due, self._on_due, self._due)
-
-    def _on_due(self, due: float) -> None:
-        if due != self._due:
-            return  # an earlier one was found meanwhile, and looks for the next
-        self._due = math.inf
-        now = self._clock.now + LEAST
-        if self.desk.next_deadline() <= now or self._again <= now:
-            self._again = math.inf
-            self.tick()
-        else:
-            self._look_again()
 
 
 class Team(ShiftWorld, Protocol):

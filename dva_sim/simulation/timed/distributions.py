@@ -1,25 +1,16 @@
-"""Laws of chance for times: each is drawn from, and knows its first two moments exactly.
-
-Luck with an index: draw number `k` is the same whoever asks for it, and when.
-
-Policies are compared on the same events. What befalls an event must therefore hang on its
-place in its stream, never on how often luck was drawn before. Draws are made in blocks, each
-from a random stream of its own, so that any of them can be made again.
-"""
+"""Laws of chance for times: each is drawn from, and knows its first two moments exactly."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
 from dva_sim.kernel.config import Config
-from dva_sim.kernel.streams import Streams
 
 Floats = NDArray[np.float64]
 Seconds = Annotated[float, Field(ge=0, le=1e12)]
@@ -262,64 +253,3 @@ Law = Annotated[_Any, BeforeValidator(_number_is_constant, json_schema_input_typ
 """A law in a configuration file: a mapping with the key `law`, or a bare number of seconds."""
 
 ZERO = Constant(mean_s=0.0)
-
-
-BLOCK = 256
-KEPT = 8  # blocks; events are asked about roughly in their order
-
-T = TypeVar("T")
-
-
-class Draws(Generic[T]):
-    """Draws number 0, 1, 2, ... for one purpose.
-
-    Args:
-        streams: The run's luck.
-        name: Of the purpose, unique in the run.
-        draw: Makes a number of draws from a generator.
-    """
-
-    def __init__(
-        self,
-        streams: Streams,
-        name: str,
-        draw: Callable[[np.random.Generator, int], list[T]],
-    ) -> None:
-        self._streams, self._name, self._draw = streams, name, draw
-        self._blocks: dict[int, list[T]] = {}
-
-    def __getitem__(self, index: int) -> T:
-        """Draw number `index`."""
-        block = self._blocks.get(index // BLOCK)
-        if block is None:
-            block = self._make(index // BLOCK)
-        return block[index % BLOCK]
-
-    def _make(self, number: int) -> list[T]:
-        if len(self._blocks) >= KEPT:
-            del self._blocks[next(iter(self._blocks))]
-        rng = self._streams.fresh(f"{self._name}/{number}")
-        block = self._blocks[number] = self._draw(rng, BLOCK)
-        return block
-
-
-class Always(Draws[T]):
-    """No luck at all."""
-
-    def __init__(self, value: T) -> None:
-        self._value = value
-
-    def __getitem__(self, index: int) -> T:
-        return self._value
-
-
-def times(streams: Streams, name: str, law: Law) -> Draws[float]:
-    """Times by a law [s]."""
-    if isinstance(law, Constant):
-        return Always(law.mean_s)
-    return Draws(streams, name, lambda rng, count: law.sample(rng, count).tolist())
-
-
-def shares(streams: Streams, name: str) -> Draws[float]:
-    """Numbers between 0 and 1, all alike."""
-    return Draws(streams, name, lambda rng, count: rng.random(count).tolist())

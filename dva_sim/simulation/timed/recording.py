@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.core.events import Event
-from dva_sim.simulation.timed.demand import Incident
+from dva_sim.simulation.timed.incidents import Incident
 from dva_sim.simulation.timed.scenario import TimedScenario
 
 Floats = NDArray[np.float64]

@@ -20,9 +20,11 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.timed import control_room
-from dva_sim.simulation.timed.control_room import Mail
-from dva_sim.simulation.timed.demand import CALLERS, Demand, Incident
-from dva_sim.simulation.timed.distributions import Draws, Law, times
+from dva_sim.simulation.timed.demand import CALLERS, Demand
+from dva_sim.simulation.timed.distributions import Law
+from dva_sim.simulation.timed.draws import Draws, times
+from dva_sim.simulation.timed.incidents import Incident
+from dva_sim.simulation.timed.mail import Mail
 from dva_sim.simulation.timed.recording import (
     CODES,
     STEPS_IN_ORDER,

@@ -7,7 +7,8 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from dva_sim.kernel.streams import Streams
-from dva_sim.simulation.timed.distributions import BLOCK, Law, times
+from dva_sim.simulation.timed.distributions import Law
+from dva_sim.simulation.timed.draws import BLOCK, times
 
 ADAPTER: TypeAdapter[Law] = TypeAdapter(Law)
 

@@ -5,7 +5,7 @@ import pytest
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.timed import build, measures, simulate_timed
-from dva_sim.simulation.timed.measures import response_bounds, share_of_the_way
+from dva_sim.simulation.timed.bounds import response_bounds, share_of_the_way
 
 GUARD = {"name": "guard", "mobilisation": 5, "look": 10, "after": "return"}
 

@@ -9,7 +9,8 @@ from scipy.optimize import linear_sum_assignment
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.timed import TimedRecording, build, simulate_timed
-from dva_sim.simulation.timed.distributions import Law, times
+from dva_sim.simulation.timed.distributions import Law
+from dva_sim.simulation.timed.draws import times
 
 POISSON = {"law": "exponential", "mean_s": 10.0}
 

@@ -1,0 +1,76 @@
+"""Random numbers with an index: draw number `k` is the same for every caller, at any time.
+
+Policies are compared on the same events. What befalls an event must therefore hang on its
+place in its stream, never on how often luck was drawn before. Draws are made in blocks, each
+from a random stream of its own, so that any of them can be made again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.timed.distributions import Constant, Law
+
+BLOCK = 256
+KEPT = 8  # blocks; events are asked about roughly in their order
+
+T = TypeVar("T")
+
+
+class Draws(Generic[T]):
+    """Draws number 0, 1, 2, ... for one purpose.
+
+    Args:
+        streams: The run's luck.
+        name: Of the purpose, unique in the run.
+        draw: Makes a number of draws from a generator.
+    """
+
+    def __init__(
+        self,
+        streams: Streams,
+        name: str,
+        draw: Callable[[np.random.Generator, int], list[T]],
+    ) -> None:
+        self._streams, self._name, self._draw = streams, name, draw
+        self._blocks: dict[int, list[T]] = {}
+
+    def __getitem__(self, index: int) -> T:
+        """Draw number `index`."""
+        block = self._blocks.get(index // BLOCK)
+        if block is None:
+            block = self._make(index // BLOCK)
+        return block[index % BLOCK]
+
+    def _make(self, number: int) -> list[T]:
+        if len(self._blocks) >= KEPT:
+            del self._blocks[next(iter(self._blocks))]
+        rng = self._streams.fresh(f"{self._name}/{number}")
+        block = self._blocks[number] = self._draw(rng, BLOCK)
+        return block
+
+
+class Always(Draws[T]):
+    """No luck at all."""
+
+    def __init__(self, value: T) -> None:
+        self._value = value
+
+    def __getitem__(self, index: int) -> T:
+        return self._value
+
+
+def times(streams: Streams, name: str, law: Law) -> Draws[float]:
+    """Times by a law [s]."""
+    if isinstance(law, Constant):
+        return Always(law.mean_s)
+    return Draws(streams, name, lambda rng, count: law.sample(rng, count).tolist())
+
+
+def shares(streams: Streams, name: str) -> Draws[float]:
+    """Numbers between 0 and 1, all alike."""
+    return Draws(streams, name, lambda rng, count: rng.random(count).tolist())

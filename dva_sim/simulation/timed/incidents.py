@@ -1,0 +1,66 @@
+"""Something that happens in the world, whatever the DVA knows of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from dva_sim.core.events import Event
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.timed.travel import Place
+from dva_sim.worlds.hazards import Hazard, make_hazard
+
+
+@dataclass(slots=True, eq=False)
+class Incident:
+    """One event of the world, with all the luck that is its own.
+
+    Attributes:
+        stream: Number of its stream.
+        index: Its place in the stream.
+        number: Its place among all incidents of the run.
+        kind: `fire`, `gas_leak` or `flood`.
+        place: Where.
+        true: Whether there is something at all.
+        severity: As reported, 0 to 1.
+        confidence: As reported, 0 to 1.
+        occurred: When it broke out [s].
+        noticed: When it was first reported [s]; nan before.
+        sources: Devices that have reported it.
+        event: The DVA's event about it, once it is reported.
+        shared: Whether the DVA knew the event already from another incident.
+        over: When there was no danger any more, or others took over [s].
+    """
+
+    stream: int
+    index: int
+    number: int
+    kind: str
+    place: Place
+    true: bool
+    severity: float
+    confidence: float
+    occurred: float
+    noticed: float = math.nan
+    sources: list[str] = field(default_factory=list)
+    event: Event | None = None
+    shared: bool = False
+    over: float = math.inf
+    _hazard: Hazard | None = None
+
+    def __post_init__(self) -> None:
+        self.place.about = self
+
+    def danger_radius(self, now: float) -> float:
+        """Within which people should not be [m]; 0 where there is nothing, or no more."""
+        if not self.true or now >= self.over:
+            return 0.0
+        if self._hazard is None:
+            self._hazard = make_hazard(self.kind, self.place.point, self.occurred)
+        return self._hazard.danger_radius(now)
+
+    def report(self, finding: str) -> m.EventReport:
+        """What somebody says who was not sent."""
+        return m.EventReport(
+            None, self.kind, self.place.position, self.severity, self.confidence, finding
+        )
