@@ -26,10 +26,9 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.notebook import Episode as Episode
     from dva_sim.experiments.report.notebook import Results as Results
     from dva_sim.experiments.results.results import Results as ResultsData
-    from dva_sim.experiments.study.cell_grid import DesignCell
     from dva_sim.experiments.study.loading import Settings
+    from dva_sim.experiments.study.plan import StudyPlan
     from dva_sim.experiments.study.registration import Preregistration
-    from dva_sim.experiments.study.study import Study
     from dva_sim.experiments.study.tuning import TunedValues
 
     Folder = ResultsData | str | Path
@@ -184,10 +183,10 @@ def run(
 
     del asked["progress"], asked["report"]
     request = RunRequest(**asked)
-    opened, cells = _rehearsed(request)
-    figures = load_figures(opened.figures, opened.folder)
-    request.run(opened, cells, progress)
-    problems = request.record(opened)
+    plan = _rehearsed(request)
+    figures = load_figures(plan.study.figures, plan.study.folder)
+    request.run(plan, progress)
+    problems = request.record(plan)
     results = load(request.folder)
     if report:
         write_report(request.folder, figures=figures)
@@ -217,16 +216,17 @@ def dry_run(
     from dva_sim.experiments.execution.scheduling import run_job  # late: start-up
 
     request = RunRequest(**asked)
-    return request.plan(*_rehearsed(request), run_job)
+    return request.dry_run(_rehearsed(request), run_job)
 
 
-def _rehearsed(request: RunRequest) -> tuple[Study, list[DesignCell]]:
-    """A study without mistakes, and its configurations."""
+def _rehearsed(request: RunRequest) -> StudyPlan:
+    """The plan of a study without mistakes."""
     from dva_sim.experiments.execution.dry_run import rehearse_all  # late: start-up
     from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
 
-    asked = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
-    return asked, rehearse_all(asked)
+    return rehearse_all(
+        open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
+    )
 
 
 def new(name: str | Path) -> Path:

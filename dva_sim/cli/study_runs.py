@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,9 +19,9 @@ from dva_sim.experiments.execution.dry_run import DryRun, contradictions_in, dry
 from dva_sim.experiments.execution.runner import RunRequest
 from dva_sim.experiments.execution.scheduling import Simulate, run_job
 from dva_sim.experiments.results.results import Results
-from dva_sim.experiments.study.cell_grid import DesignCell
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
 from dva_sim.experiments.study.file_kinds import open_study
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
@@ -39,13 +39,13 @@ def run(request: RunRequest) -> ExitCode:
     from dva_sim.experiments.report.report import write_report  # late: start-up
 
     try:
-        study, cells = _loaded(request)
-        figures = load_figures(study.figures, study.folder)  # before hours of simulation
-        before, folder = _planned(request, study, cells), request.folder
+        plan = _loaded(request)
+        figures = load_figures(plan.study.figures, plan.study.folder)  # before hours of simulation
+        before, folder = _planned(request, plan), request.folder
         with _shown("running", before.runs) as show:
-            request.run(study, cells, show)
+            request.run(plan, show)
         results = Results.load(folder)
-        failures = _told_failures(results) + _recorded(request, study)
+        failures = _told_failures(results) + _recorded(request, plan)
         with console.status("Writing the report ..."):
             report = write_report(folder, figures=figures)
             distrusted = results.distrusted
@@ -87,41 +87,36 @@ def tune(study: str, out: str | None, jobs: int | None) -> ExitCode:
 
 def plan(request: RunRequest) -> None:
     """Say what `run` would do."""
-
-    study, cells = _loaded(request)
-    say(escape(_time(_planned(request, study, cells, run_job))))
+    say(escape(_time(_planned(request, _loaded(request), run_job))))
 
 
-def _loaded(request: RunRequest) -> tuple[Study, list[DesignCell]]:
-    """A study without mistakes, and its configurations."""
+def _loaded(request: RunRequest) -> StudyPlan:
+    """The plan of a study without mistakes."""
     study = open_study(request.study, request.changes, version=request.version, pilot=request.pilot)
     say(f"[bold]{escape(study.question)}[/bold]")
-    cells = _checked(study)
-    tell_cells(study, cells)
-    return study, cells
+    plan = _checked(study)
+    tell_cells(study, plan.cells)
+    return plan
 
 
-def _checked(study: Study) -> list[DesignCell]:
+def _checked(study: Study) -> StudyPlan:
     """Find mistakes before the first run; where that takes a while, it is told."""
-
     count = size(study) * len(study.parts) + cells_of_repeats(study)
     if count < _MANY:
-        cells = rehearse_all(study)
+        plan = rehearse_all(study)
     else:
         say("Checking every configuration before the first run ...")
         with _shown("checking", count, "configurations") as show:
-            cells = rehearse_all(study, show)
-    warn([*study.lost, *contradictions_in(cells)])
-    return cells
+            plan = rehearse_all(study, show)
+    warn([*study.lost, *contradictions_in(plan.cells)])
+    return plan
 
 
-def _planned(
-    request: RunRequest, study: Study, cells: Sequence[DesignCell], probe: Simulate | None = None
-) -> DryRun:
+def _planned(request: RunRequest, plan: StudyPlan, probe: Simulate | None = None) -> DryRun:
     """Say what will run."""
-    if (most := runs_of(study)) > _MANY_RUNS:
+    if (most := runs_of(plan.study)) > _MANY_RUNS:
         say(f"Making the list of up to {most:,} runs ...")
-    found = request.plan(study, cells, probe)
+    found = request.dry_run(plan, probe)
     if found.remark:
         say(f"[yellow]{escape(found.remark)}[/yellow]")
     say(escape(_plan(found, request.folder)))
@@ -166,14 +161,14 @@ def _told_failures(results: Results) -> int:
     return len(failures)
 
 
-def _recorded(request: RunRequest, study: Study) -> int:
+def _recorded(request: RunRequest, plan: StudyPlan) -> int:
     """Make the recordings that the study asks for; how many could not be made."""
-    if study.record is None:
+    if plan.study.record is None:
         return 0
     if request.scheduler is not None:
         say("Recordings are made on this machine, from the same seeds")
     with _shown("recording", 0) as show:
-        problems = request.record(study, show)
+        problems = request.record(plan, show)
     for problem in problems if is_verbose() else problems[:_FEW]:
         say(f"[red]not recorded:[/red] {escape(problem)}")
     if problems:

@@ -15,7 +15,7 @@ from dva_sim.console.world import ConsoleWorld
 from dva_sim.experiments.execution.kept_run import KeptRun, complete, is_left
 from dva_sim.experiments.results.folder_lock import LOCK, FolderLock
 from dva_sim.experiments.results.manifest import manifest_of
-from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
@@ -58,8 +58,8 @@ class KeptResults:
         asked = {"persons": 1, "replications": 1, "seed": seed, "parts": {PART: part}}
         question = f"What did people do who drove in {scenario!r} at a console?"
         self._out, self._study = out, Study.model_validate({"question": question} | asked)
-        self._cells = cell_grid.cells(self._study)
-        (self._job,) = cell_grid.jobs(self._study, self._cells)
+        self._plan = StudyPlan.of(self._study)
+        (self._job,) = self._plan.jobs
         assert isinstance(self._job.scenario, Scenario)
         self.scenario, self.seed = self._job.scenario, self._job.seed
         self._persons: dict[str, int] = {}  # numbers by device, as they began to drive
@@ -96,7 +96,7 @@ class KeptResults:
         Raises:
             DvaSimError: the folder cannot be written.
         """
-        manifest = manifest_of(self._study, self._cells, [self._job])
+        manifest = manifest_of(self._plan)
         manifest |= {"runs": 1, "stopped": None, "failures": []}
         self._kept = KeptRun(self._out, manifest, self.scenario, self.seed)
         self._world, self._journal = world, RunJournal(world.run, self._label_of)

@@ -20,6 +20,7 @@ from dva_sim.experiments.execution.kept_recordings import (
 from dva_sim.experiments.execution.runner import run_study
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.loading import load_study
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.reading import read_recording
 
@@ -63,7 +64,7 @@ def names(study, values):
         position_of(job): {study.answer.measure: value}
         for job, value in zip(cell_grid.jobs(study), values, strict=True)
     }
-    return [name_of(job) for job in chosen(study, rows)]
+    return [name_of(job) for job in chosen(StudyPlan.of(study), rows)]
 
 
 NAN = math.nan
@@ -90,7 +91,7 @@ def test_all_are_all_that_were_run(tmp_path):
     study = study_in(tmp_path, "all")
     assert len(names(study, TIMES)) == 12
     run = {position_of(job): {} for job in cell_grid.jobs(study)[:5]}
-    assert [name_of(job) for job in chosen(study, run)][-1] == "drive-0-0-0.mcap"
+    assert [name_of(job) for job in chosen(StudyPlan.of(study), run)][-1] == "drive-0-0-0.mcap"
 
 
 # --- making them -----------------------------------------------------------------------------
@@ -174,7 +175,7 @@ def test_a_run_that_is_not_what_the_study_has_is_not_kept(kept, monkeypatch):
     before = recordings(out)
     path = out / "recordings" / next(iter(before))
     path.unlink()
-    monkeypatch.setattr(cell_grid, "jobs", lambda study: shorter)
+    monkeypatch.setattr(cell_grid, "jobs", lambda *_: shorter)
     (problem,) = record_study(study, out, jobs=1)
     assert problem.startswith(f"DvaSimError: {path.name}: ")
     assert not path.exists()
@@ -191,16 +192,16 @@ def test_a_study_without_the_key_records_nothing(tmp_path):
 
 def test_what_cannot_be_recorded_is_told_with_its_place(tmp_path):
     (tmp_path / "timed.yaml").write_text(
-        STUDY.format(record="all", measure="response_s")
+        STUDY.format(record="all", measure="response_mean_s")
         .replace("one.yaml", "patrol-shift")
         .replace("    reference: {operator.strategy: oracle}\n", "")
-        .replace("pattern: [req-rep, latest-wins]", "dispatch.policy: [nearest, hazard_team]")
+        .replace("pattern: [req-rep, latest-wins]", "dispatch.policy: [nearest_idle, hazard_team]")
         .replace("factor: pattern", "factor: dispatch.policy")
-        .replace("[req-rep, latest-wins]", "[nearest, hazard_team]")
+        .replace("[req-rep, latest-wins]", "[nearest_idle, hazard_team]")
     )
     timed = load_study(tmp_path / "timed.yaml")
     with pytest.raises(ConfigError, match=r"timed\.yaml:5:1: record: all"):
-        refuse_what_cannot_be_recorded(timed)
+        refuse_what_cannot_be_recorded(StudyPlan.of(timed))
 
 
 def test_a_full_disk_costs_recordings_and_not_the_study(emptied):

@@ -11,6 +11,7 @@ from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.cell_grid import basis_of_tuning, refuse_unknown_measures
 from dva_sim.experiments.study.hashing import fingerprint
+from dva_sim.experiments.study.inputs import StudyInputs
 from dva_sim.experiments.study.parts import Tuning
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import (
@@ -51,7 +52,8 @@ def tune(
         RunsFailed: some did, so that values would be judged by different persons.
     """
     rule, trials = rule_of(study), tuning_study(study)
-    refuse_unknown_measures(study)
+    inputs = StudyInputs(study)
+    refuse_unknown_measures(inputs)
     run_study(trials, out, jobs=jobs, episode=episode, progress=progress, limit_s=limit_s)
     results = Results.load(out)
     if results.failures:
@@ -68,7 +70,7 @@ def tune(
     return TunedValues(
         study=study.file.stem,
         made_with=f"{__version__} {fingerprint()}",
-        basis=basis_of_tuning(study),
+        basis=basis_of_tuning(inputs),
         tuning=rule,
         chosen=tuple(_choice(seen, when) for when in whens),
         seen=tuple(seen),

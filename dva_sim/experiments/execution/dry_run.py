@@ -19,9 +19,9 @@ from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.results.results import JOURNAL
 from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import rounds
 from dva_sim.experiments.study.study import Study
-from dva_sim.experiments.study.tuning import load_tuned
 from dva_sim.kernel.errors import RunTooLong
 from dva_sim.simulation.models import model_for
 
@@ -69,31 +69,29 @@ class _Tried(NamedTuple):
 
 
 def dry_run(
-    study: Study,
+    asked: Study | StudyPlan,
     out: str | Path,
     *,
     jobs: int | None = None,
     probe: Simulate | None = None,
-    cells: Sequence[DesignCell] | None = None,
 ) -> DryRun:
     """What `run_study` would do, without doing it.
 
     Args:
-        study: From `load_study`.
+        asked: From `load_study`, or its plan if that has been made.
         out: Results folder.
         jobs: Processes; by default one for each core.
         probe: Makes the tables of one run. With it, a few runs are tried for the estimate if none
             is done yet.
-        cells: The study's configurations, if they have been made already.
 
     Raises:
         ConfigError: the study is not valid, or the folder holds another one.
     """
-    cells = cell_grid.cells(study) if cells is None else cells
-    todo = list({job.key: job for job in cell_grid.jobs(study, cells)}.values())
+    plan = StudyPlan.of(asked)
+    todo = list({job.key: job for job in plan.jobs}.values())
     costs: dict[RunKey, float] = {}
     if (Path(out) / JOURNAL).exists():
-        identity = manifest_of(study, cells, todo)["hash"]
+        identity = manifest_of(plan)["hash"]
         with Checkpoint(Path(out), identity, must_exist=True) as checkpoint:
             costs = checkpoint.costs()
     left = [job for job in todo if job.key not in costs]
@@ -104,12 +102,12 @@ def dry_run(
     return DryRun(
         runs=len(todo),
         done=len(todo) - len(left),
-        cells=len(cells),
-        rounds=len(rounds(study, todo)),
+        cells=len(plan.cells),
+        rounds=len(rounds(plan.study, todo)),
         workers=workers,
         estimate_s=None if estimate is None else estimate / min(workers, len(left) or 1),
         tried=len(tried.costs),
-        remark=_remark(study),
+        remark="" if plan.tuned is None or plan.basis is None else plan.tuned.remark(plan.basis),
         is_least=tried.is_least,
         failed=tried.failed,
     )
@@ -163,12 +161,6 @@ def _spread(count: int) -> list[int]:
     return [i * step % count for i in range(count)]
 
 
-def _remark(study: Study) -> str:
-    if not cell_grid.is_tuned(study):
-        return ""
-    return load_tuned(study).remark(cell_grid.basis_of_tuning(study))
-
-
 def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
     """What does not go together in some configurations, each kind told once, as a sentence.
 
@@ -185,7 +177,7 @@ def contradictions_in(cells: Sequence[DesignCell]) -> list[str]:
 
 def rehearse_all(
     study: Study, progress: Callable[[int, int], object] = lambda *_: None
-) -> list[DesignCell]:
+) -> StudyPlan:
     """Build one run of every configuration, so that a mistake is found before the first run.
 
     Args:
@@ -193,15 +185,14 @@ def rehearse_all(
         progress: Called with the number of configurations that were built, and of all.
 
     Returns:
-        The configurations, of which there may be so many that making them again takes time.
+        The study's plan, to be run.
 
     Raises:
         ConfigError: what cannot be read, placed or recorded.
     """
-    refuse_what_cannot_be_recorded(study)
-    cells = cell_grid.cells(study)
-    every = cell_grid.to_rehearse(study, cells)
-    for done, cell in enumerate(every, 1):
+    plan = StudyPlan.of(study)
+    refuse_what_cannot_be_recorded(plan)
+    for done, cell in enumerate(plan.rehearsed, 1):
         cell_grid.rehearse(study, cell)
-        progress(done, len(every))
-    return cells
+        progress(done, len(plan.rehearsed))
+    return plan

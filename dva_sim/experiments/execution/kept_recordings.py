@@ -20,10 +20,9 @@ from dva_sim.experiments.execution import executors, scheduling
 from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.results.tables import DESIGN_COLUMNS
-from dva_sim.experiments.study import cell_grid
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.hashing import stable_hash
-from dva_sim.experiments.study.own_measures import own_measures
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.simulation.full import simulate
@@ -40,16 +39,16 @@ Row = Mapping[str, Any]
 RunPosition = tuple[str, int, int, int]  # part, cell, person, trial
 
 
-def refuse_what_cannot_be_recorded(study: Study) -> None:
+def refuse_what_cannot_be_recorded(plan: StudyPlan) -> None:
     """Better told before anything is run.
 
     Raises:
         ConfigError: no part has runs that can be recorded, or the worst is asked for where no
             answer says by which measure.
     """
+    study, scenarios = plan.study, plan.scenarios.values()
     if study.record is None:
         return
-    scenarios = [cell_grid.base_scenario(study, part) for part in study.parts]
     if not any(model_for(scenario).is_recorded for scenario in scenarios):
         models = ", ".join(sorted({scenario.model for scenario in scenarios}))
         problem = f"record: {study.record} needs runs of the full model; this study's are {models}"
@@ -59,7 +58,7 @@ def refuse_what_cannot_be_recorded(study: Study) -> None:
 
 
 def record_study(
-    study: Study,
+    asked: Study | StudyPlan,
     out: Path,
     *,
     jobs: int | None = None,
@@ -69,7 +68,7 @@ def record_study(
     """Make the recordings that a study asks for and its results folder does not hold yet.
 
     Args:
-        study: With all its runs in the folder.
+        asked: A study, or its plan, with all its runs in the folder.
         out: Its results folder.
         jobs: Processes; by default one for each core.
         progress: Called with the number of recordings there are and of all.
@@ -85,19 +84,22 @@ def record_study(
         DvaSimError: the folder cannot be written.
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
-    refuse_what_cannot_be_recorded(study)
-    if study.record is None:
+    plan = StudyPlan.of(asked)
+    refuse_what_cannot_be_recorded(plan)
+    if plan.study.record is None:
         return []
     with FolderLock(out):
-        return _record(study, out, jobs, progress or (lambda *_: None), limit_s)
+        return _record(plan, out, jobs, progress or (lambda *_: None), limit_s)
 
 
-def _record(study: Study, out: Path, jobs: int | None, tell: Progress, limit_s: float) -> list[str]:
+def _record(
+    plan: StudyPlan, out: Path, jobs: int | None, tell: Progress, limit_s: float
+) -> list[str]:
     rows = rows_of(Results.load(out))
-    wanted = {name_of(job): job for job in chosen(study, rows)}
+    wanted = {name_of(job): job for job in chosen(plan, rows)}
     folder = _tidied(out / FOLDER, wanted)
     rest = [job for name, job in wanted.items() if not (folder / name).exists()]
-    own = {measure.about.name for measure in own_measures(study).values()}
+    own = {measure.about.name for measure in plan.measures.values()}
     prints = {name_of(job): _fingerprint(job, rows[position_of(job)], own) for job in rest}
     done, total = len(wanted) - len(rest), len(wanted)
     tell(done, total)
@@ -116,16 +118,17 @@ def _record(study: Study, out: Path, jobs: int | None, tell: Progress, limit_s: 
     return sorted(problems)
 
 
-def chosen(study: Study, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
+def chosen(plan: StudyPlan, rows: Mapping[RunPosition, Row]) -> list[StudyJob]:
     """The runs to record, in the order of the design.
 
     Args:
-        study: Asks for all, for the worst of each cell, or for a sample of each cell.
+        plan: Of a study that asks for all, for the worst of each cell, or for a sample of each.
         rows: The runs that were carried out and did not fail.
     """
+    study = plan.study
     every = [
         job
-        for job in cell_grid.jobs(study)
+        for job in plan.jobs
         if position_of(job) in rows and not job.is_repeat and model_for(job.scenario).is_recorded
     ]
     if study.record == "all":

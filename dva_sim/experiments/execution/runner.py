@@ -25,10 +25,9 @@ from dva_sim.experiments.results.folder_lock import FolderLock
 from dva_sim.experiments.results.manifest import failures, machine, manifest_of, write_json
 from dva_sim.experiments.results.results import JOURNAL, MACHINE, MANIFEST, TABLES, digests
 from dva_sim.experiments.results.tables import design_row, write_tables
-from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.cell_grid import DesignCell, StudyJob
+from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.experiments.study.loading import Settings, pairs_of
-from dva_sim.experiments.study.own_measures import own_measures
+from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import is_enough, rounds
 from dva_sim.experiments.study.study import Study, Version
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -37,7 +36,7 @@ Progress = Callable[[int, int], object]
 
 
 def run_study(
-    study: Study,
+    asked: Study | StudyPlan,
     out: str | Path,
     *,
     jobs: int | None = None,
@@ -45,7 +44,6 @@ def run_study(
     episode: Simulate | None = None,
     progress: Progress | None = None,
     limit_s: float = scheduling.LIMIT_S,
-    cells: Sequence[DesignCell] | None = None,
 ) -> Path:
     """Run what the results folder does not hold yet, then write its tables and manifest.
 
@@ -54,14 +52,13 @@ def run_study(
     the manifest (`Results.failures`) and tried again the next time.
 
     Args:
-        study: From `load_study`.
+        asked: From `load_study`, or its plan if that has been made.
         out: Results folder, made if need be.
         jobs: Processes of this machine; by default one for each core.
         scheduler: Address of a dask.distributed cluster to use instead.
         episode: Makes the tables of one run; by default a simulation.
         progress: Called with the number of runs done and of all runs, as they finish.
         limit_s: A run that takes longer, by the wall clock, has failed.
-        cells: The study's configurations, if they have been made already.
 
     Returns:
         The results folder.
@@ -74,19 +71,18 @@ def run_study(
         KeyboardInterrupt: after tidying up; its message says what has been done.
     """
     out, started, clock = Path(out), datetime.now(UTC), time.perf_counter()
-    cells = cell_grid.cells(study) if cells is None else cells
-    todo = cell_grid.jobs(study, cells)
-    manifest = manifest_of(study, cells, todo)
+    plan = StudyPlan.of(asked)
+    manifest = manifest_of(plan)
     with ExitStack() as stack:
         workers = stack.enter_context(_workers(jobs, scheduler))
         stack.enter_context(FolderLock(out))
         checkpoint = stack.enter_context(_opened(out, manifest["hash"]))
         checkpoint.describe(manifest)
-        own = tuple(own_measures(study))
+        own = tuple(plan.measures)
         simulate = episode or (partial(run_job, measures=own) if own else run_job)
-        session = _Session(todo, checkpoint, workers, simulate, progress, limit_s)
+        session = _Session(plan.jobs, checkpoint, workers, simulate, progress, limit_s)
         with session.told():
-            carried_out, stopped = _run_rounds(study, todo, session)
+            carried_out, stopped = _run_rounds(plan.study, plan.jobs, session)
             with checkpoint.alone():
                 _tidy(out)
                 manifest["runs"] = len({job.key for job in carried_out})
@@ -289,29 +285,24 @@ class RunRequest:
         marks = [Path(self.study).stem, self.version, None if self.pilot is None else "pilot"]
         return Path(self.out or Path("results") / "-".join(filter(None, marks)))
 
-    def plan(
-        self, study: Study, cells: Sequence[DesignCell], probe: Simulate | None = None
-    ) -> dry_run.DryRun:
+    def dry_run(self, plan: StudyPlan, probe: Simulate | None = None) -> dry_run.DryRun:
         """What `run` would do; see `dry_run`."""
         jobs = self.jobs if self.scheduler is None else 1  # who knows how many are free there
-        return dry_run.dry_run(study, self.folder, jobs=jobs, probe=probe, cells=cells)
+        return dry_run.dry_run(plan, self.folder, jobs=jobs, probe=probe)
 
-    def run(
-        self, study: Study, cells: Sequence[DesignCell], progress: Progress | None = None
-    ) -> None:
+    def run(self, plan: StudyPlan, progress: Progress | None = None) -> None:
         """Run what the folder does not hold yet; see `run_study`."""
         run_study(
-            study,
+            plan,
             self.folder,
             jobs=self.jobs,
             scheduler=self.scheduler,
             progress=progress,
             limit_s=self.limit_s,
-            cells=cells,
         )
 
-    def record(self, study: Study, progress: Progress | None = None) -> list[str]:
+    def record(self, plan: StudyPlan, progress: Progress | None = None) -> list[str]:
         """Make the recordings that the study asks for; see `record_study`."""
         return kept_recordings.record_study(
-            study, self.folder, jobs=self.jobs, progress=progress, limit_s=self.limit_s
+            plan, self.folder, jobs=self.jobs, progress=progress, limit_s=self.limit_s
         )

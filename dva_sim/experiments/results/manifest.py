@@ -15,9 +15,7 @@ from typing import Any
 
 from dva_sim import __version__
 from dva_sim.experiments.results.tables import design_row
-from dva_sim.experiments.study import cell_grid
-from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob, StudyRun
-from dva_sim.experiments.study.factor_levels import parameter_sets
+from dva_sim.experiments.study.cell_grid import RunKey, StudyRun
 from dva_sim.experiments.study.hashing import (
     fingerprint,
     fingerprint_of_judges,
@@ -25,42 +23,39 @@ from dva_sim.experiments.study.hashing import (
     program_state,
     stable_hash,
 )
-from dva_sim.experiments.study.own_measures import columns_told, own_measures
-from dva_sim.experiments.study.study import Status, Study
-from dva_sim.experiments.study.tuning import load_tuned
+from dva_sim.experiments.study.own_measures import columns_told
+from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.study import Status
 from dva_sim.kernel.errors import DvaSimError, RunTooLong
 from dva_sim.kernel.whole_files import write_whole
 
 _PACKAGES = ("duckdb", "lxml", "numpy", "pymunk", "scipy", "shapely", "simpy")
 
 
-def manifest_of(
-    study: Study, cells: Sequence[DesignCell], todo: Sequence[StudyJob]
-) -> dict[str, Any]:
+def manifest_of(plan: StudyPlan) -> dict[str, Any]:
     """What was asked and run: nothing in it depends on when, where or how fast.
 
     Its `hash` is the identity of the results: a folder holds one study, of one program.
     """
-    tuned = cell_grid.is_tuned(study)
+    study, cells = plan.study, plan.cells
     content: dict[str, Any] = {
         "question": study.question,
         "study": study.asked(),
         "status": study.status.model_dump(mode="json"),
         "scenarios": {
-            part: cell_grid.base_scenario(study, part).model_dump(mode="json")
-            for part in study.parts
+            part: scenario.model_dump(mode="json") for part, scenario in plan.scenarios.items()
         },
         "set": list(study.settings),
         "changes": dict(study.changes),
-        "inputs": inputs((cell.scenario for cell in cells), own_measures(study)),
+        "inputs": inputs((cell.scenario for cell in cells), plan.measures),
         "cells": [
             {"part": c.part, "cell": c.index, "config": c.config, "levels": dict(c.levels)}
             for c in cells
         ],
-        "parameter_sets": parameter_sets(study),
-        "tuned": load_tuned(study).model_dump(mode="json") if tuned else None,
-        "basis": cell_grid.basis_of_tuning(study).model_dump(mode="json") if tuned else None,
-        "runs": len({job.key for job in todo}),
+        "parameter_sets": list(plan.parameter_sets),
+        "tuned": None if plan.tuned is None else plan.tuned.model_dump(mode="json"),
+        "basis": None if plan.basis is None else plan.basis.model_dump(mode="json"),
+        "runs": len({job.key for job in plan.jobs}),
         "seeds": {
             "study": study.seed,
             "population": study.seed,
@@ -69,7 +64,7 @@ def manifest_of(
         },
         "versions": _simulating(),
     }
-    if columns := columns_told(study, (cell.scenario for cell in cells)):
+    if columns := columns_told(plan.measures.values(), (cell.scenario for cell in cells)):
         content["columns"] = columns
     identity = stable_hash(content)
     content["versions"] = versions()

@@ -1,81 +1,36 @@
-"""Where in a study a mistake of one of its scenarios was made: by `--set`, or in a file.
-
-From a study to its runs: the cells of its design, with luck shared between them.
-"""
+"""From a study to its runs: the cells of its design, which share their random numbers."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from dva_sim.experiments.study.change_places import located
 from dva_sim.experiments.study.factor_levels import (
     PARAMETERS,
     TRAITS,
     factors_of_repeats,
     levels_at_ends,
     levels_of_cells,
-    parameter_sets,
-    path_in_design,
     settings_of_repeats,
 )
 from dva_sim.experiments.study.hashing import stable_hash
-from dva_sim.experiments.study.own_measures import names_of_own
+from dva_sim.experiments.study.inputs import StudyInputs
 from dva_sim.experiments.study.parts import POINT, REPEATS, TUNED, TUNING, Level, multiplied
 from dva_sim.experiments.study.study import Study
-from dva_sim.experiments.study.tuning import TuningBasis, load_tuned
+from dva_sim.experiments.study.tuning import TuningBasis
 from dva_sim.kernel.config_overrides import blame
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.kernel.suggestions import listed, unknown
-from dva_sim.kernel.yaml_files import Document, KeyPath
+from dva_sim.kernel.yaml_files import KeyPath
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.models import AnyScenario, model_for, model_of
 from dva_sim.simulation.run_measures import COVARIATES
-
-
-def located(study: Study, part: str, error: ConfigError, changes: Mapping[str, Any]) -> ConfigError:
-    """The mistake at what makes it; as it is if a file has been named.
-
-    Args:
-        study: Whose scenario it is.
-        part: Which one.
-        error: With the keys at fault, if changes of the scenario are.
-        changes: All changes of the scenario.
-    """
-    if error.file is not None:
-        return error
-    told = error.problem
-    named = [k for k, v in changes.items() if k in told or (isinstance(v, str) and repr(v) in told)]
-    keys = error.keys if len(error.keys) == 1 else (named or list(error.keys))
-    for key in keys:
-        if pair := study.setting_of(tuple(key.split("."))):
-            return ConfigError(f"--set {pair}: {error.problem.removeprefix(f'{key}: ')}")
-    for key in keys:
-        for path in _places(study, part, key, changes[key]):
-            if study.is_from_file(path):
-                return study.error(error.problem, path)
-    # What the study's file does not say is in the settings, if there are any.
-    pairs = ", ".join(f"--set {pair}" for pair in study.settings)
-    return ConfigError(f"{pairs}: {error.problem}") if keys and pairs else error
-
-
-def _places(study: Study, part: str, key: str, value: Any) -> Iterator[KeyPath]:
-    """Where the study might give a key of its scenarios that value."""
-    yield "factors", key
-    yield "parts", part, "reference", key
-    yield "parts", part, "changes", key
-    for factor, levels in study.treatments.items():
-        for level in levels:
-            yield "treatments", factor, level, key
-    if study.version is not None:
-        yield study.version, key
-    if (in_design := path_in_design(study, key, value)) is not None:
-        yield in_design
-
 
 REFERENCE = -1
 
@@ -152,31 +107,37 @@ class StudyJob(StudyRun):
     scenario: AnyScenario
 
 
-def cells(study: Study) -> list[DesignCell]:
+def cells(study: Study, inputs: StudyInputs | None = None) -> list[DesignCell]:
     """All configurations, by part, the reference first, then those of the design in order.
 
     The repeats of the answer come last, as if they were a part of their own.
+
+    Args:
+        study: What is asked.
+        inputs: What its files say, if they have been read already.
 
     Raises:
         ConfigError: a scenario that cannot be read, or is not valid with some change, or a
             measure that its runs do not have.
     """
-    refuse_unknown_measures(study)
-    _at_ends(study)
-    own = [cell for name in study.parts for cell in _cells_of(study, name)]
-    _refuse_impossible_measures(study, own)
-    return [*own, *_repeats_of(study)]
+    inputs = inputs or StudyInputs(study)
+    refuse_unknown_measures(inputs)
+    _at_ends(inputs)
+    own = [cell for name in study.parts for cell in _cells_of(inputs, name)]
+    _refuse_impossible_measures(inputs, own)
+    return [*own, *_repeats_of(inputs)]
 
 
-def refuse_unknown_measures(study: Study) -> None:
+def refuse_unknown_measures(inputs: StudyInputs) -> None:
     """What is asked for must be a column of the runs; better told before they are made.
 
     Raises:
         ConfigError: it is none.
     """
+    study = inputs.study
     for path, part, measure in _asked_measures(study):
-        source = _source(study, part)
-        own = names_of_own(study, str(source.data.get("model", "full")))
+        source = inputs.scenarios[part]
+        own = inputs.measures_of(str(source.data.get("model", "full")))
         known = [*model_of(source).measures(), *own]
         if measure in COVARIATES and measure not in known:
             problem = f"{measure!r} is measured where the key 'measures' names it"
@@ -185,11 +146,12 @@ def refuse_unknown_measures(study: Study) -> None:
             raise study.error(unknown("measure", measure, known), path)
 
 
-def _refuse_impossible_measures(study: Study, every: Sequence[DesignCell]) -> None:
+def _refuse_impossible_measures(inputs: StudyInputs, every: Sequence[DesignCell]) -> None:
     """What no run of a part can hold would only be missed when all of them are made."""
+    study = inputs.study
     for path, part, measure in _asked_measures(study):
         made = [c.scenario for c in every if c.part == part and c.index != REFERENCE]
-        own = names_of_own(study, made[0].model) if made else []
+        own = inputs.measures_of(made[0].model) if made else []
         possible = [[*model_for(scenario).measures(scenario), *own] for scenario in made]
         if not any(measure in names for names in possible):
             problem = f"no run of part {part!r} has a value of the measure {measure!r}"
@@ -211,23 +173,16 @@ def _asked_measures(study: Study) -> Iterator[tuple[KeyPath, str, str]]:
         yield ("stop", "measure"), study.stop.part, study.stop.measure
 
 
-def base_scenario(study: Study, part: str) -> AnyScenario:
+def base_scenario(inputs: StudyInputs, part: str) -> AnyScenario:
     """A part's scenario before any factor has changed it."""
-    source = _source(study, part)
-    return _build(study, part, source, _every_change(study, part, source, {}))
+    return _build(inputs, part, _every_change(inputs, part, {}))
 
 
-def basis_of_tuning(study: Study) -> TuningBasis:
+def basis_of_tuning(inputs: StudyInputs) -> TuningBasis:
     """The persons and phones that tuned values should rest on."""
-    assert study.tuning is not None
-    scenario = base_scenario(study, study.tuning.part).model_dump(mode="json")
+    assert inputs.study.tuning is not None
+    scenario = base_scenario(inputs, inputs.study.tuning.part).model_dump(mode="json")
     return TuningBasis.of(scenario.get("operator", {}).get("population", "operators"))
-
-
-def is_tuned(study: Study) -> bool:
-    """Whether some cells have tuned values."""
-    listed = (row.get(TUNING) for row in study.listed_rows)
-    return TUNED in (*study.factors.get(TUNING, ()), *listed)
 
 
 def jobs(study: Study, grid: Sequence[DesignCell] | None = None) -> list[StudyJob]:
@@ -262,109 +217,97 @@ def runs_in(manifest: Mapping[str, Any]) -> list[StudyRun]:
     ]
 
 
-def to_rehearse(study: Study, every: Iterable[DesignCell]) -> list[DesignCell]:
+def to_rehearse(
+    study: Study, every: Iterable[DesignCell], inputs: StudyInputs | None = None
+) -> list[DesignCell]:
     """The cells in which a mistake would show: instead of points in ranges, the ranges' ends."""
-    ends = _at_ends(study)
+    ends = _at_ends(inputs or StudyInputs(study))
     return [*ends, *(cell for cell in every if not (ends and cell.levels))]
 
 
-def _at_ends(study: Study) -> list[DesignCell]:
+def _at_ends(inputs: StudyInputs) -> list[DesignCell]:
     """Cells at both ends of every range, whichever points are drawn; none without ranges.
 
     Raises:
         ConfigError: a range has an end that is not valid.
     """
-    rows = list(levels_at_ends(study))
-    return [cell for name in study.parts if rows for cell in _cells_at(study, name, rows)]
+    rows = list(levels_at_ends(inputs.study))
+    return [cell for name in inputs.study.parts if rows for cell in _cells_at(inputs, name, rows)]
 
 
-def _cells_of(study: Study, name: str) -> Iterator[DesignCell]:
-    reference = study.parts[name].reference
+def _cells_of(inputs: StudyInputs, name: str) -> Iterator[DesignCell]:
+    reference = inputs.study.parts[name].reference
     if reference is not None:
-        yield _cell(study, name, REFERENCE, {}, _source(study, name), reference)
-    yield from _cells_at(study, name, levels_of_cells(study))
+        yield _cell(inputs, name, REFERENCE, {}, reference)
+    yield from _cells_at(inputs, name, levels_of_cells(inputs.study))
 
 
-def _cells_at(study: Study, name: str, rows: Iterable[Mapping[str, Level]]) -> Iterator[DesignCell]:
-    source, change = _source(study, name), _changer(study)
+def _cells_at(
+    inputs: StudyInputs, name: str, rows: Iterable[Mapping[str, Level]]
+) -> Iterator[DesignCell]:
     for index, levels in enumerate(rows):
-        yield _cell(study, name, index, levels, source, change(levels))
+        yield _cell(inputs, name, index, levels, _changes(inputs, levels))
 
 
-def _repeats_of(study: Study) -> Iterator[DesignCell]:
+def _repeats_of(inputs: StudyInputs) -> Iterator[DesignCell]:
     """The answer's contrast under every strategy and every set of parameters."""
+    study = inputs.study
     factors = factors_of_repeats(study)
     if not factors or study.answer is None:
         return
-    part, fixed, sets = study.answer.part, settings_of_repeats(study), parameter_sets(study)
-    source, change = _source(study, part), _changer(study)
+    fixed = settings_of_repeats(study)
     for index, values in enumerate(itertools.product(*factors.values())):
         levels = dict(zip(factors, values, strict=True))
-        traits = sets[int(str(levels[PARAMETERS]))]
+        traits = inputs.parameter_sets[int(str(levels[PARAMETERS]))]
         chosen = {factor: level for factor, level in levels.items() if factor != PARAMETERS}
-        changes = change(fixed | chosen) | ({TRAITS: traits} if traits else {})
-        yield _cell(study, REPEATS, index, levels, source, changes)
+        changes = _changes(inputs, fixed | chosen) | ({TRAITS: traits} if traits else {})
+        yield _cell(inputs, REPEATS, index, levels, changes)
 
 
-def _changer(study: Study) -> Callable[[Mapping[str, Level]], dict[str, Any]]:
+def _changes(inputs: StudyInputs, levels: Mapping[str, Level]) -> dict[str, Any]:
     """What the levels of a cell change in the scenario."""
-    tuned = load_tuned(study) if is_tuned(study) else None
-
-    def change(levels: Mapping[str, Level]) -> dict[str, Any]:
-        changes: dict[str, Any] = {}
-        for factor, level in levels.items():
-            if factor in study.treatments:
-                changes |= study.treatments[factor][str(level)]
-            elif factor == TUNING:
-                if level == TUNED and tuned is not None:
-                    changes[tuned.tuning.key] = tuned.value_for(levels)
-            elif factor != POINT:
-                changes[factor] = level
-        return changes
-
-    return change
+    changes: dict[str, Any] = {}
+    for factor, level in levels.items():
+        if factor in inputs.study.treatments:
+            changes |= inputs.study.treatments[factor][str(level)]
+        elif factor == TUNING:
+            if level == TUNED and inputs.tuned is not None:
+                changes[inputs.tuned.tuning.key] = inputs.tuned.value_for(levels)
+        elif factor != POINT:
+            changes[factor] = level
+    return changes
 
 
 def _cell(
-    study: Study,
+    inputs: StudyInputs,
     part: str,
     index: int,
     levels: Mapping[str, Level],
-    source: Document,
     changes: Mapping[str, Any],
 ) -> DesignCell:
-    every = _every_change(study, part, source, changes)
-    scenario = _build(study, part, source, every)
+    every = _every_change(inputs, part, changes)
+    scenario = _build(inputs, part, every)
     config = stable_hash(scenario.model_dump(mode="json"))
     return DesignCell(part, index, tuple(levels.items()), scenario, config, every)
 
 
-def _source(study: Study, part: str) -> Document:
-    path = ("parts", part, "scenario")
-    try:
-        return scenarios.load(study.parts[part].scenario, base=study.folder)
-    except ConfigError as error:
-        if error.file is not None:
-            raise
-        raise study.error(error.problem, path) from None
-
-
-def _every_change(
-    study: Study, part: str, source: Document, changes: Mapping[str, Any]
-) -> dict[str, Any]:
+def _every_change(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> dict[str, Any]:
     """What is otherwise than in a scenario's file: by the part, by `--set`, and by the cell."""
-    fixed = {**study.parts[_source_of(study, part)].changes, **study.changes}
-    of_study = model_of(source).set_by_study(study.seed)
+    study, part = inputs.study, _source_of(inputs.study, part)
+    fixed = {**study.parts[part].changes, **study.changes}
+    of_study = model_of(inputs.scenarios[part]).set_by_study(study.seed)
     return _located({**fixed, **of_study, **changes}, study.folder)
 
 
-def _build(study: Study, part: str, source: Document, changes: Mapping[str, Any]) -> AnyScenario:
+def _build(inputs: StudyInputs, part: str, changes: Mapping[str, Any]) -> AnyScenario:
     """The part's scenario; a mistake in a change is told where the study makes it."""
+    part = _source_of(inputs.study, part)
+    source = inputs.scenarios[part]
     try:
         built: AnyScenario = model_of(source).build(source, changes)
         return built
     except ConfigError as error:
-        raise located(study, _source_of(study, part), error, changes) from None
+        raise located(inputs.study, part, error, changes) from None
 
 
 def rehearse(study: Study, cell: DesignCell) -> None:
@@ -378,7 +321,7 @@ def rehearse(study: Study, cell: DesignCell) -> None:
         model.rehearse(cell.scenario, study.seed)
     except ConfigError as error:
         part = _source_of(study, cell.part)
-        source = _source(study, part)
+        source = StudyInputs(study).scenarios[part]
 
         def make(changes: Mapping[str, Any]) -> None:
             model.rehearse(model.build(source, changes), study.seed)

@@ -10,7 +10,7 @@ from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
 from dva_sim.simulation.models import MODELS, AnyScenario, measured_names, model_for
-from dva_sim.simulation.run_measures import PLUGINS, RunMeasure, load_measure, reads, refuse_twins
+from dva_sim.simulation.run_measures import PLUGINS, RunMeasure, load_measure, refuse_twins
 
 
 def own_measures(study: Study) -> dict[str, RunMeasure]:
@@ -32,23 +32,23 @@ def own_measures(study: Study) -> dict[str, RunMeasure]:
     return found
 
 
-def names_of_own(study: Study, model: str) -> list[str]:
-    """Names of its own measures that can be taken of the runs of a model."""
-    every = own_measures(study).values()
-    return [measure.about.name for measure in every if reads(measure, model)]
-
-
-def columns_told(study: Study, scenarios: Iterable[AnyScenario]) -> dict[str, Any]:
+def columns_told(
+    measures: Iterable[RunMeasure], scenarios: Iterable[AnyScenario]
+) -> dict[str, Any]:
     """What a results folder keeps of columns that are none of ours, by table and name.
 
     It is read without the files that the columns come from.
+
+    Args:
+        measures: Those of the study itself.
+        scenarios: What is run.
     """
     told: dict[str, list[Measure]] = {}
     named = {scenario.model: scenario for scenario in scenarios if scenario.model not in MODELS}
     for scenario in named.values():
         for table, columns in model_for(scenario).columns.items():
             told.setdefault(table, []).extend(columns)
-    own = [measure.about for measure in own_measures(study).values()]
+    own = [measure.about for measure in measures]
     if own:
         told.setdefault("runs", []).extend(own)
     return {table: {c.name: c.as_json() for c in columns} for table, columns in told.items()}

@@ -21,6 +21,7 @@ from dva_sim.experiments.study.hashing import (
     inputs,
     stable_hash,
 )
+from dva_sim.experiments.study.inputs import StudyInputs
 from dva_sim.experiments.study.parts import POINT
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel.config import Config, validate
@@ -140,7 +141,8 @@ def _write(path: Path, text: str, replaces: bool) -> None:
 def plan_of(study: Study) -> dict[str, Any]:
     """All that fixes a confirmatory run, but for its seed, as JSON would hold it."""
     nobody = study.model_copy(update={"seed": _ANY_SEED})
-    cells = cell_grid.cells(nobody)
+    files_read = StudyInputs(nobody)
+    cells = cell_grid.cells(nobody, files_read)
     files = {
         name: f"{Path(name).name} {content}"
         for name, content in inputs(cell.scenario for cell in cells).items()
@@ -151,7 +153,7 @@ def plan_of(study: Study) -> dict[str, Any]:
         asked["design"]["rows"] = stable_hash(study.listed_rows)
     resolved = {
         "scenarios": {
-            part: _hash_of(cell_grid.base_scenario(nobody, part), files) for part in study.parts
+            part: _hash_of(cell_grid.base_scenario(files_read, part), files) for part in study.parts
         },
         "cells": stable_hash([_hash_of(cell.scenario, files) for cell in cells]),
         "inputs": sorted(files.values()),

@@ -1,0 +1,61 @@
+"""The files that a study names: each is read when it is first needed, and once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from dva_sim.experiments.study.factor_levels import Traits, parameter_sets
+from dva_sim.experiments.study.own_measures import own_measures
+from dva_sim.experiments.study.parts import TUNED, TUNING
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.tuning import TunedValues, load_tuned
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import Document
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.run_measures import RunMeasure, reads
+
+
+@dataclass(frozen=True, eq=False)
+class StudyInputs:
+    """What the files of a study say.
+
+    Each property raises a `ConfigError` if its file cannot be read or is not valid.
+    """
+
+    study: Study
+
+    @cached_property
+    def scenarios(self) -> Mapping[str, Document]:
+        """The scenario of each part, as its file says."""
+        return {part: self._scenario(part) for part in self.study.parts}
+
+    def _scenario(self, part: str) -> Document:
+        try:
+            return scenarios.load(self.study.parts[part].scenario, base=self.study.folder)
+        except ConfigError as error:
+            if error.file is not None:
+                raise
+            raise self.study.error(error.problem, ("parts", part, "scenario")) from None
+
+    @cached_property
+    def tuned(self) -> TunedValues | None:
+        """The tuned values; None if no cell has any."""
+        listed = (row.get(TUNING) for row in self.study.listed_rows)
+        is_tuned = TUNED in (*self.study.factors.get(TUNING, ()), *listed)
+        return load_tuned(self.study) if is_tuned else None
+
+    @cached_property
+    def parameter_sets(self) -> list[Traits]:
+        """The traits of each set of parameters of the persons, drawn within their bands."""
+        return parameter_sets(self.study)
+
+    @cached_property
+    def measures(self) -> Mapping[str, RunMeasure]:
+        """The measures that the study brings itself, by names that hold in any process."""
+        return own_measures(self.study)
+
+    def measures_of(self, model: str) -> list[str]:
+        """Names of its own measures that can be taken of the runs of a model."""
+        return [each.about.name for each in self.measures.values() if reads(each, model)]

@@ -1,0 +1,68 @@
+"""A study resolved: all that its files say, its cells and its runs, made once and passed on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from dva_sim.experiments.study import cell_grid
+from dva_sim.experiments.study.cell_grid import DesignCell, StudyJob
+from dva_sim.experiments.study.factor_levels import Traits
+from dva_sim.experiments.study.inputs import StudyInputs
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
+from dva_sim.simulation.models import AnyScenario
+from dva_sim.simulation.run_measures import RunMeasure
+
+
+@dataclass(frozen=True, eq=False)
+class StudyPlan:
+    """What running a study means, before anything is run.
+
+    Attributes:
+        study: As it was loaded; with the seed of its registration, if it is run as registered.
+        scenarios: The scenario of each part before any factor has changed it.
+        cells: Its configurations, in order.
+        rehearsed: The configurations in which a mistake would show: of ranges, their ends.
+        parameter_sets: The traits of each set of parameters of the persons.
+        tuned: The tuned values; None if no cell has any.
+        basis: The persons and phones as they are now, if there are tuned values.
+        measures: The measures that the study brings itself, by names that hold in any process.
+    """
+
+    study: Study
+    scenarios: Mapping[str, AnyScenario]
+    cells: Sequence[DesignCell]
+    rehearsed: Sequence[DesignCell]
+    parameter_sets: Sequence[Traits]
+    tuned: TunedValues | None
+    basis: TuningBasis | None
+    measures: Mapping[str, RunMeasure]
+
+    @classmethod
+    def of(cls, asked: Study | StudyPlan) -> StudyPlan:
+        """The plan of a study; a plan is its own.
+
+        Raises:
+            ConfigError: a file that cannot be read, or a cell that is not valid.
+        """
+        if isinstance(asked, StudyPlan):
+            return asked
+        inputs = StudyInputs(asked)
+        cells = cell_grid.cells(asked, inputs)
+        return cls(
+            study=asked,
+            scenarios={part: cell_grid.base_scenario(inputs, part) for part in asked.parts},
+            cells=cells,
+            rehearsed=cell_grid.to_rehearse(asked, cells, inputs),
+            parameter_sets=inputs.parameter_sets,
+            tuned=inputs.tuned,
+            basis=None if inputs.tuned is None else cell_grid.basis_of_tuning(inputs),
+            measures=inputs.measures,
+        )
+
+    @cached_property
+    def jobs(self) -> list[StudyJob]:
+        """All runs in a fixed order: part, cell, person, trial; the repeats last."""
+        return cell_grid.jobs(self.study, self.cells)
