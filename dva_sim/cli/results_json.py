@@ -10,7 +10,8 @@ from typing import Any
 
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.compare import Comparison, GateVerdict
-from dva_sim.experiments.analysis.compare_rows import Difference, Levels
+from dva_sim.experiments.analysis.compare_rows import Difference
+from dva_sim.experiments.analysis.matched_cells import Levels
 from dva_sim.experiments.analysis.run_grid import RunGrid
 from dva_sim.experiments.analysis.study_view import interval_of, layout_of
 from dva_sim.experiments.report.summary import Reading

@@ -15,8 +15,8 @@ from dva_sim.experiments.analysis.kept_episodes import Tables, typical_and_worst
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.palette import HAZARD, look_of
-from dva_sim.experiments.report.figures.site_map import TypicalRun, WorstRun, kind_of
 from dva_sim.experiments.report.figures.style import styled
+from dva_sim.experiments.report.figures.time_lapse import TypicalRun, WorstRun, kind_of
 from dva_sim.recordings.writing import write_recording
 from dva_sim.simulation.full.measures import tables_of
 

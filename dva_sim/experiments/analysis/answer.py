@@ -1,11 +1,7 @@
-"""Where a finding holds, in words: `without delay`, `from 250 ms on`, `on the poor link`.
-
-The answer to a study's question, in sentences that claim no more than the runs support.
-"""
+"""A declared contrast as it was measured, and the answer that a reader takes home of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from textwrap import wrap
 
@@ -14,88 +10,8 @@ from numpy.typing import NDArray
 
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.units import unit_of
-from dva_sim.kernel.wording import capital, listing, number, percent, quantity
-from dva_sim.simulation.labels import (
-    absent_at_zero,
-    factor_name,
-    level_name,
-    measure_called,
-    measure_name,
-    named,
-    setting,
-)
-
-
-def place_of(finding: Finding, stop: int) -> str:
-    """Where one stop of a finding lies: `with profile default, at a one-way delay of 1 s`."""
-    return f"{condition(finding, inside=True)}{at(finding, [stop])}".removesuffix(", ")
-
-
-def condition(f: Finding, inside: bool = False) -> str:
-    """`With profile default, `: the levels of the other factors; nothing without any."""
-    if not f.within:
-        return ""
-    return f"{'with' if inside else 'With'} {setting(f.within)}, "
-
-
-def at(f: Finding, where: Sequence[int]) -> str:
-    """`at a one-way delay of 1 s`, or where a contrast holds that runs over nothing."""
-    if not f.over:
-        return f.everywhere
-    if spoken := _spoken(f, where):
-        return spoken
-    names = listing([level_name(f.over, f.levels[i]) for i in where])
-    name = factor_name(f.over)
-    vowel = name[0] in "aeiou" and not name.startswith("one")
-    article = "" if len(where) > 1 else "an " if vowel else "a "
-    return f"at {article}{name} {_of(f)}{names}"
-
-
-def places(f: Finding, where: NDArray[np.intp]) -> str:
-    """`from 250 ms on`, `up to 100 ms`, `at every delay`, or the levels one by one."""
-    if not f.over:
-        return f.everywhere
-    names = [level_name(f.over, f.levels[int(i)]) for i in where]
-    solid = len(where) > 1 and bool((np.diff(where) == 1).all()) and is_ordered(f)
-    if len(where) == len(f.levels) > 1:
-        return f"at every {factor_name(f.over)} tried"
-    if solid and where[-1] == len(f.levels) - 1:
-        return f"from {names[0]} on"
-    if solid and where[0] == 0:
-        return f"up to {names[-1]}"
-    return _spoken(f, where) or f"at {listing(names)}"
-
-
-def _spoken(f: Finding, where: Iterable[int]) -> str:
-    """`without delay`, `on the poor link`, `with filter none`: where a bare level is no English."""
-    levels = [f.levels[int(i)] for i in where]
-    if levels == [0] and (absent := absent_at_zero(f.over)):
-        return f"without {absent}"
-    if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
-        return ""
-    names = listing([level_name(f.over, level) for level in levels])
-    if all(str(level).isdigit() for level in levels):
-        return f"with {names} {factor_name(f.over)}"
-    if f.over == "link":
-        return f"on the {names} link{'s' if len(levels) > 1 else ''}"
-    if len(levels) == 1:
-        return f"with {named(f.over, levels[0])}"
-    return f"with {factor_name(f.over)} {names}"
-
-
-def _of(f: Finding) -> str:
-    return "of " if unit_of(f.over) or is_ordered(f) else ""
-
-
-def is_ordered(f: Finding) -> bool:
-    """Whether the levels are quantities that ascend."""
-    values = [v for v in f.levels if isinstance(v, int | float)]
-    return len(values) == len(f.levels) and values == sorted(values)
-
 
 Floats = NDArray[np.float64]
-
-_LEAST = 0.01  # that is not printed as zero
 
 
 @dataclass(frozen=True)
@@ -172,14 +88,23 @@ class Finding:
         return np.asarray((self.low > 0) | (self.high < 0))
 
     @property
+    def holds_zero(self) -> NDArray[np.bool_]:
+        """Where the band holds zero `(k,)`."""
+        return np.asarray((self.low <= 0) & (self.high >= 0))
+
+    @property
+    def bounds(self) -> Floats:
+        """The largest effect, either way, that is not ruled out `(k,)`."""
+        return np.asarray(np.maximum(-self.low, self.high))
+
+    @property
     def is_open(self) -> NDArray[np.bool_]:
         """Where the band holds zero and differences that matter, too `(k,)`.
 
         Those that matter were declared to; else they are as large as the measure usually is.
         """
         least = np.inf if self.usual is None else np.where(self.usual > 0, self.usual, np.inf)
-        holds_zero = (self.low <= 0) & (self.high >= 0)
-        return np.asarray(holds_zero & (_bounds(self) > (self.smallest_effect or least)))
+        return np.asarray(self.holds_zero & (self.bounds > (self.smallest_effect or least)))
 
     @property
     def has_too_few(self) -> bool:
@@ -211,203 +136,3 @@ class Answer:
         lines = wrap(self.lead, 100)
         more = f"notes: {len(self.notes)}" if self.notes else ""
         return "\n".join([*lines, more] if more else lines)
-
-
-def answer(finding: Finding) -> Answer:
-    """Say how large the difference is, where it differs from zero, and what is ruled out."""
-    measured = {"Measured": " ".join([_what_is_measured(finding), *_misses(finding)])}
-    if not np.isfinite(finding.low).any():
-        return Answer(_without_band(finding), measured)
-    return Answer(f"{_effect(finding)} {_reach(finding)}".strip(), measured)
-
-
-def _effect(f: Finding) -> str:
-    """`A takes 4.5 s longer than B at 1 s (95 % band 3.0 to 6.0 s).`, or that there is none."""
-    where = np.flatnonzero(f.low > 0) if (f.low > 0).any() else np.flatnonzero(f.high < 0)
-    if len(where):
-        return capital(f"{condition(f)}{_size(f, _telling_level(f, where))}.")
-    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
-    if f.has_too_few:
-        place = f", {condition(f, inside=True)}".removesuffix(", ")
-        few = f"{too_few(f.persons, f.cluster)} whether {first} and {second} differ"
-        return capital(f"{few}{place} (95 % {_interval_name(f)}).")
-    anywhere = f" at any {factor_name(f.over)} tried" if f.over else ""
-    return capital(
-        f"{condition(f)}no difference between {first} and {second} was found{anywhere} "
-        f"(95 % {_interval_name(f)})."
-    )
-
-
-def _size(f: Finding, stop: int) -> str:
-    """`A takes 4.5 s longer than B at a one-way delay of 1 s (95 % band 3.0 to 6.0 s)`.
-
-    Of `4.5 s less` the band is told as `3.0 to 6.0 s`, too.
-    """
-    side = -1 if f.mean[stop] < 0 else 1
-    low, high = sorted((side * float(f.low[stop]), side * float(f.high[stop])))
-    ends = f"{number(low)} to {quantity(high, f.unit)}"
-    comparison = f"{_comparison(f, f.mean[stop])}{_after(at(f, [stop]))}"
-    return f"{comparison} (95 % {_interval_name(f)} {ends})"
-
-
-def _interval_name(f: Finding) -> str:
-    """A band covers several levels at once."""
-    return "band" if len(f.levels) > 1 else "interval"
-
-
-def _reach(f: Finding) -> str:
-    """One sentence: where it differs from zero, and what holds elsewhere."""
-    told = [*_differs(f), *_equal(f), *_settled(f), *_undecided(f), *_unpaired(f)]
-    return capital("; ".join(told)) + "." if told else ""
-
-
-def _differs(f: Finding) -> list[str]:
-    """Where, in the direction told first and in the other one."""
-    found = [np.flatnonzero(chosen) for chosen in (f.low > 0, f.high < 0) if chosen.any()]
-    if not found:
-        return []
-    where = found[0]
-    there = "only there" if len(where) == 1 < len(f.levels) else places(f, where)
-    told = [f"it differs from zero{_after(there)}{_remark_on_size(f, where)}"]
-    if len(found) > 1:
-        stop = _telling_level(f, found[1])
-        told.append(f"it is the other way round {places(f, found[1])}: {_size(f, stop)}")
-    return told
-
-
-def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
-    """Real is not yet relevant: say so where the whole band is below what matters."""
-    bound = float(np.maximum(abs(f.low[where]), abs(f.high[where])).max())
-    if f.smallest_effect is None or bound >= f.smallest_effect:
-        return ""
-    return f", but stays below the {_declared(f)} declared to matter"
-
-
-def _holds_zero(f: Finding) -> NDArray[np.bool_]:
-    return np.asarray((f.low <= 0) & (f.high >= 0))
-
-
-def _bounds(f: Finding) -> Floats:
-    """The largest effect, either way, that is not ruled out."""
-    return np.asarray(np.maximum(-f.low, f.high))
-
-
-def _equal(f: Finding) -> list[str]:
-    where = np.flatnonzero(_holds_zero(f) & (_bounds(f) == 0))
-    return [f"{_there(f, where)}both are equal"] if len(where) else []
-
-
-def _settled(f: Finding) -> list[str]:
-    """Where an effect of some size is ruled out."""
-    bounds = _bounds(f)
-    where = np.flatnonzero(_holds_zero(f) & (bounds > 0) & ~f.is_open)
-    if not len(where):
-        return []
-    bound = quantity(max(float(bounds[where].max()), _LEAST), f.unit)
-    matters = f", less than the {_declared(f)} declared to matter" if f.smallest_effect else ""
-    return [f"{_there(f, where)}any effect is below {bound}{matters}"]
-
-
-def _undecided(f: Finding) -> list[str]:
-    """Nothing is ruled out: say how large an effect may be, unless as large as it ever can."""
-    bounds = _bounds(f)
-    where = np.flatnonzero(f.is_open)
-    if not len(where):
-        return []
-    bound, still = float(bounds[where].max()), f"{_there(f, where)}the question stays open"
-    if bound >= f.widest:
-        return [f"{still}: {f.persons} {f.cluster}s rule out nothing at all, more are needed"]
-    more = f"so more {f.cluster}s are needed"
-    return [f"{still}: up to {quantity(bound, f.unit)} is not ruled out, {more}"]
-
-
-def _there(f: Finding, where: NDArray[np.intp]) -> str:
-    """`up to 100 ms `, or nothing where there is but one place."""
-    there = places(f, where)
-    return f"{there} " if there else ""
-
-
-def _declared(f: Finding) -> str:
-    return level_name(f.measure, f.smallest_effect)
-
-
-def _unpaired(f: Finding) -> list[str]:
-    missing = np.flatnonzero(~np.isfinite(f.low))
-    return [f"{_there(f, missing)}runs are missing"] if len(missing) else []
-
-
-def _without_band(f: Finding) -> str:
-    """Without a band: the plain mean of these runs, and no claim beyond them."""
-    there = np.flatnonzero(np.isfinite(f.mean))
-    if not len(there):
-        return "No pair of runs is complete, so the question stays open."
-    stop = int(there[-1])
-    if f.persons < 2:
-        why = f"Too few {f.cluster}s to answer: an interval needs at least two, here is one."
-    else:
-        why = f"The difference is the same for every {f.cluster}, so that no interval can be given."
-    place = _after(at(f, [stop]))
-    seen = f"{condition(f, inside=True)}{_comparison(f, f.mean[stop])}{place}"
-    return f"{why} In the runs that were made, {seen}."
-
-
-def _misses(f: Finding) -> list[str]:
-    """Misses are a result of their own: the mean alone would hide them behind the horizon."""
-    if not f.missed:
-        return []
-    part = f"in part {f.part} " if f.part else ""
-    every = capital(f"{part}the first event of every run{' that did not fail' if f.failed else ''}")
-    where = _after(at(f, [len(f.levels) - 1]))
-    if f.all_confirmed:
-        return [f"{every} was confirmed."]
-    if not any(m.missed for m in f.missed):
-        return [f"{every} was confirmed{where}, under each {factor_name(f.factor)}."]
-    shares = [
-        f"{level_name(f.factor, m.line)} {percent(m.share)} ({m.missed} of {m.runs})"
-        for m in f.missed
-    ]
-    unseen = capital(f"{part}not confirmed{where}: {listing(shares)}.")
-    return [unseen, _what_misses_count(f)]
-
-
-def _after(where: str) -> str:
-    """A place behind other words; nothing where there is none."""
-    return f" {where}" if where else ""
-
-
-def _what_misses_count(f: Finding) -> str:
-    if measure_called(f.measure).awaits != "confirmation":
-        return "Such a run counts with what was measured until it ended."
-    horizon = f" ({quantity(f.horizon, 's')})" if f.horizon is not None else ""
-    return f"Such a run counts with all the time it was given{horizon}."
-
-
-def _what_is_measured(f: Finding) -> str:
-    part = f"in part {f.part}, " if f.part else ""
-    excess = f", beyond that of the {f.cluster}'s own reference run" if f.in_excess else ""
-    return capital(f"{part}the {measure_name(f.measure)}{excess}.")
-
-
-def _comparison(f: Finding, difference: float) -> str:
-    first, second = level_name(f.factor, f.first), level_name(f.factor, f.second)
-    if difference == 0:
-        return f"{first} equals {second}"
-    size = quantity(abs(difference), f.unit)
-    if measure_called(f.measure).awaits:
-        return f"{first} takes {size} {'longer' if difference > 0 else 'less'} than {second}"
-    side = "above" if difference > 0 else "below"
-    return f"{first} lies {size} {side} {second}"
-
-
-def _telling_level(f: Finding, where: NDArray[np.intp]) -> int:
-    """The last level of a quantity, for that is the question; else the largest difference."""
-    return int(where[-1] if is_ordered(f) else where[np.argmax(abs(f.mean[where]))])
-
-
-def telling_stop(finding: Finding) -> int | None:
-    """The stop of which the answer speaks first; the last with a band where nothing is told."""
-    for chosen in (finding.low > 0, finding.high < 0):
-        if len(where := np.flatnonzero(chosen)):
-            return _telling_level(finding, where)
-    there = np.flatnonzero(np.isfinite(finding.low))
-    return int(there[-1]) if len(there) else None

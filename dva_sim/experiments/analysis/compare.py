@@ -17,18 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.compare_rows import (
-    Difference,
-    Levels,
-    Matched,
-    Pair,
-    Rows,
-    Run,
-    as_numbers,
-    difference,
-    match,
-)
+from dva_sim.experiments.analysis.compare_rows import Difference, Rows, Run, as_numbers, difference
 from dva_sim.experiments.analysis.fail_conditions import SIGNS, TESTS, Gate, Test, parse, percent_of
+from dva_sim.experiments.analysis.matched_cells import Levels, Matched, Pair, match
 from dva_sim.experiments.results.results import Array, Frame, Results
 from dva_sim.experiments.study.parts import DESIGN
 from dva_sim.kernel.errors import ConfigError

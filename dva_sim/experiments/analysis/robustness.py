@@ -15,80 +15,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dva_sim.agents.operator.published import ranges, supports_of
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, Table, nan_mean
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
 from dva_sim.experiments.analysis.study_view import StudyView, interval_of
+from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.study.factor_levels import PARAMETERS
 from dva_sim.experiments.study.parts import REPEATS, STRATEGY, Level
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name
-
-LOOP = "loop_delay_mean_s"
-PERSONAL = ("delay_human_s", "delay_hand_s")
-
-Marks = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Support:
-    """The delays of a part's cells, and which of them no published data cover.
-
-    Attributes:
-        delays: Of the loop without the person, for each cell `(levels of factor 1, ...)` [s]; nan
-            where nobody drives.
-        outside: Which of them lie outside.
-        words: What is covered, for each strategy.
-    """
-
-    delays: Floats
-    outside: Marks
-    words: str
-
-
-def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | None:
-    """What published data cover of a part; None where nobody's loop has a delay.
-
-    Args:
-        part: The runs.
-        scenario: The part's before any factor changed it, for the strategy.
-    """
-    strategies = _strategies(part, scenario)
-    if not part.has(LOOP) or not strategies:
-        return None
-    runs = part.grid(LOOP)
-    for column in PERSONAL:
-        runs = runs - np.nan_to_num(part.grid(column))
-    delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
-    outside = np.isfinite(delays)
-    for name in strategies:
-        for low, high in ranges(name):
-            outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
-    return Support(delays, outside, "; ".join(map(_coverage, strategies)))
-
-
-def _strategies(part: RunGrid, scenario: Mapping[str, Any]) -> tuple[str, ...]:
-    levels = {f.name: f.levels for f in part.factors}
-    names = levels.get(STRATEGY, (get(scenario, STRATEGY),))
-    return tuple(str(name) for name in names if name is not None)
-
-
-def _has(part: RunGrid, strategy: str) -> Marks:
-    """Which cells are driven by a strategy."""
-    has = [setting.get(STRATEGY, strategy) == strategy for setting in part.settings()]
-    return np.array(has).reshape([len(f.levels) for f in part.factors])
-
-
-def _coverage(strategy: str) -> str:
-    told = [
-        f"{known.low_s:g} to {known.high_s:g} s, {' '.join(known.why.split())}"
-        for known in supports_of(strategy)
-    ]
-    return f"{strategy}: {', and '.join(told) or 'no published data'}"
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.experiments.analysis.robustness import Support
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, plain_level, present
+from dva_sim.experiments.analysis.support import Support
 from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import number, percent

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from dva_sim.experiments.analysis.answer import Answer, Finding, answer
+from dva_sim.experiments.analysis.answer import Answer, Finding
+from dva_sim.experiments.analysis.answer_sentences import answer
 from dva_sim.experiments.analysis.conditions import conditions
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Table
 from dva_sim.experiments.analysis.study_view import StudyView

@@ -19,7 +19,7 @@ from dva_sim.experiments.analysis.predictions import Judged, judge_all
 from dva_sim.experiments.analysis.robustness import sentences
 from dva_sim.experiments.analysis.study_view import factors_of, keys_of
 from dva_sim.experiments.execution.checkpoint import load_so_far
-from dva_sim.experiments.report.answer_table import answer_table, size_of, spread_table
+from dva_sim.experiments.report.answer_table import answer_table
 from dva_sim.experiments.report.blocks import (
     Block,
     FigureBlock,
@@ -37,18 +37,17 @@ from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.figures.registry import draw_all
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
 from dva_sim.experiments.report.glossary import Marker, terms_in
-from dva_sim.experiments.report.hypothesis_tables import (
-    comparison_table,
-    hypothesis_table,
-    plan_table,
-    registration_table,
-)
+from dva_sim.experiments.report.hypothesis_tables import comparison_table, hypothesis_table
 from dva_sim.experiments.report.method import remarks
 from dva_sim.experiments.report.outcome_table import in_a_line
 from dva_sim.experiments.report.outcome_table import sentences as sentences_of_endings
 from dva_sim.experiments.report.outcome_table import table as endings_table
 from dva_sim.experiments.report.printing import print_page
 from dva_sim.experiments.report.prose import note
+from dva_sim.experiments.report.registration_table import registration_table
+from dva_sim.experiments.report.size_plan_table import plan_table
+from dva_sim.experiments.report.spread_table import spread_table
+from dva_sim.experiments.report.study_size import size_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.report.tuning_table import tuned_table
 from dva_sim.experiments.results.manifest import status_of

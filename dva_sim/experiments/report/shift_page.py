@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dva_sim.experiments.analysis.answer import Answer, Finding, answer
+from dva_sim.experiments.analysis.answer import Answer, Finding
+from dva_sim.experiments.analysis.answer_sentences import answer
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid, Setting, Table
 from dva_sim.experiments.analysis.shift_effects import BEST, POLICY, Shifts, is_dispatch, pooled
 from dva_sim.experiments.analysis.study_view import StudyView

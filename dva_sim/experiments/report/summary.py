@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 
 from dva_sim import statistics
-from dva_sim.experiments.analysis.answer import Answer, Finding, at, places, telling_stop
+from dva_sim.experiments.analysis.answer import Answer, Finding
+from dva_sim.experiments.analysis.answer_sentences import telling_stop
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.conditions import get
 from dva_sim.experiments.analysis.hypothesis_tests import Judgement, judged
 from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
-from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of, support_of_part
+from dva_sim.experiments.analysis.places import at, places
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
 from dva_sim.experiments.analysis.run_grid import (
     Floats,
     RunGrid,
@@ -44,9 +46,11 @@ from dva_sim.experiments.analysis.study_view import (
     view_of,
     with_rows,
 )
+from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
 from dva_sim.experiments.report.event_outcomes import EventOutcomes, outcomes_of
-from dva_sim.experiments.report.hypothesis_tables import few_that_weigh, verdict_sentences
+from dva_sim.experiments.report.heavy_runs import few_that_weigh
+from dva_sim.experiments.report.hypothesis_tables import verdict_sentences
 from dva_sim.experiments.report.model_page import ModelPage
 from dva_sim.experiments.report.model_pages import page_of
 from dva_sim.experiments.report.people_page import PeoplePage, people_drove

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from dva_sim.experiments.report.hypothesis_tables import plan_lines
+from dva_sim.experiments.report.size_plan_table import plan_lines
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.manifest import status_of
 from dva_sim.experiments.results.results import Results, plain

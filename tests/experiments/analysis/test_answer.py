@@ -5,7 +5,8 @@ import pytest
 from helpers.studies.synthetic_results import finding
 from helpers.wording import unnamed
 
-from dva_sim.experiments.analysis.answer import Missed, answer
+from dva_sim.experiments.analysis.answer import Missed
+from dva_sim.experiments.analysis.answer_sentences import answer
 
 
 def lead(found):

@@ -6,7 +6,7 @@ from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.robustness import robustness_of, sentences
 from dva_sim.experiments.analysis.study_view import finding_of, view_of
-from dva_sim.experiments.report.figures.contrast import RepeatsFigure
+from dva_sim.experiments.report.figures.repeats import RepeatsFigure
 from dva_sim.experiments.report.figures.style import styled
 
 EFFECTS = {

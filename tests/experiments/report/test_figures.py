@@ -8,29 +8,24 @@ from helpers.studies.report_text import blank_pictures
 from helpers.wording import unnamed
 from matplotlib.figure import Figure
 
-from dva_sim.experiments.analysis.predictions import Cadence
+from dva_sim.experiments.analysis.cadence import Cadence
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
-from dva_sim.experiments.report.answer_table import spread_table
 from dva_sim.experiments.report.figures.budget import DelayBudget, stages_of
+from dva_sim.experiments.report.figures.commands import CommandAge, CommandRate
 from dva_sim.experiments.report.figures.contrast import AnswerFigure
+from dva_sim.experiments.report.figures.cut_bars import fit_to
 from dva_sim.experiments.report.figures.distribution import Distributions
-from dva_sim.experiments.report.figures.effect import (
-    CommandAge,
-    CommandRate,
-    Differences,
-    Levels,
-    _band,
-    _possible,
-)
-from dva_sim.experiments.report.figures.factorial import FactorialEffects, HeatMap
-from dva_sim.experiments.report.figures.outcomes import Events, StoryOutcomes, StoryTimes, fates
-from dva_sim.experiments.report.figures.palette import ONE, apart, columns_of
+from dva_sim.experiments.report.figures.effect import Differences, Levels, _band, _possible
+from dva_sim.experiments.report.figures.factorial import FactorialEffects
+from dva_sim.experiments.report.figures.heat_map import HeatMap
+from dva_sim.experiments.report.figures.keys import apart, columns_of
+from dva_sim.experiments.report.figures.palette import ONE
 from dva_sim.experiments.report.figures.scatter import trend
 from dva_sim.experiments.report.figures.site_map import DrivenWays
+from dva_sim.experiments.report.figures.story import Events, StoryOutcomes, StoryTimes, fates
 from dva_sim.experiments.report.figures.style import (
     ASIDE,
-    fit_to,
     is_to_scale,
     log_axis,
     panel_grid,
@@ -40,6 +35,7 @@ from dva_sim.experiments.report.figures.style import (
     styled,
 )
 from dva_sim.experiments.report.figures.tradeoff import TradeOff
+from dva_sim.experiments.report.spread_table import spread_table
 from dva_sim.statistics import band
 
 DELAY = Factor("link.delay_s", (0.0, 0.05, 0.1, 0.25, 0.5, 1.0))

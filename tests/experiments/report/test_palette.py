@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 import dva_sim.experiments.report.figures
 from dva_sim.experiments.analysis.competing_risks import WAYS
 from dva_sim.experiments.analysis.run_grid import Factor
-from dva_sim.experiments.report.figures import outcomes, palette
+from dva_sim.experiments.report.figures import palette, story
 from dva_sim.experiments.report.figures import shift as dispatch
 from dva_sim.experiments.report.figures.palette import FATES, LOOKS, STAGES, colours, looks
 from dva_sim.network.patterns import PATTERNS
@@ -99,7 +99,7 @@ def test_text_has_the_contrast_of_small_print(colour):
 
 STACKS = {
     "delay budget": list(STAGES.values()),
-    "events of runs": [FATES[fate] for fate in outcomes._FATES],
+    "events of runs": [FATES[fate] for fate in story._FATES],
     "events of shifts": list(dispatch.FILLS.values()),
     "ways to end": [FATES[way] for way in WAYS],
 }

@@ -6,8 +6,8 @@ from helpers.studies.report_text import words, words_of
 from helpers.wording import unnamed
 
 from dva_sim.experiments.analysis.conditions import conditions
-from dva_sim.experiments.report.answer_table import size_of
 from dva_sim.experiments.report.report import _levels, write_report
+from dva_sim.experiments.report.study_size import size_of
 
 pytestmark = pytest.mark.system
 

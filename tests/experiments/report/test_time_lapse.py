@@ -9,8 +9,8 @@ from helpers.wording import unnamed
 from dva_sim.experiments.analysis.kept_episodes import Tables, typical_and_worst
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
-from dva_sim.experiments.report.figures.site_map import TypicalRun, WorstRun
 from dva_sim.experiments.report.figures.style import styled
+from dva_sim.experiments.report.figures.time_lapse import TypicalRun, WorstRun
 
 LINES = ("pub-sub", "req-rep", "latest-wins")
 TIMES = dict(zip(LINES, (40.0, 72.2, 90.0), strict=True))

@@ -7,10 +7,11 @@ order; what a figure of one's own needs is offered here.
 
 from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
-from dva_sim.experiments.report.figures.palette import Look, legend, looks
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
+from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.palette import Look, looks
 from dva_sim.experiments.report.figures.style import (
     Drawn,
-    Numbers,
     ReportFigure,
     axis_label,
     dodge,
@@ -18,7 +19,6 @@ from dva_sim.experiments.report.figures.style import (
     panel_grid,
     panels,
     stops_axis,
-    with_unit,
 )
 
 __all__ = [

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.run_grid import Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, legend, looks
+from dva_sim.experiments.report.figures.csv_numbers import Numbers
+from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import measure_name
@@ -40,7 +42,7 @@ class Distributions(style.ReportFigure):
             len(shown), 1, 2.7 if len(shown) < 3 else 2.2, sharex=True, sharey=True
         )
         look = looks(view.line)
-        raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), style.Numbers()
+        raw, confirmed, numbers = view.part.grid(view.measure), _confirmed(view), Numbers()
         for (ax,), panel in zip(axes, shown, strict=True):
             for level, offset in style.dodge(view.lines):
                 values = view.curve(raw, panel, level).reshape(len(view.stops), -1)

@@ -1,44 +1,31 @@
-"""What the factor does to the measure: paired differences, and the measure itself.
-
-What becomes of the commands: how old they are, and how many arrive.
-"""
+"""What the factor does to the measure: paired differences, and the measure itself."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.predictions import Cadence, cadence
 from dva_sim.experiments.analysis.run_grid import (
-    Factor,
     Floats,
     Setting,
-    nan_mean,
     person_means,
     present,
 )
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import (
-    FAINT,
-    INK,
-    PAPER,
-    SOFT,
-    Ends,
-    Look,
-    legend,
-    looks,
-    name_lines,
-)
+from dva_sim.experiments.report.figures.cadence_line import boundary, cadences, mark_boundary
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
+from dva_sim.experiments.report.figures.cut_bars import Bars, fit_to, mark_cuts
+from dva_sim.experiments.report.figures.keys import Ends, legend, name_lines
+from dva_sim.experiments.report.figures.palette import FAINT, INK, PAPER, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
-from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
 from dva_sim.statistics import Band, band
 
@@ -51,14 +38,6 @@ if TYPE_CHECKING:
 
 _WIDER = 1.2  # of a logarithmic axis, lest marks lie on its edges
 _STEP = 0.12  # between the bars of two lines, in stops
-
-
-def cadences(view: StudyView, scenario: Mapping[str, Any]) -> list[Cadence | None]:
-    """Of each panel shown; where a delay and a pattern that waits are among the factors."""
-    waits = any(level in PATTERNS and PATTERNS[str(level)].in_step for level in view.lines)
-    if view.over is None or view.over.name != "link.delay_s" or not waits:
-        return [None for _ in view.shown]
-    return [cadence(scenario, panel) for panel in view.shown]
 
 
 class Differences(style.ReportFigure):
@@ -90,7 +69,7 @@ class Differences(style.ReportFigure):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
             mark_boundary(ax, view.over, found, text=True)
         zoomed = view.smallest_effect is not None and _zoom_on_small(axes, view.smallest_effect)
-        style.mark_cuts(bars)
+        mark_cuts(bars)
         _name(view, others, figure, axes, ends)
         title = f"Difference against {name} in {_what(view)}"
         words = caption(
@@ -98,7 +77,7 @@ class Differences(style.ReportFigure):
             baseline=name,
             zoomed=zoomed,
             is_marked=view.smallest_effect is not None,
-            has_boundary=any(_boundary(view.over, found) is not None for found in there),
+            has_boundary=any(boundary(view.over, found) is not None for found in there),
         )
         reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
         return self.finish(figure, words, numbers, title=title, reads=reads)
@@ -127,7 +106,7 @@ class Levels(style.ReportFigure):
         label = style.axis_label(view.measure, style.wrapped(what))
         limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
         figure, axes, ends, bars, cut, numbers = _curves(view, view.lines, curve, label, limits)
-        style.mark_cuts(bars)
+        mark_cuts(bars)
         _name(view, view.lines, figure, axes, ends)
         words = caption("levels", in_excess=_in_excess(view))
         reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
@@ -144,36 +123,6 @@ def _few_words(reading: Reading) -> str:
     return f"{few}: where bars overlap or hold zero, nothing is shown to be equal."
 
 
-def _boundary(over: Factor | None, cadence: Cadence | None) -> float | None:
-    """Where along x the wanted rate becomes too high; None if it is not among the levels.
-
-    Where places are not to scale, between two levels is the middle between them.
-    """
-    place = style.place_of(over, cadence.boundary_s) if over and cadence else None
-    if place is None or over is None or style.is_to_scale(over) or place.is_integer():
-        return place
-    return math.floor(place) + 0.5
-
-
-def mark_boundary(ax: Axes, over: Factor | None, cadence: Cadence | None, text: bool) -> None:
-    """The delay from which request/reply must fall behind the wanted rate."""
-    place = _boundary(over, cadence)
-    if place is None or over is None or cadence is None:
-        return
-    ax.axvline(place, color=SOFT, lw=1, ls=(0, (4, 2)), zorder=1)
-    if text:
-        ax.annotate(
-            f"2d + P = T\n(d = {level_name(over.name, round(cadence.boundary_s, 4))})",
-            (place, 0.98),
-            xycoords=("data", "axes fraction"),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="top",
-            fontsize=8,
-            color=SOFT,
-        )
-
-
 def _curves(
     view: StudyView,
     lines: tuple[Level, ...],
@@ -181,7 +130,7 @@ def _curves(
     ylabel: str,
     limits: tuple[float, float],
     home: float = math.nan,
-) -> tuple[Figure, list[Axes], list[Ends], list[style.Bars], str, style.Numbers]:
+) -> tuple[Figure, list[Axes], list[Ends], list[Bars], str, Numbers]:
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
@@ -197,8 +146,8 @@ def _curves(
         that are cut, and the numbers drawn.
     """
     figure, axes = style.panel_grid(view, 3.4)
-    look, every, seen, numbers = looks(view.line), [], [np.array([home])], style.Numbers()
-    bars: list[style.Bars] = []
+    look, every, seen, numbers = looks(view.line), [], [np.array([home])], Numbers()
+    bars: list[Bars] = []
     draw = _band if style.has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
@@ -208,12 +157,12 @@ def _curves(
             seen.append(matrix.ravel())
             ends[level] = draw(ax, bands, look[level], shift)
             at = _places(bands, shift)
-            bars.append(style.Bars(ax, at, bands.low, bands.high, look[level].colour))
+            bars.append(Bars(ax, at, bands.low, bands.high, look[level].colour))
             numbers.add(view.setting(panel, level), view.along_x() | _columns(view.measure, bands))
         style.hatch_stops(ax, view.stops_outside(panel))
         every.append(ends)
     style.label_panels(axes, view, ylabel)
-    cut = style.fit_to(axes[0], present(np.concatenate(seen)))
+    cut = fit_to(axes[0], present(np.concatenate(seen)))
     return figure, axes, every, bars, cut, numbers
 
 
@@ -230,7 +179,7 @@ def _places(bands: Band, shift: float) -> Floats:
 
 def _columns(measure: str, bands: Band) -> dict[str, Floats]:
     """A band as columns: mean, simultaneous and pointwise 95 % limits."""
-    return style.in_units(
+    return in_units(
         measure,
         mean=bands.mean,
         band_low=bands.low,
@@ -313,108 +262,3 @@ def _in_excess(view: StudyView) -> bool:
 
 def _what(view: StudyView) -> str:
     return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
-
-
-_ROOM = 1.08  # above the highest mark
-_QUANTILES = ("p05", "p25", "p50", "p75", "p95")
-
-
-class CommandAge(style.ReportFigure):
-    """How old a command is when it takes effect, as quantile ranges."""
-
-    name = "command_age"
-    title = "Age of commands when they take effect"
-    pages = ("driving",)
-    has_panels = True
-
-    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
-        columns = [f"command_age_{q}_s" for q in _QUANTILES]
-        if not all(view.part.has(column) for column in columns):
-            return None
-        figure, axes = style.panel_grid(view, 3.0)
-        look = looks(view.line)
-        grids, numbers = [view.part.grid(column) for column in columns], style.Numbers()
-        for ax, panel in zip(axes, view.shown, strict=True):
-            for level, offset in style.dodge(view.lines):
-                ages = [_cell_means(view.curve(grid, panel, level)) for grid in grids]
-                _ranges(ax, [stop + offset for stop in range(len(view.stops))], ages, look[level])
-                told = dict(zip(columns, ages, strict=True))
-                numbers.add(view.setting(panel, level), view.along_x() | told)
-        style.log_axis(axes[0])
-        style.label_panels(
-            axes, view, style.axis_label("age_s", style.wrapped("Command age at application", 22))
-        )
-        legend(figure, view.line)
-        return self.finish(figure, caption("command_age"), numbers)
-
-
-class CommandRate(style.ReportFigure):
-    """Commands applied per second, beside what arithmetic allows request/reply."""
-
-    name = "command_rate"
-    title = "Commands applied per second"
-    pages = ("driving",)
-    columns = ("command_rate_hz",)
-    has_panels = True
-
-    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
-        there = cadences(view, reading.scenario_of(view.part.name))
-        figure, axes = style.panel_grid(view, 3.0)
-        look, every, numbers = looks(view.line), [], style.Numbers()
-        grid = view.part.grid("command_rate_hz")
-        for ax, panel, found in zip(axes, view.shown, there, strict=True):
-            ends: Ends = {}
-            for i, (level, place) in enumerate(style.dodge(view.lines)):
-                means = _cell_means(view.curve(grid, panel, level))
-                if style.has_lines(view):  # larger marks below, where lines lie on each other
-                    _line(ax, means, look[level], 4 + 2.5 * (len(view.lines) - 1 - i))
-                else:
-                    x = np.arange(len(means)) + place
-                    ax.plot(x, means, look[level].mark, ms=5, color=look[level].colour)
-                ends[level] = float(means[-1])
-                told = view.along_x() | {"command_rate_hz": means}
-                numbers.add(view.setting(panel, level), told)
-            _closed_form(ax, view, found)
-            every.append(ends)
-        tops = [ax.dataLim.y1 for ax in axes if np.isfinite(ax.dataLim.y1)]  # a panel may be empty
-        axes[0].set_ylim(0, _ROOM * max(tops, default=1.0))
-        style.label_panels(axes, view, style.axis_label("command_rate_hz"))
-        if style.has_lines(view):
-            name_lines(axes, every, view.line)
-        else:
-            legend(figure, view.line)
-        words = caption("command_rate", has_cadence=any(there))
-        return self.finish(figure, words, numbers)
-
-
-def _cell_means(values: Floats) -> Floats:
-    """`(stops, persons, trials)` to means over all runs of a stop."""
-    return nan_mean(values.reshape(len(values), -1), axis=1)
-
-
-def _line(ax: Axes, means: Floats, look: Look, size: float) -> None:
-    ax.plot(means, color=look.colour, lw=1, alpha=0.5)
-    ax.plot(means, look.mark, ms=size, color=look.colour)
-
-
-def _ranges(ax: Axes, x: Sequence[float], ages: list[Floats], look: Look) -> None:
-    low, quarter, middle, three_quarters, high = ages
-    ax.vlines(x, low, high, color=look.colour, lw=1)
-    ax.vlines(x, quarter, three_quarters, color=look.colour, lw=4, alpha=0.55)
-    ax.plot(x, middle, look.mark, color=look.colour, ms=4.5)
-
-
-def _closed_form(ax: Axes, view: StudyView, cadence: Cadence | None) -> None:
-    """A dash at each stop where a pattern stands that is bound by it."""
-    if cadence is None or view.over is None or not view.over.is_numeric:
-        return
-    delays = [float(v) for v in view.over.levels if isinstance(v, int | float)]
-    rates = [cadence.lock_step_rate(d) for d in delays]
-    has_lines, half = style.has_lines(view), 0.4 / len(view.lines)
-    for level, place in style.dodge(view.lines):
-        if level in PATTERNS and PATTERNS[str(level)].in_step:
-            x = np.arange(len(delays)) + (0.0 if has_lines else place)
-            ax.hlines(rates, x - half, x + half, color=INK, lw=1, ls=(0, (4, 2)), zorder=3)
-    mark_boundary(ax, view.over, cadence, text=False)

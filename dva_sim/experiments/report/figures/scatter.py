@@ -10,7 +10,9 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Floats, RunGrid, Setting, nan_mean
 from dva_sim.experiments.analysis.study_view import StudyView, layout_of
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, legend, looks
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
+from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.palette import INK, ONE, PAPER, SOFT, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
 from dva_sim.kernel.wording import capital
@@ -124,9 +126,9 @@ class Scatter(style.ReportFigure):
             row[0].set_ylabel(style.axis_label(view.measure, style.wrapped(label, 26)))
         if view.contrast is None:
             legend(figure, view.line)
-        numbers = style.Numbers()
+        numbers = Numbers()
         for cloud, y in zip(clouds, means, strict=True):
-            told = dict(zip(names, where, strict=True)) | {style.with_unit("mean", view.measure): y}
+            told = dict(zip(names, where, strict=True)) | {with_unit("mean", view.measure): y}
             numbers.add(panel | {"of": cloud.name}, {POINT: range(len(y))} | told)
         title = f"{capital(_what(view, clouds))} against each factor{_place(panel)}"
         return self.finish(figure, caption("scatter"), numbers, title=title)
@@ -196,7 +198,7 @@ class Sobol(style.ReportFigure):
         clouds, names, where, panel = points_of(view, reading)
         height = 1.2 + 0.42 * len(names)
         figure, (axes,) = style.panels(1, len(clouds), height, sharey=True, sharex=True)
-        numbers = style.Numbers()
+        numbers = Numbers()
         for ax, cloud in zip(axes, clouds, strict=True):
             found = _sobol(cloud, names, where)
             for row, index in enumerate(found):

@@ -10,25 +10,11 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pooled
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_limits
+from dva_sim.experiments.report.figures.keys import box, key
 from dva_sim.experiments.report.figures.outcomes import shares_of, stack_in_time
-from dva_sim.experiments.report.figures.palette import (
-    FAINT,
-    FATES,
-    INK,
-    PAPER,
-    SOFT,
-    Look,
-    box,
-    key,
-    looks,
-)
-from dva_sim.experiments.report.figures.style import (
-    Drawn,
-    Numbers,
-    ReportFigure,
-    panels,
-    with_limits,
-)
+from dva_sim.experiments.report.figures.palette import FAINT, FATES, INK, PAPER, SOFT, Look, looks
+from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, panels
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level

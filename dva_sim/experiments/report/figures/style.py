@@ -5,25 +5,23 @@ The numbers behind a figure are written down as they are drawn, to be kept besid
 
 from __future__ import annotations
 
-import csv
 import io
 import textwrap
 from abc import ABC, abstractmethod
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
+from dva_sim.experiments.analysis.run_grid import Factor, Setting
 from dva_sim.experiments.analysis.study_view import StudyView
+from dva_sim.experiments.report.figures.csv_numbers import Numbers
 from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.study.parts import Level
-from dva_sim.kernel.csv_cells import harmless, harmless_row
-from dva_sim.kernel.units import ending_of, unit_of
-from dva_sim.kernel.wording import capital, number
+from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import capital
 from dva_sim.simulation.labels import brief, factor_name, level_name, measure_name
 
 if TYPE_CHECKING:
@@ -33,73 +31,10 @@ if TYPE_CHECKING:
     from dva_sim.experiments.report.summary import Reading
 
 
-_DIGITS = 9
-
-
-class Numbers:
-    """Rows that say where (levels of factors, names) and what (numbers)."""
-
-    def __init__(self) -> None:
-        self._rows: list[dict[str, Any]] = []
-
-    def add(self, where: Mapping[str, Any], columns: Mapping[str, Iterable[Any]]) -> None:
-        """One row for each entry of the columns, which are of one length.
-
-        Args:
-            where: Levels and names that hold for all these rows.
-            columns: Numbers, or levels, of each row.
-        """
-        for row in zip(*columns.values(), strict=True):
-            self._rows.append(dict(where) | dict(zip(columns, row, strict=True)))
-
-    def row(self, where: Mapping[str, Any], **columns: Any) -> None:
-        """A single row."""
-        self._rows.append(dict(where) | columns)
-
-    def csv(self) -> bytes:
-        """Comma-separated, with a heading; what is missing is left empty."""
-        heads = list(dict.fromkeys(key for row in self._rows for key in row))
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(harmless_row(heads))
-        writer.writerows([_text(harmless(row.get(h))) for h in heads] for row in self._rows)
-        return text.getvalue().encode()
-
-
-def with_unit(word: str, measure: str) -> str:
-    """`mean_s` for the mean of a measure in seconds."""
-    ending = ending_of(measure)
-    return f"{word}_{ending}" if ending else word
-
-
-def in_units(measure: str, **columns: Any) -> dict[str, Any]:
-    """Columns of a measure, such as its mean and limits, under names that end in its unit."""
-    return {with_unit(word, measure): values for word, values in columns.items()}
-
-
-def with_limits(column: str, middle: Any, low: Any, high: Any) -> dict[str, Any]:
-    """A column with its limits: `response_s`, `response_low_s` and `response_high_s`."""
-    stem = column.removesuffix(f"_{ending_of(column)}")
-    return {column: middle} | in_units(column, **{f"{stem}_low": low, f"{stem}_high": high})
-
-
-def _text(value: Any) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    if isinstance(value, bool | np.bool_):
-        return str(bool(value)).lower()
-    if isinstance(value, float | np.floating):
-        return "" if np.isnan(value) else f"{float(value):.{_DIGITS}g}"
-    return str(value)
-
-
 _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
 _DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
 _LEAST_TICK = 8  # characters of a tick's name in a line
-_ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
-_HAIR = 1e-3  # of an axis, below which what is cut cannot be seen
-_LINE_PT = 9.0  # height of a line of small print [pt]
 _ROW_LABEL = 28  # characters that the height of a row holds
 ASIDE = "_aside"  # label of what is drawn but is no result: the site, a scale, a heading
 LEAST_WORDS = 6.0  # [pt] in this width
@@ -319,86 +254,6 @@ def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
     axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())
-
-
-def fit_to(axes: Axes, values: Floats) -> str:
-    """Cut bands far beyond what any person did, lest they flatten all else; says if it did.
-
-    To be followed by `mark_cuts`, once the limits are settled.
-    """
-    bottom, top = axes.get_ylim()
-    if not len(values):
-        return ""
-    room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
-    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
-    axes.set_ylim(low, high)
-    if (low, high) == (bottom, top):
-        return ""
-    return (
-        "Bands and bars that go far beyond what any person did are cut: an arrow head at the edge "
-        "of the axes, with the number at which they end."
-    )
-
-
-@dataclass(frozen=True)
-class Bars:
-    """What may be longer than the axes are: where each bar stands `(n,)`, and from where to where.
-
-    Attributes:
-        axes: In which they are drawn.
-        at: Place of each, across it.
-        low: Where it begins.
-        high: Where it ends.
-        colour: Of all of them.
-        along: The axis along which they lie.
-    """
-
-    axes: Axes
-    at: Floats
-    low: Floats
-    high: Floats
-    colour: str
-    along: Literal["x", "y"] = "y"
-
-
-def mark_cuts(every: Sequence[Bars]) -> None:
-    """An arrow head where an edge of the axes cuts a bar, with the bound that cannot be seen.
-
-    To be called last: the limits must be settled.
-    """
-    beside: Counter[tuple[Axes, str, int, int]] = Counter()
-    for bars in every:
-        is_up = bars.along == "y"
-        low, high = sorted(bars.axes.get_ylim() if is_up else bars.axes.get_xlim())
-        for ends, edge, side in ((bars.low, low, -1), (bars.high, high, 1)):
-            for at, end in zip(bars.at, ends, strict=True):
-                if side * (end - edge) > _HAIR * (high - low):
-                    spot = (bars.axes, bars.along, side, round(at))
-                    _arrow_head(bars, float(at), edge, side, beside[spot], number(float(end)))
-                    beside[spot] += 1
-
-
-def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: str) -> None:
-    """At an edge; of several bounds at one stop one stands below the other."""
-    look: dict[str, Any] = {"color": bars.colour, "label": ASIDE, "clip_on": False, "zorder": 6}
-    if bars.along == "y":
-        place, mark, offset = (at, edge), "v^"[side > 0], (6.0, -side * (2 + _LINE_PT * row))
-        across, up = "left", "top" if side > 0 else "bottom"
-    else:
-        place, mark, offset = (edge, at), "<>"[side > 0], (-2.0 * side, 6 + _LINE_PT * row)
-        across, up = "right" if side > 0 else "left", "bottom"
-    bars.axes.plot(*place, mark, ms=6, **look)
-    bars.axes.annotate(
-        bound,
-        place,
-        xytext=offset,
-        textcoords="offset points",
-        ha=across,
-        va=up,
-        fontsize=7.5,
-        color=bars.colour,
-        zorder=6,
-    )
 
 
 def hatch_stops(axes: Axes, stops: Sequence[int]) -> None:

@@ -9,7 +9,10 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Floats, Setting, person_means, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import legend, looks
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
+from dva_sim.experiments.report.figures.cut_bars import Bars, mark_cuts
+from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.palette import looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.simulation.labels import factor_name, level_name, measure_name
@@ -42,14 +45,14 @@ class TradeOff(style.ReportFigure):
         if columns is None:
             return None
         figure, axes = style.panel_grid(view, 3.6)
-        numbers, ends, bars = style.Numbers(), [], list[style.Bars]()
+        numbers, ends, bars = Numbers(), [], list[Bars]()
         for ax, panel in zip(axes, view.shown, strict=True):
             for level in view.lines:
                 bands = [_band(view, column, panel, level) for column in columns]
                 bars += _line(ax, view, level, *bands)
                 ends.append((ax, bands[0].mean, bands[1].mean))
                 told = {
-                    style.with_unit(f"{word}_{edge}", column): getattr(found, name)
+                    with_unit(f"{word}_{edge}", column): getattr(found, name)
                     for word, column, found in zip(
                         ("exposure", "response"), columns, bands, strict=True
                     )
@@ -60,7 +63,7 @@ class TradeOff(style.ReportFigure):
             ax.grid(True, axis="both")
             ax.margins(0.12)
         _fit(axes[0], view, columns)
-        style.mark_cuts(bars)
+        mark_cuts(bars)
         for ax, x, y in ends:
             _name_stops(ax, view, x, y)
         figure.supxlabel(style.axis_label(columns[0]), fontsize="medium")
@@ -105,17 +108,15 @@ def _fit(ax: Axes, view: StudyView, columns: tuple[str, str]) -> None:
         ax.set(**{f"{name}lim": (low, high)})
 
 
-def _line(
-    ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band
-) -> list[style.Bars]:
+def _line(ax: Axes, view: StudyView, level: Level, exposure: Band, response: Band) -> list[Bars]:
     """A mark at each stop, joined where stops are numbers; gives the bars of its crosses."""
     paint, mark = looks(view.line)[level]
     x, y = exposure.mean, response.mean
     ax.hlines(y, exposure.pointwise_low, exposure.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.vlines(x, response.pointwise_low, response.pointwise_high, color=paint, lw=0.8, alpha=0.7)
     ax.plot(x, y, "-" if style.leads_on(view) else "", marker=mark, color=paint, ms=5, lw=1.2)
-    across = style.Bars(ax, y, exposure.pointwise_low, exposure.pointwise_high, paint, "x")
-    return [across, style.Bars(ax, x, response.pointwise_low, response.pointwise_high, paint)]
+    across = Bars(ax, y, exposure.pointwise_low, exposure.pointwise_high, paint, "x")
+    return [across, Bars(ax, x, response.pointwise_low, response.pointwise_high, paint)]
 
 
 def _name_stops(ax: Axes, view: StudyView, x: Floats, y: Floats) -> None:

@@ -10,7 +10,9 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import INK, Look, legend, looks
+from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_limits
+from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.palette import INK, Look, looks
 from dva_sim.experiments.report.prose import caption
 
 if TYPE_CHECKING:
@@ -87,16 +89,16 @@ class Taken(_Measures):
     shown = TAKEN
 
 
-def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> style.Numbers:
+def _numbers(view: StudyView, shown: Sequence[ShownMeasure]) -> Numbers:
     """Means over persons and the middle 90 % of them, in the units of the table of runs."""
-    numbers, panel = style.Numbers(), view.panels[0]
+    numbers, panel = Numbers(), view.panels[0]
     grids = {each.column: view.part.grid(each.column) for each in shown}
     for level in view.lines:
         curves = {name: view.curve(grid, panel, level) for name, grid in grids.items()}
         told: dict[str, Floats] = {}
         for name, curve in curves.items():
             persons = person_means(curve)
-            told |= style.with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
+            told |= with_limits(name, nan_mean(persons, axis=0), *_middle(persons))
         numbers.add(view.setting(panel, level), view.along_x() | told)
     return numbers
 

@@ -1,0 +1,83 @@
+"""Where a finding holds, in words: `without delay`, `from 250 ms on`, `on the poor link`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.kernel.units import unit_of
+from dva_sim.kernel.wording import listing
+from dva_sim.simulation.labels import (
+    absent_at_zero,
+    factor_name,
+    level_name,
+    named,
+    setting,
+)
+
+
+def place_of(finding: Finding, stop: int) -> str:
+    """Where one stop of a finding lies: `with profile default, at a one-way delay of 1 s`."""
+    return f"{condition(finding, inside=True)}{at(finding, [stop])}".removesuffix(", ")
+
+
+def condition(f: Finding, inside: bool = False) -> str:
+    """`With profile default, `: the levels of the other factors; nothing without any."""
+    if not f.within:
+        return ""
+    return f"{'with' if inside else 'With'} {setting(f.within)}, "
+
+
+def at(f: Finding, where: Sequence[int]) -> str:
+    """`at a one-way delay of 1 s`, or where a contrast holds that runs over nothing."""
+    if not f.over:
+        return f.everywhere
+    if spoken := _spoken(f, where):
+        return spoken
+    names = listing([level_name(f.over, f.levels[i]) for i in where])
+    name = factor_name(f.over)
+    vowel = name[0] in "aeiou" and not name.startswith("one")
+    article = "" if len(where) > 1 else "an " if vowel else "a "
+    of = "of " if unit_of(f.over) or is_ordered(f) else ""
+    return f"at {article}{name} {of}{names}"
+
+
+def places(f: Finding, where: NDArray[np.intp]) -> str:
+    """`from 250 ms on`, `up to 100 ms`, `at every delay`, or the levels one by one."""
+    if not f.over:
+        return f.everywhere
+    names = [level_name(f.over, f.levels[int(i)]) for i in where]
+    solid = len(where) > 1 and bool((np.diff(where) == 1).all()) and is_ordered(f)
+    if len(where) == len(f.levels) > 1:
+        return f"at every {factor_name(f.over)} tried"
+    if solid and where[-1] == len(f.levels) - 1:
+        return f"from {names[0]} on"
+    if solid and where[0] == 0:
+        return f"up to {names[-1]}"
+    return _spoken(f, where) or f"at {listing(names)}"
+
+
+def _spoken(f: Finding, where: Iterable[int]) -> str:
+    """`without delay`, `on the poor link`, `with filter none`: where a bare level is no English."""
+    levels = [f.levels[int(i)] for i in where]
+    if levels == [0] and (absent := absent_at_zero(f.over)):
+        return f"without {absent}"
+    if all(isinstance(level, int | float) and not isinstance(level, bool) for level in levels):
+        return ""
+    names = listing([level_name(f.over, level) for level in levels])
+    if all(str(level).isdigit() for level in levels):
+        return f"with {names} {factor_name(f.over)}"
+    if f.over == "link":
+        return f"on the {names} link{'s' if len(levels) > 1 else ''}"
+    if len(levels) == 1:
+        return f"with {named(f.over, levels[0])}"
+    return f"with {factor_name(f.over)} {names}"
+
+
+def is_ordered(f: Finding) -> bool:
+    """Whether the levels are quantities that ascend."""
+    values = [v for v in f.levels if isinstance(v, int | float)]
+    return len(values) == len(f.levels) and values == sorted(values)

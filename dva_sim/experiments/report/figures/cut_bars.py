@@ -1,0 +1,106 @@
+"""Bars that go beyond the axes: the axes fit what persons did, and the edge tells what is cut."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from dva_sim.experiments.analysis.run_grid import Floats
+from dva_sim.kernel.wording import number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+from dva_sim.experiments.report.figures.style import ASIDE
+
+_ROOM = 0.15  # share of what persons span that is left free beyond them, where bands are cut
+
+
+_HAIR = 1e-3  # of an axis, below which what is cut cannot be seen
+
+
+_LINE_PT = 9.0  # height of a line of small print [pt]
+
+
+def fit_to(axes: Axes, values: Floats) -> str:
+    """Cut bands far beyond what any person did, lest they flatten all else; says if it did.
+
+    To be followed by `mark_cuts`, once the limits are settled.
+    """
+    bottom, top = axes.get_ylim()
+    if not len(values):
+        return ""
+    room = _ROOM * (float(np.ptp(values)) or abs(float(values[0])) or 1.0)
+    low, high = max(bottom, values.min() - room), min(top, values.max() + room)
+    axes.set_ylim(low, high)
+    if (low, high) == (bottom, top):
+        return ""
+    return (
+        "Bands and bars that go far beyond what any person did are cut: an arrow head at the edge "
+        "of the axes, with the number at which they end."
+    )
+
+
+@dataclass(frozen=True)
+class Bars:
+    """What may be longer than the axes are: where each bar stands `(n,)`, and from where to where.
+
+    Attributes:
+        axes: In which they are drawn.
+        at: Place of each, across it.
+        low: Where it begins.
+        high: Where it ends.
+        colour: Of all of them.
+        along: The axis along which they lie.
+    """
+
+    axes: Axes
+    at: Floats
+    low: Floats
+    high: Floats
+    colour: str
+    along: Literal["x", "y"] = "y"
+
+
+def mark_cuts(every: Sequence[Bars]) -> None:
+    """An arrow head where an edge of the axes cuts a bar, with the bound that cannot be seen.
+
+    To be called last: the limits must be settled.
+    """
+    beside: Counter[tuple[Axes, str, int, int]] = Counter()
+    for bars in every:
+        is_up = bars.along == "y"
+        low, high = sorted(bars.axes.get_ylim() if is_up else bars.axes.get_xlim())
+        for ends, edge, side in ((bars.low, low, -1), (bars.high, high, 1)):
+            for at, end in zip(bars.at, ends, strict=True):
+                if side * (end - edge) > _HAIR * (high - low):
+                    spot = (bars.axes, bars.along, side, round(at))
+                    _arrow_head(bars, float(at), edge, side, beside[spot], number(float(end)))
+                    beside[spot] += 1
+
+
+def _arrow_head(bars: Bars, at: float, edge: float, side: int, row: int, bound: str) -> None:
+    """At an edge; of several bounds at one stop one stands below the other."""
+    look: dict[str, Any] = {"color": bars.colour, "label": ASIDE, "clip_on": False, "zorder": 6}
+    if bars.along == "y":
+        place, mark, offset = (at, edge), "v^"[side > 0], (6.0, -side * (2 + _LINE_PT * row))
+        across, up = "left", "top" if side > 0 else "bottom"
+    else:
+        place, mark, offset = (edge, at), "<>"[side > 0], (-2.0 * side, 6 + _LINE_PT * row)
+        across, up = "right" if side > 0 else "left", "bottom"
+    bars.axes.plot(*place, mark, ms=6, **look)
+    bars.axes.annotate(
+        bound,
+        place,
+        xytext=offset,
+        textcoords="offset points",
+        ha=across,
+        va=up,
+        fontsize=7.5,
+        color=bars.colour,
+        zorder=6,
+    )
