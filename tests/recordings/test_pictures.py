@@ -16,11 +16,13 @@ from PIL import Image, ImageColor
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import TrackPoint
 from dva_sim.recordings.pictures import Wanted, colours, style
-from dva_sim.recordings.pictures.film import Film, write_film
-from dva_sim.recordings.pictures.layers import DrawnBody
+from dva_sim.recordings.pictures.bodies import DrawnBody
+from dva_sim.recordings.pictures.film import Film
+from dva_sim.recordings.pictures.film_files import write_film
 from dva_sim.recordings.pictures.moments import Moments
+from dva_sim.recordings.pictures.names import Box, Names
 from dva_sim.recordings.pictures.run_endings import verdicts
-from dva_sim.recordings.pictures.scene import Box, Names, Scene
+from dva_sim.recordings.pictures.scene import Scene
 from dva_sim.recordings.pictures.stills import best_time, even_times, still, strip
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import Ending, simulate

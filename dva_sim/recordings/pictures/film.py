@@ -1,72 +1,24 @@
-"""The messages of the last seconds, as a strip below the map.
-
-A run from above as moving pictures, or several runs in step.
-
-Writing films: GIF by Pillow, MP4 by ffmpeg; a film that fails leaves no half file.
-"""
+"""A run from above as moving pictures, or several runs in step."""
 
 from __future__ import annotations
 
 import math
-import shutil
-import subprocess
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from tempfile import TemporaryFile
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from PIL import Image, ImageColor
 
-from dva_sim.kernel.errors import ConfigError
-from dva_sim.kernel.whole_files import whole
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.colours import ROBOT
 from dva_sim.recordings.pictures.moments import Moments
 from dva_sim.recordings.pictures.run_endings import pattern_name, verdicts
 from dva_sim.recordings.pictures.scene import Scene
-from dva_sim.recordings.pictures.style import Sheet, heading_of
+from dva_sim.recordings.pictures.sheet import Sheet, heading_of
+from dva_sim.recordings.pictures.traffic_strip import Traffic
 from dva_sim.simulation.full import Playback
-
-WINDOW_S = 10.0
-
-
-class Traffic:
-    """Messages to the robots above the line, from them below.
-
-    Args:
-        ax: Where.
-        moments: A run made with `keep_traffic`.
-    """
-
-    def __init__(self, ax: Axes, moments: Moments) -> None:
-        self._moments, robots = moments, set(moments.recording.radii)
-        traffic = moments.recording.recorder.traffic or []
-        up = np.array([sent.time for sent in traffic if sent.destination in robots])
-        down = np.array([sent.time for sent in traffic if sent.source in robots])
-        ax.set_xlim(-WINDOW_S, 0)
-        ax.set_ylim(-1, 1)
-        ax.set_yticks([0.5, -0.5], ["to robots", "from robots"], fontsize=style.FONT)
-        ax.set_xticks([-10, -5, 0], ["10 s ago", "5 s ago", "now"], fontsize=style.FONT)
-        ax.spines[["top", "right", "left"]].set_visible(False)
-        ax.axhline(0, color="0.7", lw=0.6)
-        ax.tick_params(length=0)
-        self._strips = [
-            (times, height, ax.vlines([], 0, height, color=colour, lw=0.7, animated=True))
-            for times, height, colour in ((up, 0.85, "#3f90da"), (down, -0.85, "0.55"))
-        ]
-
-    def show(self, time: float) -> list[Artist]:
-        """The strip at a moment [s]; after the end of the run its last one."""
-        time = self._moments.within(time)
-        for times, height, lines in self._strips:
-            inside = times[(times > time - WINDOW_S) & (times <= time)] - time
-            lines.set_segments([np.array([[x, 0.0], [x, height]]) for x in inside])
-        return [lines for *_, lines in self._strips]
-
 
 FPS = 8
 LENGTH_S = 16.0  # a film lasts about this long; the run is sped up to fit
@@ -172,109 +124,3 @@ class _Eye:
             self._shown = robot, captured
         self._title.set_text(title)
         return [self._image, self._title]
-
-
-COLOURS = 112  # of a GIF
-ALIKE = 8  # a colour that differs less from the last picture's stays as it was, of 255
-SAMPLES = 6  # pictures that these are chosen from
-
-
-def write_film(film: Film, path: Path) -> None:
-    """Write a film; the ending of `path` decides the form.
-
-    Raises:
-        ConfigError: ffmpeg is missing or failed.
-    """
-    with whole(path) as part:
-        (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(film, part)
-
-
-def find_ffmpeg() -> str:
-    """Path of ffmpeg: the one of the `imageio-ffmpeg` package, or else of the system.
-
-    Raises:
-        ConfigError: there is none.
-    """
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        found = shutil.which("ffmpeg")
-    else:
-        found = imageio_ffmpeg.get_ffmpeg_exe()
-    if found is None:
-        raise ConfigError(
-            "mp4 needs ffmpeg: pip install 'dva-sim[video]', or install ffmpeg, or write a .gif"
-        )
-    return found
-
-
-def _write_gif(film: Film, path: Path) -> None:
-    # One palette, from pictures spread over the run, keeps the file small.
-    times = [film.duration * (n + 1) / SAMPLES for n in range(SAMPLES)]
-    samples = [Image.fromarray(film.at(time)) for time in times]
-    sheet = Image.new("RGB", (samples[0].width, samples[0].height * SAMPLES))
-    for number, sample in enumerate(samples):
-        sheet.paste(sample, (0, number * sample.height))
-    most = COLOURS - len(style.SMALL)
-    common = sheet.quantize(most, Image.Quantize.MEDIANCUT).getpalette() or []
-    # Few pixels show a robot: left to chance, its colour would be lost.
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(common[: 3 * most] + [v for c in style.SMALL for v in ImageColor.getrgb(c)])
-    pictures = [
-        Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-        for frame in _steady(film.frames())
-    ]
-    pictures[0].save(
-        path, save_all=True, append_images=pictures[1:], duration=1000 // FPS, loop=0, optimize=True
-    )
-
-
-def _steady(frames: Iterator[NDArray[np.uint8]]) -> Iterator[NDArray[np.uint8]]:
-    """Pictures that change only where one can see it: what stays the same takes no room."""
-    shown = next(frames)
-    yield shown
-    for frame in frames:
-        red, green, blue = np.moveaxis(np.abs(frame.astype(np.int16) - shown) >= ALIKE, 2, 0)
-        shown = np.where((red | green | blue)[:, :, None], frame, shown)
-        yield shown
-
-
-def _write_mp4(film: Film, path: Path) -> None:
-    frames = film.frames()
-    first = next(frames)
-    command = [find_ffmpeg(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    command += ["-s", f"{first.shape[1]}x{first.shape[0]}", "-r", str(FPS), "-i", "-"]
-    # Most players want an even number of pixels and this order of colours.
-    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-c:v", "libx264"]
-    command += ["-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(path)]
-    with TemporaryFile() as said:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
-        try:
-            _feed(process, first.tobytes(), frames)
-        finally:
-            process.kill()  # where it has ended already, that does nothing
-            process.wait()
-        if process.returncode != 0:
-            raise ConfigError(f"ffmpeg could not write the video: {_last_line(said, process)}")
-
-
-def _feed(process: subprocess.Popen[bytes], first: bytes, frames: Iterator[Any]) -> None:
-    """Hand over all pictures; a pipe that breaks shows in how ffmpeg ended."""
-    pipe = process.stdin
-    assert pipe is not None
-    try:
-        with pipe:
-            pipe.write(first)
-            for frame in frames:
-                pipe.write(frame.tobytes())
-    except BrokenPipeError:
-        pass
-    process.wait()
-
-
-def _last_line(said: IO[bytes], process: subprocess.Popen[bytes]) -> str:
-    said.seek(0)
-    lines = said.read().decode(errors="replace").strip().splitlines()
-    if lines:
-        return lines[-1]
-    return f"it ended with {process.returncode}; a negative number is the signal that killed it"

@@ -61,7 +61,7 @@ class Wanted:
         _check_path("still", self.still, STANDING if self.camera else DRAWN)
         _check_path("strip", self.strip, DRAWN)
         if self.video is not None and self.video.suffix.lower() == ".mp4":
-            from dva_sim.recordings.pictures.film import find_ffmpeg  # late: start-up
+            from dva_sim.recordings.pictures.film_files import find_ffmpeg  # late: start-up
 
             find_ffmpeg()
         if self.camera is not None and self.still is None:
@@ -121,7 +121,7 @@ class Wanted:
         Raises:
             ConfigError: a moment after the run ended, or a failing ffmpeg.
         """
-        from dva_sim.recordings.pictures import film, stills  # late: start-up
+        from dva_sim.recordings.pictures import film_files, stills  # late: start-up
         from dva_sim.recordings.pictures.film import Film  # late: start-up
 
         stills.check_times(recordings, self.times)
@@ -139,7 +139,7 @@ class Wanted:
                 stills.strip(recordings, times).savefig(part)
             yield f"Strip: {self.strip}"
         if self.video is not None:
-            film.write_film(Film(recordings, self.inset), self.video)
+            film_files.write_film(Film(recordings, self.inset), self.video)
             yield f"Video: {self.video}"
 
 
