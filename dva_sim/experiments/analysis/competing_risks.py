@@ -142,10 +142,7 @@ def with_endings(runs: Table, events: Table) -> Table:
         how[key][0] if not isinstance(word, str) and len(how[key]) == 1 else word
         for key, word in zip(keys, told, strict=True)
     ]
-    return dict(runs) | {
-        "confirmed": np.array(share),
-        "outcome": np.array(outcome, dtype=object),
-    }
+    return dict(runs) | {"confirmed": np.array(share), "outcome": np.array(outcome, dtype=object)}
 
 
 _OF_RUNS = {"contained": CONFIRMED, "open": "timeout"}

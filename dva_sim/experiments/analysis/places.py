@@ -10,13 +10,7 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.kernel.units import unit_of
 from dva_sim.kernel.wording import listing
-from dva_sim.simulation.labels import (
-    absent_at_zero,
-    factor_name,
-    level_name,
-    named,
-    setting,
-)
+from dva_sim.simulation.labels import absent_at_zero, factor_name, level_name, named, setting
 
 
 def place_of(finding: Finding, stop: int) -> str:

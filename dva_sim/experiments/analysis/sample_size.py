@@ -259,10 +259,7 @@ _CLAIMS = {"above": "above ", "below": "below \N{MINUS SIGN}", "same": "the same
 
 
 def _of_comparisons(
-    study: Mapping[str, Any],
-    runs: Table,
-    named: Mapping[str, Contrast],
-    family: Counter[str],
+    study: Mapping[str, Any], runs: Table, named: Mapping[str, Contrast], family: Counter[str]
 ) -> Iterator[_Test]:
     for name, contrast in named.items():
         at = places_of(study, contrast)[-1]

@@ -7,12 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.hypothesis_tests import (
-    Compared,
-    Judgement,
-    Tested,
-    Verdict,
-)
+from dva_sim.experiments.analysis.hypothesis_tests import Compared, Judgement, Tested, Verdict
 from dva_sim.experiments.analysis.run_grid import Setting
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.prose import note
@@ -42,16 +37,11 @@ def hypothesis_table(tested: Sequence[Tested], cluster: str = "person") -> CellT
             _interval(t.difference, t.contrast.measure),
             _p(t.adjusted),
             _p(t.against),
-            _verdict(t, cluster),
+            ": ".join(filter(None, (_VERDICTS[t.verdict], _few(t, cluster)))),
         ]
         for t in tested
     ]
     return CellTable("", heads, len(heads), rows, note=note("hypotheses"))
-
-
-def _verdict(tested: Tested, cluster: str) -> str:
-    """`? open: too few persons (4) to tell`, where they are."""
-    return ": ".join(filter(None, (_VERDICTS[tested.verdict], _few(tested, cluster))))
 
 
 def _few(tested: Tested, cluster: str) -> str:
@@ -97,7 +87,7 @@ def comparison_table(found: Judgement, cluster: str = "person") -> CellTable:
         [
             f"{c.name}: {_sides(c)}",
             measure_of(c.contrast.measure, c.contrast.part),
-            _place(c.at),
+            (setting(c.at) or "on average"),
             _interval(c.difference, c.contrast.measure),
             _bare(c.size.average) if c.size else "–",
             number(c.correlation),
@@ -145,10 +135,6 @@ def verdict_with_interval(tested: Tested) -> str:
     if tested.difference is None:
         return _VERDICTS[tested.verdict]
     return f"{_VERDICTS[tested.verdict]}: {_interval(tested.difference, tested.contrast.measure)}"
-
-
-def _place(at: Setting) -> str:
-    return setting(at) or "on average"
 
 
 def _interval(found: Interval | None, measure: str) -> str:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from dva_sim.experiments.analysis.hypothesis_tests import (
-    judged,
-)
+from dva_sim.experiments.analysis.hypothesis_tests import judged
 from dva_sim.experiments.analysis.run_grid import Table
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.hypothesis_tables import bound_of, verdict_with_interval

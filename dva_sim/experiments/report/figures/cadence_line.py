@@ -7,14 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from dva_sim.experiments.analysis.cadence import Cadence, cadence
-from dva_sim.experiments.analysis.run_grid import (
-    Factor,
-)
+from dva_sim.experiments.analysis.run_grid import Factor
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import (
-    SOFT,
-)
+from dva_sim.experiments.report.figures.palette import SOFT
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.simulation.labels import level_name
 

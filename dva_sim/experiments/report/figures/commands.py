@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.analysis.cadence import Cadence
-from dva_sim.experiments.analysis.run_grid import (
-    Floats,
-    nan_mean,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, nan_mean
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.cadence_line import cadences, mark_boundary

@@ -10,12 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.run_grid import (
-    Floats,
-    Setting,
-    person_means,
-    present,
-)
+from dva_sim.experiments.analysis.run_grid import Floats, Setting, person_means, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.cadence_line import boundary, cadences, mark_boundary

@@ -8,13 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dva_sim.experiments.analysis.run_grid import Floats
-from dva_sim.experiments.report.figures.palette import (
-    INK,
-)
-from dva_sim.experiments.report.figures.style import (
-    ASIDE,
-    WIDTH,
-)
+from dva_sim.experiments.report.figures.palette import INK
+from dva_sim.experiments.report.figures.style import ASIDE, WIDTH
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.simulation import scenario as scenes
 

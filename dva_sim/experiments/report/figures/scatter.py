@@ -115,7 +115,7 @@ class Scatter(style.ReportFigure):
         means = [nan_mean(c.values.reshape(len(c.values), -1), axis=1) for c in clouds]
         for ax, name, x in zip(axes, names, where, strict=True):
             for cloud, y in zip(clouds, means, strict=True):
-                _dots(ax, x, y, _look(view, cloud))
+                _dots(ax, x, y, ONE if cloud.level is None else looks(view.line)[cloud.level])
             ax.set_xlabel(style.wrapped(capital(head_of(name)), 30))
             if (ranges.get(name) or {}).get("scale") == "log":
                 style.log_axis(ax, "x")
@@ -142,10 +142,6 @@ def _what(view: StudyView, clouds: list[Cloud]) -> str:
 
 def _place(panel: Setting) -> str:
     return f" ({setting(panel)})" if panel else ""
-
-
-def _look(view: StudyView, cloud: Cloud) -> Look:
-    return ONE if cloud.level is None else looks(view.line)[cloud.level]
 
 
 def _dots(ax: Axes, x: Floats, y: Floats, look: Look) -> None:

@@ -17,11 +17,7 @@ from dva_sim.experiments.report.figures.ground import (
     scale_bar,
     site_of,
 )
-from dva_sim.experiments.report.figures.palette import (
-    PAPER,
-    SOFT,
-    colours,
-)
+from dva_sim.experiments.report.figures.palette import PAPER, SOFT, colours
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, panels, stop_of, wrapped
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import POINT, Level
