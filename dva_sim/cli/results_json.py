@@ -9,8 +9,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from dva_sim.experiments.analysis.answer import Finding
-from dva_sim.experiments.analysis.compare import Comparison, GateVerdict
+from dva_sim.experiments.analysis.compare import Comparison
 from dva_sim.experiments.analysis.compare_rows import Difference
+from dva_sim.experiments.analysis.gate_verdicts import GateVerdict
 from dva_sim.experiments.analysis.matched_cells import Levels
 from dva_sim.experiments.analysis.run_grid import RunGrid
 from dva_sim.experiments.analysis.study_view import interval_of, layout_of

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from dva_sim.experiments.analysis.answer import too_few
 from dva_sim.experiments.analysis.hypothesis_tests import Compared, Judgement, Tested, Verdict
-from dva_sim.experiments.analysis.run_grid import Setting
 from dva_sim.experiments.report.cell_table import CellTable
 from dva_sim.experiments.report.prose import note
 from dva_sim.kernel.units import unit_of

@@ -1,0 +1,199 @@
+"""A results folder, read once: each part of it when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dva_sim import statistics
+from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
+from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
+from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
+from dva_sim.experiments.analysis.run_grid import (
+    Table,
+)
+from dva_sim.experiments.analysis.study_view import (
+    StudyView,
+    finding_of,
+    points_of,
+    possible_values,
+    row_names,
+    view_of,
+    with_rows,
+)
+from dva_sim.experiments.analysis.support import support_of_part
+from dva_sim.experiments.report.event_outcomes import EventOutcomes, outcomes_of
+from dva_sim.experiments.report.model_page import ModelPage
+from dva_sim.experiments.report.model_pages import page_of
+from dva_sim.experiments.report.people_page import PeoplePage, people_drove
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.parts import POINT, REPEATS
+from dva_sim.simulation.labels import take_up
+
+_FEWEST_PAIRS = 4  # of which a correlation says anything
+
+
+class ResultsReading:
+    """A results folder, read once: each part of it when it is first asked for.
+
+    Args:
+        results: The folder.
+    """
+
+    def __init__(self, results: Results) -> None:
+        self.results = results
+        self.manifest, self.study = results.manifest, results.study
+        take_up(self.manifest.get("columns") or {})
+        self._tables: dict[str, Table] = {}
+
+    def __repr__(self) -> str:
+        return f"Reading of {self.results.folder}"
+
+    def table(self, name: str) -> Table:
+        """Columns of a table; nothing where the study has no such table."""
+        if name not in self._tables:
+            table: Table = self.results.table(name) if self.results.has(name) else {}
+            if name == "runs" and self._is_of_events and self.results.has("events"):
+                table = with_endings(table, self.results.table("events"))
+            names = {} if name in ("runs", REPEATS) else row_names(self.study, self.runs)
+            self._tables[name] = with_rows(table, names) if table and names else table
+        return self._tables[name]
+
+    @property
+    def _is_of_events(self) -> bool:
+        """Whether the answer is about events, whoever saw to them, and not about drives."""
+        measure = (self.study.get("answer") or {}).get("measure")
+        ends_by_event = page_of(self.scenarios.values()).ends_by_event
+        return measure in ("confirmation_mean_s", "response_mean_s") and ends_by_event
+
+    @property
+    def runs(self) -> Table:
+        """The table of runs."""
+        return self.table("runs")
+
+    @property
+    def persons(self) -> int:
+        """How many were simulated, which a stopping rule or a budget may have decided."""
+        return len(np.unique(self.runs["person"])) if self.runs else 0
+
+    @property
+    def scenarios(self) -> Mapping[str, Mapping[str, Any]]:
+        """Each part's scenario before any factor changed it."""
+        found: Mapping[str, Mapping[str, Any]] = self.manifest.get("scenarios", {})
+        return found
+
+    def scenario_of(self, part: str) -> Mapping[str, Any]:
+        """One part's scenario."""
+        return self.scenarios.get(part, {})
+
+    @cached_property
+    def view(self) -> StudyView | None:
+        """How the study is looked at, with its extrapolations known; None without any run."""
+        view = view_of(self.study, self.runs) if self.runs else None
+        if view is None:
+            return None
+        scenario = self.scenario_of(view.part.name)
+        support = support_of_part(view.part, scenario)
+        possible = possible_values(view.measure, scenario)
+        if view.part.name in self.distrusted:
+            view = replace(view, contrast=None)
+        return replace(view, outside=support.outside if support else None, possible=possible)
+
+    @cached_property
+    def distrusted(self) -> dict[str, str]:
+        """See `Results`: parts of which no contrast is shown."""
+        return self.results.distrusted
+
+    @cached_property
+    def finding(self) -> Finding | None:
+        """The declared contrast as measured; None, too, where it is withheld."""
+        found = finding_of(self.view) if self.view is not None else None
+        return replace(found, failed=len(self.results.failures)) if found is not None else None
+
+    @property
+    def told(self) -> Finding | None:
+        """The finding in the words of the report: where loads are known, along them."""
+        return None if self.finding is None else self.page.told(self.finding)
+
+    @cached_property
+    def page(self) -> ModelPage:
+        """What the report says otherwise of the study's model; asked where there are runs."""
+        assert self.view is not None
+        if self.by_people:
+            return PeoplePage(self.view, self.table("drives"))
+        page = page_of(self.scenarios.values())
+        fitting = page if page.fits(self.view) else ModelPage
+        return fitting(self.view, self.table("events") or None)
+
+    @cached_property
+    def by_people(self) -> bool:
+        """Return True if people drove the robots, not simulated persons."""
+        return people_drove(self.table("drives"))
+
+    @property
+    def cluster(self) -> str:
+        """What is drawn anew for intervals: persons, or shifts."""
+        return "person" if self.view is None else self.page.cluster
+
+    @cached_property
+    def endings(self) -> Endings | None:
+        """How the events of the answer's part ended; None where a study has none."""
+        events = self.table("events")
+        if self.view is None or self.by_people or "closing_s" not in events:
+            return None
+        horizon = horizon_of(self.view, self.scenario_of(self.view.part.name))
+        found = Endings(self.view, events, self.runs, horizon)
+        return found if len(found) and np.isfinite(horizon) else None
+
+    @cached_property
+    def events(self) -> EventOutcomes | None:
+        """Outcomes of the events of all runs; None for a study without events."""
+        return outcomes_of(self.table("events"))
+
+    @cached_property
+    def robustness(self) -> RepeatedAnswer | None:
+        """The answer under other models of the persons, where it was repeated."""
+        if self.view is None or self.finding is None or not self.table(REPEATS):
+            return None
+        scenario = self.scenario_of(self.view.part.name)
+        return robustness_of(self.study, self.table(REPEATS), self.view, self.finding, scenario)
+
+    @property
+    def points(self) -> list[str]:
+        """Continuous factors: columns that tell where in its ranges each run lies."""
+        return points_of(self.study, self.runs)
+
+    @cached_property
+    def episodes(self) -> tuple[KeptEpisode, KeptEpisode] | None:
+        """A typical run and the worst, of those that were kept."""
+        if self.view is None:
+            return None
+        names = [n for n in self.study.get("factors", {}) if n != POINT and n in self.runs]
+        columns = [*names, *self.points]
+        tables = Tables(self.runs, self.table("tracks"), columns, self.table("events"))
+        part = self.view.part.name
+        return typical_and_worst(self.results.folder, part, self.view.measure, tables)
+
+    @cached_property
+    def pair_correlation(self) -> float | None:
+        """How alike the two sides of the contrast are, run by run, at the last stop."""
+        view = self.view
+        if view is None or view.contrast is None:
+            return None
+        grid = view.part.grid(view.measure)
+        first, second = (view.curve(grid, view.panels[0], level)[-1] for level in view.contrast)
+        both = np.isfinite(first) & np.isfinite(second)
+        if both.sum() < _FEWEST_PAIRS:
+            return None
+        found = statistics.pair_correlation(first[both], second[both])
+        return found if np.isfinite(found) else None
+
+    def trials_of(self, part: str) -> int:
+        """How many each person made in a part; 0 where that is not known."""
+        own = (self.study.get("parts", {}).get(part) or {}).get("replications")
+        return int(own or self.study.get("replications") or 0)
