@@ -35,6 +35,7 @@ from dva_sim.experiments.report.figures.style import (
     styled,
 )
 from dva_sim.experiments.report.figures.tradeoff import TradeOff
+from dva_sim.experiments.report.figures.transport import Brought
 from dva_sim.experiments.report.spread_table import spread_table
 from dva_sim.statistics import band
 
@@ -357,6 +358,19 @@ def test_an_axis_that_is_logarithmic_says_so_and_has_a_tick_at_what_matters(view
         assert ax.get_yscale() in ("log", "symlog")
         assert "log scale" in ax.get_ylabel()
     assert {-0.2, 0.0, 0.2} <= set(drawn[0].axes[0].get_yticks())
+
+
+@blank
+def test_panels_of_transports_that_are_logarithmic_say_so_in_their_titles(view):
+    times = view.part.treated["drive_time_s"]
+    known = with_columns(view, round_trip_mean_s=times / 100, command_rate_hz=times / 10)
+    with styled():
+        axes = Brought().draw(known, NOTHING_ELSE).figure.axes
+    told = {ax.get_title("left"): ax.get_yscale() for ax in axes if ax.get_visible()}
+    assert set(told.values()) == {"log", "linear"}
+    assert [
+        title for title, scale in told.items() if ("log scale" in title) != (scale == "log")
+    ] == []
 
 
 def arrow_heads(axes):

@@ -109,7 +109,8 @@ def _panel(ax: Axes, view: StudyView, shown: ShownMeasure) -> None:
         values = person_means(view.curve(grid, view.panels[0], level))
         place = WIDTH * ((index + 0.5) / count - 0.5)
         _marks(ax, place, values, look)
-    ax.set_title(shown.title, fontweight="normal")
+    scale = ", log scale" if shown.is_log else ""
+    ax.set_title(f"{shown.title}{scale}", fontweight="normal")
     style.stops_axis(ax, view.over)
     if shown.is_log:
         style.log_axis(ax)
