@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,7 +60,7 @@ def _interval_name(f: Finding) -> str:
 
 def _reach(f: Finding) -> str:
     """One sentence: where it differs from zero, and what holds elsewhere."""
-    told = [*_differs(f), *_equal(f), *_settled(f), *_undecided(f), *_unpaired(f)]
+    told = [*_differs(f), *_elsewhere(f)]
     return capital("; ".join(told)) + "." if told else ""
 
 
@@ -83,48 +86,38 @@ def _remark_on_size(f: Finding, where: NDArray[np.intp]) -> str:
     return f", but stays below the {_declared(f)} declared to matter"
 
 
-def _equal(f: Finding) -> list[str]:
-    where = np.flatnonzero(f.holds_zero & (f.bounds == 0))
-    return [f"{_there(f, where)}both are equal"] if len(where) else []
+def _elsewhere(f: Finding) -> Iterator[str]:
+    """Where the band holds zero: both are equal, an effect of some size is ruled out, or none."""
+    is_equal = f.holds_zero & (f.bounds == 0)
+    is_settled = f.holds_zero & ~is_equal & ~f.is_open
+    kinds: list[tuple[NDArray[np.bool_], Callable[[float], str]]] = [
+        (is_equal, lambda _: "both are equal"),
+        (is_settled, partial(_ruled_out, f)),
+        (f.is_open, partial(_left_open, f)),
+        (~np.isfinite(f.low), lambda _: "runs are missing"),
+    ]
+    for chosen, told in kinds:
+        where = np.flatnonzero(chosen)
+        if len(where):
+            yield f"{places(f, where)} {told(float(f.bounds[where].max()))}".lstrip()
 
 
-def _settled(f: Finding) -> list[str]:
-    """Where an effect of some size is ruled out."""
-    bounds = f.bounds
-    where = np.flatnonzero(f.holds_zero & (bounds > 0) & ~f.is_open)
-    if not len(where):
-        return []
-    bound = quantity(max(float(bounds[where].max()), _LEAST), f.unit)
+def _ruled_out(f: Finding, bound: float) -> str:
     matters = f", less than the {_declared(f)} declared to matter" if f.smallest_effect else ""
-    return [f"{_there(f, where)}any effect is below {bound}{matters}"]
+    return f"any effect is below {quantity(max(bound, _LEAST), f.unit)}{matters}"
 
 
-def _undecided(f: Finding) -> list[str]:
-    """Nothing is ruled out: say how large an effect may be, unless as large as it ever can."""
-    bounds = f.bounds
-    where = np.flatnonzero(f.is_open)
-    if not len(where):
-        return []
-    bound, still = float(bounds[where].max()), f"{_there(f, where)}the question stays open"
+def _left_open(f: Finding, bound: float) -> str:
+    """How large an effect may be, unless as large as it ever can."""
     if bound >= f.widest:
-        return [f"{still}: {f.persons} {f.cluster}s rule out nothing at all, more are needed"]
-    more = f"so more {f.cluster}s are needed"
-    return [f"{still}: up to {quantity(bound, f.unit)} is not ruled out, {more}"]
-
-
-def _there(f: Finding, where: NDArray[np.intp]) -> str:
-    """`up to 100 ms `, or nothing where there is but one place."""
-    there = places(f, where)
-    return f"{there} " if there else ""
+        why = f"{f.persons} {f.cluster}s rule out nothing at all, more are needed"
+    else:
+        why = f"up to {quantity(bound, f.unit)} is not ruled out, so more {f.cluster}s are needed"
+    return f"the question stays open: {why}"
 
 
 def _declared(f: Finding) -> str:
     return level_name(f.measure, f.smallest_effect)
-
-
-def _unpaired(f: Finding) -> list[str]:
-    missing = np.flatnonzero(~np.isfinite(f.low))
-    return [f"{_there(f, missing)}runs are missing"] if len(missing) else []
 
 
 def _without_band(f: Finding) -> str:

@@ -79,9 +79,12 @@ def stages_of(view: StudyView) -> dict[str, Floats]:
         return found
     stands, wait = part.grid("delay_sampling_s"), np.zeros_like(part.grid("delay_sampling_s"))
     if part.has("commands_superseded"):
-        fates = ("sent", "superseded", "applied")
-        sent, replaced, applied = (np.nan_to_num(part.grid(f"commands_{fate}")) for fate in fates)
-        unsent = np.maximum(replaced - (sent - applied), 0.0)  # the robot replaces sent ones, too
+        fates = ("sent", "superseded", "applied", "stale")
+        sent, replaced, applied, stale = (
+            np.nan_to_num(part.grid(f"commands_{fate}")) for fate in fates
+        )
+        # Of those replaced some were sent already, and skipped by the robot.
+        unsent = np.maximum(replaced - np.maximum(sent - applied - stale, 0.0), 0.0)
         wait = stands * unsent / np.maximum(sent + unsent, 1.0)
     before = part.grid("delay_pattern_s") if part.has("delay_pattern_s") else 0.0
     found |= {"delay_period_s": stands - wait, "delay_wait_s": wait + before}
