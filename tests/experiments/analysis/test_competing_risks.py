@@ -10,7 +10,7 @@ from helpers.wording import unnamed
 from dva_sim.experiments.analysis.competing_risks import NOTHING, Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView, finding_of
-from dva_sim.experiments.report.figures.outcomes import EndingsInTime
+from dva_sim.experiments.report.figures.endings import EndingsInTime
 from dva_sim.experiments.report.outcome_table import in_a_line, sentences, table
 
 LEVELS = ("short", "long")

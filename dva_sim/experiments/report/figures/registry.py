@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Final
 
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import (
-    budget,
+    answer_figure,
     commands,
-    contrast,
+    delay_budget,
     distribution,
     effect,
+    endings,
     factorial,
     heat_map,
-    outcomes,
     repeats,
     scatter,
     shift,
-    site_map,
     story,
     time_lapse,
     tradeoff,
+    trajectories,
     transport,
 )
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, styled
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
-    contrast.AnswerFigure,
+    answer_figure.AnswerFigure,
     distribution.Distributions,
     effect.Differences,
     effect.Levels,
@@ -46,12 +46,12 @@ SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
     scatter.Scatter,
     scatter.Sobol,
     repeats.RepeatsFigure,
-    budget.DelayBudget,
+    delay_budget.DelayBudget,
     commands.CommandAge,
     commands.CommandRate,
     tradeoff.TradeOff,
-    outcomes.EndingsInTime,
-    site_map.Trajectories,
+    endings.EndingsInTime,
+    trajectories.Trajectories,
     time_lapse.TypicalRun,
     time_lapse.WorstRun,
     story.StoryTimes,
