@@ -6,15 +6,16 @@ import pytest
 from helpers.studies import synthetic_results
 from helpers.studies.report_text import blank_pictures
 from helpers.wording import unnamed
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from dva_sim.experiments.analysis.cadence import Cadence
 from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
 from dva_sim.experiments.analysis.study_view import StudyView
-from dva_sim.experiments.report.figures.budget import DelayBudget, stages_of
+from dva_sim.experiments.report.figures.answer_figure import AnswerFigure
 from dva_sim.experiments.report.figures.commands import CommandAge, CommandRate
-from dva_sim.experiments.report.figures.contrast import AnswerFigure
 from dva_sim.experiments.report.figures.cut_bars import fit_to
+from dva_sim.experiments.report.figures.delay_budget import DelayBudget, stages_of
 from dva_sim.experiments.report.figures.distribution import Distributions
 from dva_sim.experiments.report.figures.effect import Differences, Levels, _band, _possible
 from dva_sim.experiments.report.figures.factorial import FactorialEffects
@@ -22,7 +23,6 @@ from dva_sim.experiments.report.figures.heat_map import HeatMap
 from dva_sim.experiments.report.figures.keys import apart, columns_of
 from dva_sim.experiments.report.figures.palette import ONE
 from dva_sim.experiments.report.figures.scatter import trend
-from dva_sim.experiments.report.figures.site_map import DrivenWays
 from dva_sim.experiments.report.figures.story import Events, StoryOutcomes, StoryTimes, fates
 from dva_sim.experiments.report.figures.style import (
     ASIDE,
@@ -35,6 +35,7 @@ from dva_sim.experiments.report.figures.style import (
     styled,
 )
 from dva_sim.experiments.report.figures.tradeoff import TradeOff
+from dva_sim.experiments.report.figures.trajectories import DrivenWays
 from dva_sim.experiments.report.figures.transport import Brought
 from dva_sim.experiments.report.spread_table import spread_table
 from dva_sim.statistics import band
@@ -358,6 +359,19 @@ def test_an_axis_that_is_logarithmic_says_so_and_has_a_tick_at_what_matters(view
         assert ax.get_yscale() in ("log", "symlog")
         assert "log scale" in ax.get_ylabel()
     assert {-0.2, 0.0, 0.2} <= set(drawn[0].axes[0].get_yticks())
+
+
+@blank
+@pytest.mark.parametrize(("persons", "boxes"), [(4, 0), (5, 2 * 6 * 3)])
+def test_quarters_are_drawn_of_five_runs_and_not_made_up_of_fewer(persons, boxes):
+    rows = synthetic_results.drive_rows(persons, 1)
+    part = RunGrid(synthetic_results.columns(rows), "drive", [PATTERN, DELAY, PROFILE])
+    whole = StudyView(part, "drive_time_s", PATTERN, DELAY, None, {"profile": "default"})
+    with styled():
+        figure = Distributions().draw(whole, NOTHING_ELSE).figure
+    sides = [c for c in figure.axes[0].collections if isinstance(c, LineCollection)]
+    upright = [s for c in sides for s in c.get_segments() if s[0][0] == s[1][0]]
+    assert len(upright) == boxes  # two sides of each box
 
 
 @blank

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 
 _CROWD = 60  # runs of a cell from which on dots must be small
+_FEWEST = 5  # runs of a cell: quarters of fewer are made up between them
 _GOLDEN = 0.6180339887498949
 
 
@@ -101,8 +102,8 @@ def _dots(
 
 
 def _boxes(ax: Axes, offset: float, width: float, values: Floats) -> None:
-    """Median and middle half of each stop `(stops, runs)`, where there are runs."""
-    stops = np.flatnonzero(np.isfinite(values).any(axis=1))
+    """Median and middle half of each stop `(stops, runs)`, where there are runs enough for them."""
+    stops = np.flatnonzero(np.isfinite(values).sum(axis=1) >= _FEWEST)
     if not len(stops):
         return
     low, middle, high = np.nanquantile(values[stops], [0.25, 0.5, 0.75], axis=1)
