@@ -8,7 +8,6 @@ Callbacks are scheduled directly: a process per packet costs three times as much
 from __future__ import annotations
 
 from collections.abc import Callable
-from heapq import heappop, heappush
 from typing import Any
 
 import simpy
@@ -22,13 +21,13 @@ class Clock:
     Times are seconds [s] since the run's start; they are kept to the microsecond.
 
     Attributes:
+        env: SimPy's environment in microseconds; its time is that of the last event.
         now: Seconds since the start [s].
     """
 
     def __init__(self) -> None:
         self.env = simpy.Environment(initial_time=0)
-        self._queue: Any = self.env._queue  # of when [us], in which order, what, with what
-        self.now = 0.0
+        self.now, self._now_us = 0.0, 0
 
     def call_at(self, time: float, action: Callable[..., object], *args: Any) -> None:
         """Run `action(*args)` at `time` [s]; a time already past means as soon as possible."""
@@ -42,37 +41,38 @@ class Clock:
         self, period: float, action: Callable[[], object], start: float | None = None
     ) -> None:
         """Run `action()` each `period` [s] until it returns `False`; first at `start` [s]."""
-        env, queue, step = self.env, self._queue, max(1, round(period * US))
+        env, step = self.env, max(1, round(period * US))
 
-        def tick() -> None:
+        def tick(_: simpy.Event) -> None:
+            self._set(int(env.now))
             if action() is not False:
-                heappush(queue, (env._now + step, next(env._eid), tick, ()))
+                env.timeout(step).callbacks.append(tick)
 
-        self._put(env._now if start is None else round(start * US), tick, ())
+        first = self._now_us if start is None else max(self._now_us, round(start * US))
+        env.timeout(first - env.now).callbacks.append(tick)
 
     def run(self, until: float) -> None:
         """Let time pass up to `until` [s]; what is due then happens when time goes on."""
-        end, env, queue = round(until * US), self.env, self._queue
+        end, env = round(until * US), self.env
         if until > self.now:
-            while queue and queue[0][0] < end:
-                env._now, _, action, args = heappop(queue)  # as in `step`, without its call
-                self.now = env._now / US
-                action(*args)
+            while env.peek() < end:
+                env.step()
             self._set(end)
 
     def step(self) -> None:
         """Let the next event happen."""
-        env = self.env
-        env._now, _, action, args = heappop(self._queue)
-        self.now = env._now / US
-        action(*args)
+        self.env.step()
 
-    def _put(self, at: float, action: Callable[..., object], args: tuple[Any, ...]) -> None:
+    def _put(self, at: int, action: Callable[..., object], args: tuple[Any, ...]) -> None:
         """It is due at a time [us], after all that was put there before."""
-        env = self.env
-        now = env._now
-        heappush(self._queue, (at if at > now else now, next(env._eid), action, args))
+        env, now = self.env, self._now_us
 
-    def _set(self, now: float) -> None:
+        def call(_: simpy.Event) -> None:
+            self._set(int(env.now))
+            action(*args)
+
+        env.timeout((at if at > now else now) - env.now).callbacks.append(call)
+
+    def _set(self, now: int) -> None:
         """It is that time [us], and nothing before it is due."""
-        self.env._now, self.now = now, now / US
+        self._now_us, self.now = now, now / US

@@ -154,14 +154,13 @@ class LiveClock(Clock):
         self._running = True
         end = math.inf if math.isinf(until) else round(until * US)
         self._catch_up(end)
-        while self._running and self.env._now < end:
+        while self._running and self._now_us < end:
             self._wait(end)
         self._running = False
 
     def _wait(self, end: float) -> None:
         """Wait for the next event or message; events that are due by then go first."""
-        queue = self._queue
-        due = queue[0][0] if queue and queue[0][0] < end else end
+        due = min(self.env.peek(), end)
         wait = (due - self._real()) / US
         wait = 0.0 if wait < 0.0 else wait if wait < LONGEST_WAIT else LONGEST_WAIT
         ready = self._poller.poll(wait)
@@ -170,24 +169,25 @@ class LiveClock(Clock):
             handler = self._handlers.get(source)
             if handler is not None:  # nobody unwatched it since
                 handler()
-        if queue and queue[0][0] <= self.env._now:
+        if self.env.peek() <= self._now_us:
             self._catch_up(end)
 
     def _catch_up(self, end: float) -> None:
         """Let the events happen that are due, in their order, then make it now."""
-        env, queue, real = self.env, self._queue, self._real()
+        env, real = self.env, self._real()
         until = real if real < end else end
         for _ in range(AT_ONCE):
-            if not queue or queue[0][0] > until:
+            due = env.peek()
+            if due > until:
                 break
-            self.lateness = max(self.lateness, (real - queue[0][0]) / US)
+            self.lateness = max(self.lateness, (real - due) / US)
             self.step()
             if not self._running:
                 return
         # Never beyond the next event, whose own step would turn time back.
-        until = queue[0][0] if queue and queue[0][0] < until else until
-        if until > env._now:
-            self._set(until)
+        until = min(env.peek(), until)
+        if until > self._now_us:
+            self._set(int(until))
 
     def _real(self) -> int:
         return time.monotonic_ns() // 1000 - self._origin
@@ -238,7 +238,7 @@ class PacedClock(LiveClock):
 
     def go(self) -> None:
         """Virtual time goes on from where it is, whatever real time has passed: it begins now."""
-        self._rebase(int(self.env._now))
+        self._rebase(int(self._now_us))
         self._worst = 0.0
 
     def worst_lag(self) -> float:
@@ -288,7 +288,7 @@ class PacedClock(LiveClock):
             self.step()
             if not self._running:
                 return
-        self._set(max(env._now, min(self._real(), end, env.peek())))
+        self._set(int(max(self._now_us, min(self._real(), end, env.peek()))))
 
     def _look_behind(self, due: int) -> None:
         """By how much an event comes too late that was due at a time."""

@@ -387,7 +387,7 @@ def test_without_hazards_nobody_looks_at_the_air_and_standing_people_cost_nothin
     building = Building()
     building.bystander()
     building.pass_time(100.0)
-    assert not building.clock.env._queue
+    assert building.clock.env.peek() == math.inf
 
 
 # --- while nothing is wrong ------------------------------------------------------------

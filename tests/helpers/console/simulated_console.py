@@ -24,7 +24,7 @@ class VirtualPace(PacedClock):
     def run(self, until):
         while self.env.peek() <= round(until * US):
             self.step()
-        self._set(max(self.env._now, round(until * US)))
+        self._set(max(self._now_us, round(until * US)))
 
     def _catch_up(self, end):
         pass
