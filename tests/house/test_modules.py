@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -189,25 +190,59 @@ def _faults_of_import(names: Iterable[str]) -> Iterator[str]:
 
 
 def _faults_of_call(call: ast.Call) -> Iterator[str]:
-    called = ast.unparse(call.func)
-    if called in ("gc.set_threshold", "set_threshold"):
+    called = getattr(call.func, "attr", getattr(call.func, "id", ""))
+    if called == "set_threshold":
         yield "sets when garbage is looked for"
     given = 0
     for each in call.args:
         spread = isinstance(each, ast.Starred) and isinstance(each.value, ast.Tuple | ast.List)
         given += len(each.value.elts) if spread else 1
-    if given > MOST_ARGUMENTS and called.rpartition(".")[2] not in VARIADIC:
+    if given > MOST_ARGUMENTS and called not in VARIADIC:
         yield f"may exchange arguments: {called} with {given} by their place"
 
 
+OF_TUPLES = {"_asdict", "_fields", "_make", "_replace"}
+DOCUMENTED = {"_Element", "_ElementTree", "_exit", "_repr_html_"}
+"""What has no other name: of lxml, of `os`, of pandas."""
+
+
+def read_of_others(nodes: Iterable[ast.AST]) -> set[str]:
+    """Private names that are read or set of something else, and which none of ours has."""
+    own, others = set(), set()
+    for node in nodes:
+        if isinstance(node, ast.Attribute):
+            if node.attr.startswith("_") and not node.attr.startswith("__"):
+                is_own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+                is_of_base = ast.unparse(node.value) == "super()"
+                (own if is_own or is_of_base else others).add(node.attr)
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            own.add(node.name)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            own.add(node.id)
+    return others - own - OF_TUPLES - DOCUMENTED
+
+
 def test_no_module_does_what_none_should():
-    found = {}
+    found, every = {}, []
     for name, path in MODULES.items():
         room = name.split(".")[1] if "." in name else ""
-        faults = [f for node in ast.walk(tree_of(path)) for f in faults_of(node, room)]
+        nodes = list(ast.walk(tree_of(path)))
+        faults = [fault for node in nodes for fault in faults_of(node, room)]
+        every.append(nodes)
         if faults:
             found[name] = faults
     assert found == {"dva_sim.kernel.rare_collection": ["sets when garbage is looked for"]}
+    assert read_of_others(chain.from_iterable(every)) == set()
+
+
+@pytest.mark.parametrize(
+    "read", ["self._pool._processes", "env._eid", "pool()._queue", "param._made"]
+)
+def test_a_private_name_that_none_of_ours_has_is_found_where_it_is_read(read):
+    own = "class Own:\n    def _mine(self): self._kept = other._kept, other._mine(), os._exit\n"
+    assert read_of_others(ast.walk(ast.parse(own))) == set()
+    for use in (read, f"{read} = 1"):
+        assert read_of_others(ast.walk(ast.parse(own + use))) == {read.rpartition(".")[2]}
 
 
 @pytest.mark.parametrize(
