@@ -6,14 +6,13 @@ Seats are given out here. Whatever ends a drive ends it for good: nothing begins
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.alarm_actions import AlarmActions
-from dva_sim.console.answers import BYE, Answers, answering
+from dva_sim.console.answers import BYE
 from dva_sim.console.audited import name_of_page
+from dva_sim.console.dispatcher import ActionDispatcher, does
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
 from dva_sim.console.refusal import Refused, Said
@@ -22,13 +21,13 @@ from dva_sim.console.room_actions import RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Seats
 from dva_sim.console.sliders import change_pattern
 from dva_sim.console.tour import tour_of
+from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.arguments import FASTEST
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.network.patterns import PATTERNS
-from dva_sim.network.realtime import FASTEST
 
 Line = dict[str, Any]
 
-LONGEST_LEG = 3600.0  # of the tour [s]
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
 
@@ -37,11 +36,14 @@ class Actions:
 
     Args:
         world: In which.
+
+    Attributes:
+        take: Does what a line asks for.
     """
 
     def __init__(self, world: ConsoleWorld) -> None:
         self._world = world
-        self._seats, self._answers = Seats(), Answers()
+        self._seats = Seats()
         self._phones = PhoneActions(world, self._seats, self._robot, self._stop_one)
         self._rooms = RoomActions(world, self._seats, self._robot, self._take)
         self._at_robots = RobotActions(
@@ -52,63 +54,15 @@ class Actions:
             deaf=world.deafen,
             slow=world.run.slowed,
         )
+        guards = GuardActions(world)
+        alarms = AlarmActions(world.alarms, world.author, lambda *given: dispatcher.do(*given))
+        holders = self, self._phones, self._at_robots, guards, self._rooms, alarms, world.dva
+        dispatcher = ActionDispatcher(
+            *(ActionPlace.WORLD, holders, self._tell, "no action {what!r}"), lambda: world.audited
+        )
+        self.take = dispatcher.take
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)
-        self._doers: dict[str, Callable[[str, Line, Said], object]] = {
-            "take": self._take,
-            "release": self._release,
-            "start": self._start,
-            "stop": self._stop,
-            "emergency": self._emergency,
-            "link": self._link,
-            "pattern": self._pattern,
-            "pace": self._pace,
-            "confirm": lambda client, _, said: self._person(client).report("confirmed", said),
-            "refute": lambda client, _, said: self._person(client).report("refuted", said),
-            "decline": self._decline,
-            "tour": self._tour,
-            "tour_time": self._tour_time,
-            **self._phones.doers,
-            **self._at_robots.doers,
-            **GuardActions(world).doers,
-            **self._rooms.doers,
-            **AlarmActions(
-                world.alarms, world.author, self._rooms.doers["event_acknowledge"]
-            ).doers,
-            **world.dva.doers,
-        }
-
-    def take(self, line: Line) -> None:
-        """Do what a line asks for; nothing that it can hold does any harm."""
-        what, client = line.get("do"), str(line.get("client", ""))
-        if what == "input":
-            self._input(client, line)
-        elif what == "manual":
-            self._at_robots.input(client, line)
-        elif what == "samples":
-            self._drew(client, line.get("seen"))
-            self._phones.samples(client, line)
-        elif what == "gone":
-            self._gone(client)
-        elif what == "watch":
-            self._watch(line.get("robots"))
-        elif what == "look":
-            self._look(line.get("logs"), line.get("tables"))
-        elif isinstance(number := line.get("id"), str):
-            self._answers.once(
-                number,
-                partial(self._do, client, str(what), line),
-                self._tell,
-                repeats=what == "emergency",
-            )
-
-    def _do(self, client: str, what: str, line: Line, said: Said) -> None:
-        do = self._doers.get(what)
-        if do is None:
-            raise Refused(f"no action {what!r}")
-        if self._world.audited is not None:
-            said = self._world.audited.answered(what, client, line, said)
-        answering(partial(do, client, line), said)
 
     def _tell(self, answer: Line) -> None:
         self._world.tell({**answer, "t": self._world.feed.now_ms})
@@ -122,6 +76,7 @@ class Actions:
             raise Refused("You are not controlling a robot. Take control first.")
         return self._world.person(seat.number)
 
+    @does("take")
     def _take(self, client: str, line: Line, said: Said) -> None:
         robots = self._robots(line)
         number = self._seats.sit(client, self._world.seat_of_order(robots))
@@ -159,6 +114,7 @@ class Actions:
         none = " No robot was taken." if len(robots) > 1 else ""
         return f"{'; '.join(named)}: release it there, or take it over on the page Events.{none}"
 
+    @does("release")
     def _release(self, client: str, line: Line, said: Said) -> None:
         if str(line["id"]).startswith(BYE):
             self._phones.forget(client)
@@ -190,10 +146,10 @@ class Actions:
 
     def _robots(self, line: Line) -> list[str]:
         """Ids of the robots that a line names by their numbers or labels."""
-        given = line.get("robots")
+        given = line.get("robots", "all")
         if given == "all":
             return list(self._world.run.field.robots)
-        if not isinstance(given, list) or not given:
+        if not given:
             raise Refused("no robot is named")
         return list(dict.fromkeys(self._robot(one) for one in given))
 
@@ -201,9 +157,7 @@ class Actions:
         world = self._world
         for robot in world.run.field.robots.values():
             number = world.feed.numbers[robot.device.id_tag]
-            if given in (robot.device.label, robot.device.id_tag) or (
-                isinstance(given, int) and not isinstance(given, bool) and given == number
-            ):
+            if given in (robot.device.label, robot.device.id_tag, number):
                 return robot.device.id_tag
         raise Refused(f"there is no robot {given!r}")
 
@@ -215,6 +169,7 @@ class Actions:
             return "held: this machine cannot keep up with real time"
         return "The simulation is paused. Resume it first." if self._world.clock.paused else ""
 
+    @does("start")
     def _start(self, client: str, _: Line, said: Said) -> None:
         person = self._person(client)
         if why := self._why_not():
@@ -222,9 +177,11 @@ class Actions:
         person.alert = ""
         person.start(said)
 
+    @does("stop")
     def _stop(self, client: str, _: Line, said: Said) -> None:
         self._person(client).stop(said)
 
+    @does("emergency")
     def _emergency(self, client: str, line: Line, said: Said) -> None:
         seat = self._seats.taken.get(client)
         if "robots" not in line and seat is not None:
@@ -238,31 +195,35 @@ class Actions:
                 person.ended_by_others(robots)
         own.emergency(robots, said)
 
-    def _drew(self, client: str, seen: Any) -> None:
+    def _drew(self, client: str, line: Line) -> None:
         """Note which picture of each robot a page has drawn last, if it says so."""
         seat = self._seats.taken.get(client)
-        if seat is None or not isinstance(seen, list):
+        if seat is None or "seen" not in line:
             return
-        drawn = {pair[0]: pair[1] for pair in seen if _is_drawn(pair)}
+        drawn = dict(line["seen"])
         for robot, held in self._world.person(seat.number).robots.items():
             held.drew(drawn.get(self._world.feed.numbers.get(robot)))
 
+    @does("samples")
+    def _samples(self, client: str, line: Line) -> None:
+        self._drew(client, line)
+        self._phones.samples(client, line)
+
+    @does("input")
     def _input(self, client: str, line: Line) -> None:
-        """What a person wants now; what is no number wants to stand."""
-        self._drew(client, line.get("seen"))
-        speed, turn, number = line.get("speed"), line.get("turn"), line.get("n")
-        held = line.get("held") is True
+        """What a person wants now; who does not hold on wants to stand."""
+        self._drew(client, line)
+        held = line["held"]
         if not held and self._phones.is_tilted(client):
             return  # a stick that nobody touches does not take a tilted phone's place
-        if not (held and _is_share(speed, 0.0) and _is_share(turn, -1.0)):
-            speed = turn = 0.0
+        speed, turn = (line["speed"], line["turn"]) if held else (0.0, 0.0)
         if self._seats.heard(client, time.monotonic(), held):
-            count = number if isinstance(number, int) else 0
-            self._person(client).want(count, float(speed or 0.0), float(turn or 0.0))
+            self._person(client).want(line["n"], speed, turn)
             if not held:
                 self._phones.let_go(client)
 
-    def _gone(self, client: str) -> None:
+    @does("gone")
+    def _gone(self, client: str, _: Line) -> None:
         """The page is hidden, or its socket closed: nobody has a hand on it."""
         self._at_robots.gone(client)
         self._stop_one(client, "stopped: the page was hidden, left or cut off")
@@ -299,6 +260,15 @@ class Actions:
         for client in list(self._seats.taken):
             self._stop_one(client, why)
 
+    @does("confirm")
+    def _confirm(self, client: str, _: Line, said: Said) -> None:
+        self._person(client).report("confirmed", said)
+
+    @does("refute")
+    def _refute(self, client: str, _: Line, said: Said) -> None:
+        self._person(client).report("refuted", said)
+
+    @does("decline")
     def _decline(self, client: str, _: Line, said: Said) -> None:
         """Of the own seat, or of one in which nobody sits."""
         if client in self._seats.taken:
@@ -311,9 +281,11 @@ class Actions:
 
     # --- what can be changed ---------------------------------------------------------------
 
+    @does("link")
     def _link(self, _: str, line: Line, said: Said) -> None:
         said(True, self._world.change_link(line))
 
+    @does("pattern")
     def _pattern(self, _: str, line: Line, said: Said) -> None:
         robot, name = self._robot(line.get("robot")), line.get("name")
         world = self._world
@@ -326,21 +298,21 @@ class Actions:
 
         change_pattern(world.run, world.persons, robot, str(name), changed)
 
+    @does("pace")
     def _pace(self, _: str, line: Line, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if self._world.run.is_real:
             raise Refused("the links are real: time goes by as it does outside")
-        if factor is not None and not _is_share(factor, 1.0, FASTEST):
+        if factor is not None and factor < 1.0:
             raise Refused(f"factor should be a number from 1 to {FASTEST:g}")
-        if paused is not None and not isinstance(paused, bool):
-            raise Refused("paused should be true or false")
         if paused:
             self._stop_all("stopped: time stands still")
         clock = self._world.clock
-        clock.pace(None if factor is None else float(factor), paused)
+        clock.pace(factor, paused)
         now = "time stands still" if clock.paused else f"{clock.factor:g} times real time"
         said(True, now)
 
+    @does("tour")
     def _tour(self, _: str, line: Line, said: Said) -> None:
         plan = tour_of(self._world.run, self._world.feed.numbers)
         if plan is None:
@@ -349,40 +321,25 @@ class Actions:
             )
         said(True, "two goals", tour=plan)
 
+    @does("tour_time")
     def _tour_time(self, client: str, line: Line, said: Said) -> None:
-        robot, took = self._robot(line.get("robot")), line.get("took_s", -1.0)
+        robot, took = self._robot(line["robot"]), line["took_s"]
         log = self._world.recorder.newest_drive.get(robot)
         if log is None or log.operator != self._person(client).device.id_tag:
             raise Refused("You have not driven this robot.")
-        if not _is_share(took, 0.0, LONGEST_LEG):
-            raise Refused(f"took_s should be a number from 0 to {LONGEST_LEG:g}")
-        log.by = log.by._replace(tour_time=float(took))
+        log.by = log.by._replace(tour_time=took)
         said(True, f"{took:.1f} s noted")
 
-    def _watch(self, robots: Any) -> None:
-        numbers = robots if isinstance(robots, list) else []
-        ids = {t["id"] for t in self._world.feed.things if t["i"] in numbers}
+    @does("watch")
+    def _watch(self, _: str, line: Line) -> None:
+        ids = {t["id"] for t in self._world.feed.things if t["i"] in line["robots"]}
         self._world.screens.watch(ids)
 
-    def _look(self, logs: Any, tables: Any) -> None:
-        if isinstance(logs, dict) and isinstance(tables, list):
-            self._world.logs.look({str(name): bool(all_) for name, all_ in logs.items()})
-            self._world.dva.looked = "devices" in tables
+    @does("look")
+    def _look(self, _: str, line: Line) -> None:
+        self._world.logs.look(line["logs"])
+        self._world.dva.looked = "devices" in line["tables"]
 
 
 def _nobody(ok: bool, text: str) -> None:
     """Takes the answer to what nobody asked for."""
-
-
-def _is_share(value: Any, least: float, most: float = 1.0) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and least <= value <= most
-
-
-def _is_drawn(pair: Any) -> bool:
-    """Return True for a robot's index with the time of a picture [ms]."""
-    return (
-        isinstance(pair, list)
-        and len(pair) == 2
-        and all(isinstance(one, int) and not isinstance(one, bool) for one in pair)
-    )

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.console.alarm_desk import AlarmDesk
+from dva_sim.console.dispatcher import Doer, does
 from dva_sim.console.refusal import Said
 
 Line = dict[str, Any]
-Doer = Callable[[str, Line, Said], object]
 
 
 class AlarmActions:
@@ -24,12 +24,8 @@ class AlarmActions:
 
     def __init__(self, desk: AlarmDesk, author: Callable[[str], str], acknowledge: Doer) -> None:
         self._desk, self._author, self._acknowledge_event = desk, author, acknowledge
-        self.doers: Mapping[str, Doer] = {
-            "alarm_acknowledge": self._acknowledge,
-            "alarm_shelve": self._shelve,
-            "alarm_unshelve": self._unshelve,
-        }
 
+    @does("alarm_acknowledge")
     def _acknowledge(self, client: str, line: Line, said: Said) -> None:
         """What an open event is behind is acknowledged at the DVA, all else here."""
         keys = self._desk.members(line["alarm"])
@@ -43,13 +39,16 @@ class AlarmActions:
         answers = Gathered(len(events), said)
         for number in events.values():
             about = {"do": "event_acknowledge", "event": number, "id": f"{line['id']} {number}"}
-            self._acknowledge_event(client, line | about, answers)
+            who = {key: line[key] for key in ("client", "role") if key in line}
+            self._acknowledge_event(client, who | about, answers)
 
+    @does("alarm_shelve")
     def _shelve(self, client: str, line: Line, said: Said) -> None:
         keys = self._desk.members(line["alarm"])
         self._desk.shelve(keys, line["for_s"], self._author(client))
         said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
 
+    @does("alarm_unshelve")
     def _unshelve(self, client: str, line: Line, said: Said) -> None:
         self._desk.unshelve(self._desk.members(line["alarm"]))
         said(True, "back in the list")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.kernel.errors import DvaSimError
 
 Line = dict[str, Any]
@@ -71,5 +72,5 @@ def answering(do: Callable[[Said], object], said: Said) -> None:
     """Do something of which somebody waits to hear; if it is refused, that is the answer."""
     try:
         do(said)
-    except (Refused, DvaSimError) as error:
+    except (Refused, BadMessage, DvaSimError) as error:
         said(False, str(error))

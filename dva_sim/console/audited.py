@@ -10,30 +10,13 @@ from typing import Any, Final
 
 from dva_sim.console.audit_keeper import AuditKeeper
 from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.wire.actions import ACTIONS, Action, Audit
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.audit_log import AuditEntry
 
 Line = dict[str, Any]
 
-# What people do beside the DVA's decisions, which tells of its own.
-ACTIONS: Final = frozenset(
-    [
-        *("take", "release", "start", "stop", "emergency", "link", "pattern", "pace"),
-        *("confirm", "refute", "decline", "take_over", "mission"),
-        *("phone_register", "phone_permission", "guard_join", "guard_leave", "guard_answer"),
-        *("guard_say", "guard_report", "room_join"),
-        *("alarm_acknowledge", "alarm_shelve", "alarm_unshelve"),
-        *("server_start", "server_stop", "revoke", "fake_add", "fake_remove"),
-    ]
-)
-DECISIONS: Final = frozenset(
-    [
-        *("event_raise", "event_acknowledge", "event_assign", "event_take_off"),
-        *("event_false_alarm", "event_escalate", "event_note", "dispatch_mode"),
-    ]
-)
-STOPS: Final = frozenset(["stop", "emergency", "release", "guard_leave"])
 DONE, REFUSED = "done", "refused"
 _HEAD: Final = frozenset(["id", "do", "client", "role", "robots", "robot", "event", "reason"])
 SECRET: Final = frozenset(["server", "port"])
@@ -46,12 +29,7 @@ class Audited:
         keeper: Of the file.
         author: What the person of a page is called.
         label: The name of a device, by its id.
-
-    Attributes:
-        noted: Actions whose end is noted here; of all others the DVA tells.
     """
-
-    noted: frozenset[str] = ACTIONS
 
     def __init__(
         self,
@@ -68,16 +46,17 @@ class Audited:
         Raises:
             Refused: the log cannot be written, and the action stops nothing.
         """
-        if what not in ACTIONS | DECISIONS:
+        action = ACTIONS[what]
+        if isinstance(action.audit, str):
             return said
-        if self.keeper.problem and what not in STOPS:
+        if self.keeper.problem and not action.stops:
             raise Refused(f"{self.keeper.problem}; nothing is done until it can be")
 
         def told(ok: bool, text: str, /, **more: Any) -> None:
-            if what in self.noted:
+            if self.is_noted(action):
                 outcome = more.get("outcome", DONE if ok else REFUSED)
                 self._note(what, client, line, outcome, text)
-            if what in STOPS:
+            if action.stops:
                 said(ok, text, **more)
                 return
 
@@ -90,6 +69,10 @@ class Audited:
             self.keeper.when_safe(safe)
 
         return told
+
+    def is_noted(self, action: Action) -> bool:
+        """Return True if an action has a row of its own; of the others the DVA tells."""
+        return action.audit is Audit.OWN
 
     def _note(self, what: str, client: str, line: Line, outcome: str, text: str) -> None:
         robots = line.get("robots") or ([line["robot"]] if "robot" in line else [])

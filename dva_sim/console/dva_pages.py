@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.device_rows import DeviceRows
+from dva_sim.console.dispatcher import does
 from dva_sim.console.dva_port import DvaPort
 from dva_sim.console.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.real_links import ConsoleSockets
@@ -28,7 +29,6 @@ class DvaPages:
 
     Attributes:
         port: Where it listens.
-        doers: What pages may ask for, by its name.
         looked: Whether somebody looks at the table of devices.
     """
 
@@ -47,13 +47,6 @@ class DvaPages:
         self._fakes = FakeDevices(
             self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
         )
-        self.doers: Mapping[str, Callable[[str, Line, Said], object]] = {
-            "server_start": self._start,
-            "server_stop": self._stop,
-            "revoke": self._revoke,
-            "fake_add": lambda _, line, said: self._fakes.add(line, said),
-            "fake_remove": self._remove,
-        }
 
     def devices(self, now_ms: int) -> Line | None:
         """The table, once a second; None if nobody looks."""
@@ -62,21 +55,21 @@ class DvaPages:
         rows = self._rows.rows(self._fakes.devices)
         return {"k": "devices", "t": now_ms, "devices": rows}
 
+    @does("server_start")
     def _start(self, _: str, line: Line, said: Said) -> None:
-        port = line.get("port")
-        if not isinstance(port, int) or not 1 <= port <= 65_534:
-            raise Refused("port should be a whole number from 1 to 65534")
-        self.port.start(port)
+        self.port.start(line["port"])
         self._moved(self.port.address)
         said(True, f"the server listens on {self.port.address}")
 
+    @does("server_stop")
     def _stop(self, _: str, __: Line, said: Said) -> None:
         self.port.stop()
         said(True, "the server is stopped")
 
+    @does("revoke")
     def _revoke(self, _: str, line: Line, said: Said) -> None:
-        robot = line.get("device")
-        grant = self._run.dva.desk.sessions.permissions.grants.get(str(robot))
+        robot = line["device"]
+        grant = self._run.dva.desk.sessions.permissions.grants.get(robot)
         if grant is None:
             raise Refused(f"nobody has a permission for {robot}")
         self._run.dva.revoke(grant.robot, None, holder_told=True)
@@ -86,8 +79,13 @@ class DvaPages:
             True, f"{holder} has no permission for {labels.get(grant.robot, grant.robot)} any more"
         )
 
+    @does("fake_add")
+    def _add(self, _: str, line: Line, said: Said) -> None:
+        self._fakes.add(line, said)
+
+    @does("fake_remove")
     def _remove(self, _: str, line: Line, said: Said) -> None:
-        said(True, f"{self._fakes.remove(line.get('device'))} is removed")
+        said(True, f"{self._fakes.remove(line['device'])} is removed")
 
     # --- fake devices ----------------------------------------------------------------------
 

@@ -20,7 +20,6 @@ from dva_sim.protocol.limits import pattern
 RENEW: Final = 3.0  # from one registration to the next: a third of what the DVA bears [s]
 MOST: Final = 64
 NOWHERE: Final = "192.0.2.{}"  # addresses that belong to nobody (RFC 5737)
-TYPES: Final = ("Robot", "Guard", "TeleOp", "Remote Control")
 
 MakeDevice = Callable[[str, str, str, str], AgentDevice]
 
@@ -54,13 +53,10 @@ class FakeDevices:
         Raises:
             Refused: it cannot be.
         """
-        kind = line.get("type")
-        if kind not in TYPES:
-            raise Refused(f"type should be one of {', '.join(TYPES)}")
         if len(self.devices) >= MOST:
             raise Refused(f"there are {MOST} fake devices already: remove one first")
         id_tag, address = self._identity(line)
-        device = self._make(id_tag, str(line.get("label", "")), str(kind), address)
+        device = self._make(id_tag, line["label"], line["type"], address)
         self.devices[id_tag] = device
 
         def answered(reply: m.Reply) -> None:
@@ -81,7 +77,7 @@ class FakeDevices:
             self._drop(device)
             raise Refused(error.reason) from None
 
-    def remove(self, id_tag: Any) -> str:
+    def remove(self, id_tag: str) -> str:
         """Remove one; its label.
 
         Raises:
@@ -115,7 +111,7 @@ class FakeDevices:
         Raises:
             Refused: the id is taken, or is none.
         """
-        wanted = str(line.get("id_tag") or "").strip().upper()
+        wanted = line.get("id_tag", "").strip().upper()
         number = next(n for n in range(1, 1 << 16) if not self._is_taken(self._id_of(n)[0]))
         own, address = self._id_of(number)
         if wanted and not re.fullmatch(pattern("DeviceID"), wanted):
@@ -124,7 +120,7 @@ class FakeDevices:
             )
         if wanted and self._is_taken(wanted):
             raise Refused(f"id {wanted} is taken")
-        return wanted or own, str(line.get("address") or "").strip() or address
+        return wanted or own, line.get("address", "").strip() or address
 
     def _is_taken(self, id_tag: str) -> bool:
         return id_tag in self.devices or self._is_known(id_tag)

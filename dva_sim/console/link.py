@@ -3,40 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 from dva_sim.kernel.config import validate
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.scenario import Scenario, start_needs_s, time_out_s
 
-LIMITS: Final[dict[str, tuple[float, float]]] = {
-    "delay_s": (0.0, 5.0),
-    "jitter_s": (0.0, 1.0),
-    "loss": (0.0, 0.5),
-    "rate_bps": (1e4, 1e9),
-    "processing_s": (0.0, 3.0),
-}
-"""What the sliders reach."""
 _LAWS = ("delay_law", "delay_log")  # of which jitter takes the place
-
-
-def read(given: Mapping[str, Any]) -> dict[str, float]:
-    """The numbers of an action.
-
-    Raises:
-        ConfigError: one that is none, or beyond what the sliders reach.
-    """
-    values: dict[str, float] = {}
-    for key, (least, most) in LIMITS.items():
-        value = given.get(key)
-        if value is None:
-            continue
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not least <= value <= most:
-            raise ConfigError(f"{key} should be a number from {least:g} to {most:g}")
-        values[key] = float(value)
-    return values
 
 
 def changed(link: LinkConfig, wanted: Mapping[str, float]) -> LinkConfig:

@@ -7,25 +7,22 @@ robot. What ends a drive ends it at once, and for good.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.dispatcher import does
 from dva_sim.console.phone_input import samples_of, settings_of
 from dva_sim.console.phone_seat import PhoneSeat
-from dva_sim.console.phones import TYPES
 from dva_sim.console.refusal import NO_ANSWER, Refused, Said
 from dva_sim.console.seats import Seats
 from dva_sim.console.world import ConsoleWorld
-from dva_sim.kernel.labels import visible
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
 
 Line = dict[str, Any]
-LEVELS = ("teleoperation", "missions", "both")
 LIFTED = "stopped: the thumb was lifted"
 TURNED = "stopped: the phone's screen has turned"
-MOST_LETTERS = 64  # of a label or a server's name
 
 
 class PhoneActions:
@@ -47,12 +44,6 @@ class PhoneActions:
     ) -> None:
         self._world, self._seats, self._robot, self._stop = world, seats, robot, stop
         self._phones = world.phones
-        self.doers: Mapping[str, Callable[[str, Line, Said], object]] = {
-            "phone_register": self._register,
-            "phone_devices": self._devices,
-            "phone_permission": self._permission,
-            "phone_calibrate": self._calibrate,
-        }
 
     def sits(self, client: str) -> bool:
         """Whether a page has the seat of a phone, and none of the console."""
@@ -71,9 +62,9 @@ class PhoneActions:
             phone.tilt.let_go()
 
     def samples(self, client: str, line: Line) -> None:
-        """Samples of a phone have come; what makes no sense counts as silence."""
+        """Samples of a phone have come."""
         said, phone = samples_of(line), self._phones.seat(client)
-        if said is None or phone is None:
+        if phone is None:
             return
         if phone.person is None:
             seat = self._seats.taken.get(client)
@@ -103,8 +94,10 @@ class PhoneActions:
 
     # --- who it is -------------------------------------------------------------------------
 
+    @does("phone_register")
     def _register(self, client: str, line: Line, said: Said) -> None:
-        label, kind, address = _identity(line)
+        label, kind = line["label"], line["type"]
+        address = f"{line['server'].strip()}:{line['port']}"
         seat = self._seats.taken.get(client)
         if seat is not None and not self.sits(client):
             raise Refused("this page has a seat of the console: release it first")
@@ -166,6 +159,7 @@ class PhoneActions:
 
     # --- what it asks of the DVA ---------------------------------------------------------------
 
+    @does("phone_devices")
     def _devices(self, client: str, _: Line, said: Said) -> None:
         device = self._device(client)[1].device
 
@@ -178,12 +172,10 @@ class PhoneActions:
 
         device.ask(device.dva, m.GetDeviceList(), answered, lambda: said(False, NO_ANSWER))
 
+    @does("phone_permission")
     def _permission(self, client: str, line: Line, said: Said) -> None:
         _, person = self._device(client)
-        level = line.get("level")
-        if level not in LEVELS:
-            raise Refused(f"level should be one of {', '.join(LEVELS)}")
-        robot = self._asked(line.get("device"))
+        level, robot = line["level"], self._asked(line["device"])
         held = person.robots.get(robot)
         if held is not None and held.level == level:
             said(True, f"{held.label} is yours already")
@@ -199,16 +191,15 @@ class PhoneActions:
 
         person.take([robot], answered, level)
 
-    def _asked(self, given: Any) -> str:
+    def _asked(self, given: str) -> str:
         """The id that is asked for: also of what is no robot, so that the DVA can say so.
 
         Raises:
             Refused: it is no device that anybody knows.
         """
-        if isinstance(given, str) and given in self._world.run.stage.labels:
-            return given
-        return self._robot(given)
+        return given if given in self._world.run.stage.labels else self._robot(given)
 
+    @does("phone_calibrate")
     def _calibrate(self, client: str, line: Line, said: Said) -> None:
         phone = self._phone(client)
         settings = settings_of(line)
@@ -216,26 +207,6 @@ class PhoneActions:
         phone.calibrate(settings)
         later = " from the next drive on" if phone.driven is not None else ""
         said(True, f"calibrated{later}{kept}")
-
-
-def _identity(line: Line) -> tuple[str, str, str]:
-    """Label, type and the address of the DVA that a registration names.
-
-    Raises:
-        Refused: one of them makes no sense.
-    """
-    server, port, label, kind = (line.get(key) for key in ("server", "port", "label", "type"))
-    if not isinstance(server, str) or not 1 <= len(server.strip()) <= MOST_LETTERS:
-        raise Refused(f"server should be an address of 1 to {MOST_LETTERS} characters")
-    if not isinstance(port, int) or isinstance(port, bool) or not 1 <= port <= 65_535:
-        raise Refused("port should be a whole number from 1 to 65535")
-    if not isinstance(label, str) or not 1 <= len(label) <= MOST_LETTERS:
-        raise Refused(f"label should have 1 to {MOST_LETTERS} characters")
-    if not label.isprintable():
-        raise Refused(f"label should have characters that can be seen: {visible(label)}")
-    if kind not in TYPES:
-        raise Refused(f"type should be one of {', '.join(TYPES)}")
-    return label, str(kind), f"{server.strip()}:{port}"
 
 
 def _shown(device: m.Device) -> Line:

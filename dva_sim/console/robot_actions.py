@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dva_sim.agents.robot.controller import Decision
+from dva_sim.console.dispatcher import does
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_windows import RobotWindow, RobotWindows
 from dva_sim.console.seats import SILENT_AFTER
@@ -61,16 +62,12 @@ class RobotActions:
         self._labels, self._deaf, self._slow = labels, deaf, slow
         self._hands: dict[str, PageHand] = {}  # by client
         self._count = 0
-        self.doers: Mapping[str, Callable[[str, Line, Said], object]] = {
-            "manual_take": self._take,
-            "manual_release": self._release,
-            "fault": self._fault,
-        }
 
     # --- by hand -----------------------------------------------------------------------
 
+    @does("manual_take")
     def _take(self, client: str, line: Line, said: Said) -> None:
-        robot = self._robot(line.get("robot"))
+        robot = self._robot(line["robot"])
         window = self._windows.by_id[robot]
         if why := self._why_not():
             raise Refused(why)
@@ -98,6 +95,7 @@ class RobotActions:
                 text = text.replace(id_tag, label)
             raise Refused(f"{m.CODE_NAMES[decision.code]}: {text}")
 
+    @does("manual_release")
     def _release(self, client: str, _: Line, said: Said) -> None:
         hand = self._hands.get(client)
         if hand is not None:
@@ -110,15 +108,16 @@ class RobotActions:
         if window.hand.let_go(client).code == m.OK:
             window.number = None
 
+    @does("manual")
     def input(self, client: str, line: Line) -> None:
         """What a hand wants now, as shares of the limits; what is not held wants to stand."""
         hand = self._hands.get(client)
         if hand is None:
             return
-        held = line.get("held") is True and not self._why_not()
+        held = line["held"] and not self._why_not()
         hand.heard, hand.holds = time.monotonic(), held
         if held:
-            self._drive(client, hand, line.get("speed", 0.0), line.get("turn", 0.0))
+            self._drive(client, hand, line["speed"], line["turn"])
         else:
             self._drive(client, hand, 0.0, 0.0)
 
@@ -160,11 +159,12 @@ class RobotActions:
 
     # --- faults ------------------------------------------------------------------------
 
+    @does("fault")
     def _fault(self, _: str, line: Line, said: Said) -> None:
-        robot, what = self._robot(line.get("robot")), str(line.get("what"))
-        window, on = self._windows.by_id[robot], line.get("on") is True
+        robot, what = self._robot(line["robot"]), line["what"]
+        window, on = self._windows.by_id[robot], line["on"]
         if what == "processing":
-            seconds = float(line.get("seconds", 0.0))
+            seconds = line.get("seconds", 0.0)
             window.faults.slow_down(seconds if on else None)
             self._slow(seconds if on else 0.0)
         elif what == "replies":
@@ -179,7 +179,7 @@ class RobotActions:
         said(True, f"{what}: {'on' if on else 'off'}")
 
     def _stick(self, window: RobotWindow, line: Line, on: bool) -> None:
-        sensor = str(line.get("sensor"))
+        sensor = line.get("sensor", "")
         if sensor not in window.robot.sensors:
             there = ", ".join(window.robot.sensors) or "none"
             raise Refused(f"there is no sensor {sensor!r}; sensors: {there}")

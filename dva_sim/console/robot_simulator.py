@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
+from dva_sim.console.audit_keeper import auditing
 from dva_sim.console.options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.refusal import Refused
@@ -119,9 +120,13 @@ class RobotSimulator:
         refuse_broken(found)
 
     def _run(self, world: RobotWorld) -> None:
-        with ending_when_asked(world.clock, supervised=False) as ending:
-            desk = RobotDesk(world)
-            self._processes.start(world, desk.take)
+        about = {"robot": world.robot.device.label}
+        with (
+            auditing(None, world.clock, about, self._say) as audit,
+            ending_when_asked(world.clock, supervised=False) as ending,
+        ):
+            world.keep_audit(audit)
+            self._processes.start(world, RobotDesk(world).take, audit=audit.path)
             self._say(f"Robot: {world.robot.device.address}")
             if self._options.dva is not None:
                 self._begin(world, self._options.dva)

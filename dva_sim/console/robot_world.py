@@ -14,6 +14,8 @@ from typing import Any
 from dva_sim.agents.observation import Cameras
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.screens import OwnScreens, camera_url, topic_of
+from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audited import Audited, name_of_page
 from dva_sim.console.feed import Feed
 from dva_sim.console.lag import LagRule
 from dva_sim.console.logs import PERIOD, Logs
@@ -41,7 +43,7 @@ Tell = Callable[..., object]
 
 POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
-PAGES = "robots", "map"
+PAGES = "robots", "map", "audit"
 
 
 class RobotWorld:
@@ -60,6 +62,7 @@ class RobotWorld:
         clock: Real time.
         robot: The robot.
         station: How far it has come.
+        audited: Keeps who did what, once that is wanted.
         windows: Its windows.
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
@@ -94,6 +97,7 @@ class RobotWorld:
         self.lag, self._newest = LagRule(), dict[str, Any]()
         self.hold: Callable[[str], object] = lambda _: None
         self.clock.on_late = self._late
+        self.audited: Audited | None = None
         self._watch()
 
     @property
@@ -157,6 +161,11 @@ class RobotWorld:
 
     def _lost(self, robot: str, reply: bytes) -> None:
         self.audit.sent(self.clock.now, robot, "", reply)
+
+    def keep_audit(self, keeper: AuditKeeper) -> None:
+        """Keep what people do from now on."""
+        label = self.robot.device.label
+        self.audited = Audited(keeper, name_of_page, lambda named: named and label)
 
     def deafen(self, robot: str, on: bool) -> None:
         """The audit is told that the robot hears nothing, or hears again."""
@@ -238,6 +247,8 @@ class RobotWorld:
     def _tell_news(self) -> None:
         for line in self.feed.story():
             self.tell(line)
+        if self.audited is not None:
+            self._tell_new(self.audited.keeper.line(self.feed.now_ms))
 
     def _tell_logs(self) -> None:
         for line in self.logs.batches():

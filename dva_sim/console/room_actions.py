@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.dispatcher import Doer, does
 from dva_sim.console.missions import inspection_of, send_on_mission
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.rooms import ConsoleRoom
@@ -16,7 +17,6 @@ from dva_sim.console.world import ConsoleWorld
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
-Doer = Callable[[str, Line, Said], object]
 
 
 class RoomActions:
@@ -38,13 +38,6 @@ class RoomActions:
     ) -> None:
         self._world, self._rooms, self._seats = world, world.rooms, seats
         self._robot, self._take = robot, take
-        self.doers: Mapping[str, Doer] = {
-            "room_join": self._join,
-            "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self.decide),
-            "mission": self._mission,
-            "take_over": self._take_over,
-        }
 
     def forget(self, client: str) -> None:
         """A page is gone for good."""
@@ -52,8 +45,9 @@ class RoomActions:
 
     # --- who asks ---------------------------------------------------------------------------
 
+    @does("room_join")
     def _join(self, client: str, line: Line, said: Said) -> None:
-        name = str(line.get("name", "")).strip()[:64]
+        name = line["name"].strip()
         self._rooms.join(client, str(line.get("role", "look")), name, said)
 
     def _room(
@@ -87,11 +81,13 @@ class RoomActions:
 
     # --- events -----------------------------------------------------------------------------
 
+    @does(*DECISIONS)
     def decide(self, client: str, line: Line, said: Said) -> None:
         """Decide on an event."""
         body, done = decision_of(line, self._device, self._rooms.decisions)
         self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
 
+    @does("event_raise")
     def _raise(self, client: str, line: Line, said: Said) -> None:
         body, done = report_of(line, self._place(line))
 
@@ -132,6 +128,7 @@ class RoomActions:
 
     # --- robots -----------------------------------------------------------------------------
 
+    @does("mission")
     def _mission(self, client: str, line: Line, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._rooms.listener.events.get(line["event"])
@@ -145,9 +142,10 @@ class RoomActions:
 
         self._room(client, line, said, send)
 
+    @does("take_over")
     def _take_over(self, client: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
-        robot, reason = self._robot(line["robot"]), str(line["reason"])
+        robot, reason = self._robot(line["robot"]), line["reason"]
 
         def begin(room: ConsoleRoom) -> None:
             number = self._seats.sit(client)

@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 from shapely.geometry import mapping
 
-from dva_sim.console import link
 from dva_sim.console.lag import LIMIT
+from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures import colours
 from dva_sim.simulation.full.hazards import RunHazard
@@ -59,8 +59,8 @@ def scene_of(
         "site": site_of(site),
         "things": things,
         "patterns": patterns_of(scenario.pattern),
-        "link_limits": {key: list(limits) for key, limits in link.LIMITS.items()},
-        "pace_limits": [1.0, 20.0],
+        "link_limits": {key: list(limits) for key, limits in LINK_LIMITS.items()},
+        "pace_limits": [1.0, FASTEST],
         "watchdog_s": scenario.robot.watchdog_s,
         "stale_s": scenario.robot.max_age_s,
         "lag_limit_s": LIMIT,

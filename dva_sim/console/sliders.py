@@ -8,8 +8,9 @@ from typing import Any
 from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.link import changed, read, with_link
+from dva_sim.console.link import changed, with_link
 from dva_sim.console.real_links import TITLE
+from dva_sim.console.wire.arguments import LINK_LIMITS
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import Stage
@@ -56,7 +57,8 @@ class LinkSliders:
         Raises:
             ConfigError: what cannot be.
         """
-        run, wanted = self._run, read(given)
+        run = self._run
+        wanted = {key: given[key] for key in LINK_LIMITS if key in given}
         if run.is_real and wanted.keys() - {"processing_s"}:
             raise ConfigError(TITLE)
         self.link = changed(run.scenario.link, self._wanted | wanted)

@@ -118,8 +118,9 @@ def test_a_page_that_has_drawn_nothing_yet_drives_no_longer_than_the_limit(monke
 )
 def test_a_picture_that_there_never_was_makes_no_command_younger(page, seen):
     before = held(page)._drawn_tick
-    page.actions._drew("c1", seen)
-    page.actions._drew("c9", seen)
+    for client in ("c1", "c9"):
+        wish = {"n": 1, "speed": 0, "turn": 0, "held": False, "seen": seen}
+        page.actions.take({"do": "input", "client": client, **wish})
     assert held(page)._drawn_tick == before
 
 

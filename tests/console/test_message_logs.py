@@ -10,11 +10,11 @@ from lxml import etree
 
 from dva_sim.cameras.pipes import MOST_WAITING, LineOutbox
 from dva_sim.console.logs import BATCH, BATCH_BYTES, CUT, Logs
-from dva_sim.console.web.checks import BadMessage
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.log_entries import Entry
 from dva_sim.console.web.logs import AT_ONCE, KEPT, KEPT_BYTES, KeptLogs, Looks
 from dva_sim.console.web.state import RunState
+from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Request
 from dva_sim.network.virtual_network import VirtualNetwork

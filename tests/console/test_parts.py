@@ -9,10 +9,12 @@ import pytest
 from dva_sim.cameras.pipes import MOST_WAITING, LineOutbox, LinePipe
 from dva_sim.console.answers import Answers
 from dva_sim.console.lag import GOOD_FOR, LIMIT, LagRule
-from dva_sim.console.link import changed, read
+from dva_sim.console.link import changed
 from dva_sim.console.refusal import Refused
 from dva_sim.console.seats import MOST_SEATS, SILENT_AFTER, Seats
 from dva_sim.console.tour import FAR, LEAST, tour_of
+from dva_sim.console.wire.actions import ACTIONS
+from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.network.link import LinkConfig
 from dva_sim.simulation.full.run import Run
@@ -174,8 +176,8 @@ def test_a_delay_that_a_law_cannot_have_is_refused_in_a_line():
 
 @pytest.mark.parametrize("given", [{"delay_s": 5.1}, {"loss": "much"}, {"rate_bps": True}])
 def test_numbers_beyond_the_sliders_are_refused(given):
-    with pytest.raises(ConfigError, match=next(iter(given))):
-        read(given)
+    with pytest.raises(BadMessage, match=next(iter(given))):
+        ACTIONS["link"].read(given)
 
 
 @pytest.mark.parametrize("seed", range(1, 6))

@@ -2,6 +2,7 @@
 
 import json
 import math
+from contextlib import suppress
 
 import pytest
 from helpers.console.simulated_phone import PhonePage
@@ -9,8 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.phone_input import samples_of, settings_of
-from dva_sim.kernel.errors import ConfigError
+from dva_sim.console.phone_input import samples_of
+from dva_sim.console.wire.actions import ACTIONS
+from dva_sim.console.wire.kinds import BadMessage
 
 
 @pytest.fixture
@@ -100,8 +102,9 @@ def test_an_emergency_names_a_robot_or_is_for_ones_own(page):
 
 
 def test_without_registration_there_are_neither_lists_nor_permissions(page):
-    for what in ("phone_devices", "phone_permission"):
-        answer = page.ask(what, device=page.robot().device.id_tag, level="both")
+    wish = {"device": page.robot().device.id_tag, "level": "both"}
+    for what, about in (("phone_devices", {}), ("phone_permission", wish)):
+        answer = page.ask(what, **about)
         assert not answer["ok"]
         assert "not registered" in answer["text"]
 
@@ -185,16 +188,16 @@ SOUND = TIMES.flatmap(
 
 @given(MESSAGES)
 def test_any_message_is_samples_or_nothing(message):
-    said = samples_of(message)
-    if said is not None:
+    with suppress(BadMessage):
+        said = samples_of(ACTIONS["samples"].read(message))
         assert len(said.at) == len(said.xyz) <= 64
         assert all(math.isfinite(x) for one in said.xyz for x in one)
 
 
 @given(st.dictionaries(st.sampled_from(["reference_mps2", "speed_step_mps2", "pipeline"]), NUMBERS))
 def test_any_calibration_is_one_or_refused(message):
-    with pytest.raises(ConfigError):
-        settings_of(message)
+    with pytest.raises(BadMessage):
+        ACTIONS["phone_calibrate"].read(message)
 
 
 @pytest.mark.system

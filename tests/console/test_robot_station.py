@@ -12,6 +12,8 @@ from dva_sim.console.robot_desk import RobotDesk
 from dva_sim.console.robot_simulator import RobotOptions
 from dva_sim.console.robot_station import two_free_ports
 from dva_sim.console.robot_world import RobotWorld
+from dva_sim.console.wire.actions import ACTIONS
+from dva_sim.console.wire.kinds import hints_of
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.network.sockets import SocketNetwork
@@ -71,7 +73,8 @@ class Bench:
     def do(self, what, **about):
         self.count += 1
         number = f"a{self.count}"
-        self.desk.take({"id": number, "client": "c1", "do": what, "robot": 0, **about})
+        robot = {"robot": 0} if "robot" in hints_of(ACTIONS[what].arguments) else {}
+        self.desk.take({"id": number, "client": "c1", "do": what, **robot, **about})
 
         def answers():
             return [one for one in self.lines if one["k"] == "done" and one["id"] == number]

@@ -9,10 +9,10 @@ from contextlib import contextmanager
 from helpers.console.served_console import scene
 from starlette.responses import Response
 
-from dva_sim.console.web import simulation as web_simulation
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.simulation import MOST_PENDING, SILENCE, Simulation
+from dva_sim.console.wire import actions as declared
 
 
 class Clock:
@@ -92,8 +92,8 @@ def test_it_has_ended_when_it_says_so_or_is_gone():
 
 
 def test_who_waits_in_vain_is_told_after_a_while_and_longer_for_what_crosses_the_link(monkeypatch):
-    monkeypatch.setattr(web_simulation, "PATIENCE", 0.001)
-    monkeypatch.setattr(web_simulation, "LONG", 0.002)
+    monkeypatch.setattr(declared, "PATIENCE", 0.001)
+    monkeypatch.setattr(declared, "LONG", 0.002)
 
     async def story(simulation, clock, end):
         told = []

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
-from dva_sim.console.alarm_actions import AlarmActions, Doer
-from dva_sim.console.answers import BYE, Answers, answering
+from dva_sim.console.alarm_actions import AlarmActions
+from dva_sim.console.answers import BYE
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
+from dva_sim.console.dispatcher import ActionDispatcher, does
 from dva_sim.console.refusal import Refused, Said, unanswered
+from dva_sim.console.wire.actions import ActionPlace
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -22,62 +23,41 @@ class AttachedActions:
 
     Args:
         pages: Of the system to which the console is attached.
+
+    Attributes:
+        take: Does what a line asks for.
     """
 
     def __init__(self, pages: AttachedPages) -> None:
-        self._pages, self._system, self._answers = pages, pages.system, Answers()
+        self._pages, self._system = pages, pages.system
         decisions = AttachedDecisions(self._system, pages.people)
-        alarms = AlarmActions(pages.alarms, pages.people.author, self._acknowledge)
-        self._decide = decisions.decide
-        self._doers: Mapping[str, Doer] = {
-            "emergency": self._emergency,
-            "revoke": self._revoke,
-            "fake_add": self._add_fake,
-            "fake_remove": self._remove_fake,
-            "release": self._release,
-            **decisions.doers,
-            **alarms.doers,
-        }
+        author = pages.people.author
+        alarms = AlarmActions(pages.alarms, author, lambda *given: dispatcher.do(*given))
+        dispatcher = ActionDispatcher(
+            *(ActionPlace.ATTACHED, (self, decisions, alarms), self._tell, NOT_HERE),
+            lambda: pages.audited,
+        )
+        self.take = dispatcher.take
 
-    def take(self, line: Line) -> None:
-        """Do what a line asks for; nothing that it can hold does any harm."""
-        what, number = str(line.get("do", "")), line.get("id")
-        if what == "look":
-            tables = line.get("tables")
-            self._pages.looked = isinstance(tables, list) and "devices" in tables
-        elif what == "watch":
-            robots = line.get("robots")
-            self._pages.sensors.watch(robots if isinstance(robots, list) else [])
-        elif isinstance(number, str):
-            self._answers.once(
-                number,
-                partial(self._do, what, line),
-                self._tell,
-                repeats=what == "emergency",
-            )
+    @does("look")
+    def _look(self, _: str, line: Line) -> None:
+        self._pages.looked = "devices" in line["tables"]
 
-    def _do(self, what: str, line: Line, said: Said) -> None:
-        do = self._doers.get(what)
-        if do is None:
-            raise Refused(NOT_HERE)
-        client = str(line.get("client", ""))
-        said = self._pages.audited.answered(what, client, line, said)
-        answering(partial(do, client, line), said)
-
-    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
-        """An alarm is seen that an event is behind: a decision like any other."""
-        said = self._pages.audited.answered("event_acknowledge", client, line, said)
-        self._decide(client, line, said)
+    @does("watch")
+    def _watch(self, _: str, line: Line) -> None:
+        self._pages.sensors.watch(line["robots"])
 
     def _tell(self, answer: Line) -> None:
         self._pages.tell({**answer, "t": self._system.now_ms})
 
+    @does("release")
     def _release(self, client: str, line: Line, said: Said) -> None:
         """Nothing is in hand; but a page may be gone for good."""
         if str(line["id"]).startswith(BYE):
             self._pages.people.leave(client)
         said(True, "released")
 
+    @does("emergency")
     def _emergency(self, _: str, line: Line, said: Said) -> None:
         """Each robot is told by a connection of its own; who does not answer is named."""
         system, wanted = self._system, line.get("robots", "all")
@@ -101,8 +81,9 @@ class AttachedActions:
             ok, failed = partial(ended, robot, True), partial(ended, robot, False)
             system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
 
+    @does("revoke")
     def _revoke(self, _: str, line: Line, said: Said) -> None:
-        robot = str(line.get("device"))
+        robot = line["device"]
         if robot not in self._system.robots():
             raise Refused(f"the DVA has listed no robot {robot}")
 
@@ -112,6 +93,7 @@ class AttachedActions:
 
         self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, said))
 
+    @does("fake_add")
     def _add_fake(self, _: str, line: Line, said: Said) -> None:
         if self._system.options.keys is not None:
             raise Refused(
@@ -119,6 +101,7 @@ class AttachedActions:
             )
         self._system.fakes.add(line, said)
 
+    @does("fake_remove")
     def _remove_fake(self, _: str, line: Line, said: Said) -> None:
-        label = self._system.fakes.remove(line.get("device"))
+        label = self._system.fakes.remove(line["device"])
         said(True, f"{label} speaks no more: the DVA takes it from its list within some seconds")

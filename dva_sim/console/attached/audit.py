@@ -14,15 +14,15 @@ from typing import Any, Final
 
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.audited import ACTIONS, DECISIONS, Audited
+from dva_sim.console.audited import Audited
 from dva_sim.console.refusal import Said
+from dva_sim.console.wire.actions import ACTIONS, Action, Audit
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
 
 RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
-MESSAGES: Final = DECISIONS | {"revoke"}  # what is decided by a message to the DVA
 
 
 @dataclass
@@ -56,8 +56,6 @@ class AttachedAudit(Audited):
         author: What the person of a page is called.
     """
 
-    noted = (ACTIONS | DECISIONS) - {"release"}  # nothing is in hand here that could be released
-
     def __init__(
         self, keeper: AuditKeeper, system: AttachedSystem, author: Callable[[str], str]
     ) -> None:
@@ -68,7 +66,7 @@ class AttachedAudit(Audited):
     def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
         """See `Audited`; a decision that was taken waits a moment for the DVA's record of it."""
         told = super().answered(what, client, line, said)
-        if what not in MESSAGES:
+        if ACTIONS[what].audit is not Audit.DVA and what != "revoke":
             return told
         number = str(line["id"])
         asked = self._asked[number] = AskedDecision(_action(what), line.get("event"))
@@ -81,6 +79,10 @@ class AttachedAudit(Audited):
                 self._system.clock.call_after(RECORD_WITHIN, self._finish, number)
 
         return wait
+
+    def is_noted(self, action: Action) -> bool:
+        """See `Audited`: all, but that nothing is in hand here which could be released."""
+        return action.name != "release"
 
     def _finish(self, number: str) -> None:
         asked = self._asked.get(number)

@@ -5,20 +5,19 @@ Whether that is allowed, the DVA says: it alone knows the role of each control r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.dispatcher import does
 from dva_sim.console.missions import inspection_of, send_on_mission
 from dva_sim.console.refusal import NO_ANSWER, Refused, Said, unanswered
 from dva_sim.console.takeover import Takeover
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
-Doer = Callable[[str, Line, Said], object]
 
 
 class AttachedDecisions:
@@ -31,32 +30,29 @@ class AttachedDecisions:
 
     def __init__(self, system: AttachedSystem, people: AttachedPeople) -> None:
         self._system, self._people = system, people
-        self.doers: Mapping[str, Doer] = {
-            "room_join": self._join,
-            "event_raise": self._raise,
-            **dict.fromkeys(DECISIONS, self.decide),
-            "mission": self._mission,
-            "take_over": self._take_over,
-        }
 
+    @does("room_join")
     def _join(self, client: str, line: Line, said: Said) -> None:
         """All who decide here share the console's own control room, each by an own name."""
         if not self._system.answers:
             raise Refused(NO_ANSWER)
-        name = str(line.get("name", "")).strip()[:64]
+        name = line["name"].strip()
         name = self._people.join(client, str(line.get("role", "look")), name)
         said(True, f"you are {name}, and may {self._system.role}")
 
+    @does("event_raise")
     def _raise(self, _: str, line: Line, said: Said) -> None:
         place = self._system.place_of(line["x_m"], line["y_m"])
         self._ask(*report_of(line, place), said)
 
+    @does(*DECISIONS)
     def decide(self, _: str, line: Line, said: Said) -> None:
         """Decide on an event."""
         self._ask(*decision_of(line, self._device, self._seen), said)
 
     # --- robots ------------------------------------------------------------------------------
 
+    @does("mission")
     def _mission(self, _: str, line: Line, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._system.agent.events.get(line["event"])
@@ -68,6 +64,7 @@ class AttachedDecisions:
         label = self._system.label_of(robot)
         send_on_mission(self._system.device, robot, label, inspection_of(status), said)
 
+    @does("take_over")
     def _take_over(self, _: str, line: Line, said: Said) -> None:
         """Take a robot from whoever holds it; it goes by itself where it was sent to."""
         robot, agent = self._robot(line["robot"]), self._system.agent
@@ -84,7 +81,7 @@ class AttachedDecisions:
         Takeover(
             agent=agent,
             robot=robot,
-            reason=str(line["reason"]),
+            reason=line["reason"],
             event=event,
             seat=None,
             take=take,

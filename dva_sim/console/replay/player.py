@@ -7,23 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dva_sim.console.answers import Answers
+from dva_sim.console.dispatcher import ActionDispatcher, does
 from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.replay.audit import RecordedAudit
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
-from dva_sim.network.realtime import FASTEST, PacedClock
+from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import pack
 
 Line = dict[str, Any]
-SLOWEST = 0.1  # that a recording is played, as a multiple of real time
 # From one line to the next, real time [s].
 POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = 0.1, 0.25, 1.0, 0.1, 0.2
 NOBODY = "this is a recording: there is nobody who could be told to do anything"
@@ -41,6 +40,7 @@ class Player:
         tell: Takes lines for pages, and a key for those of which the newest counts.
         show: Takes lines for whoever draws pictures, likewise.
         audit: The audit log in the recording.
+        take: Does what a page asks for; what would tell somebody something is refused.
     """
 
     def __init__(
@@ -56,13 +56,8 @@ class Player:
         self._logs: dict[str, ExchangeLog] = {}
         self._looks_at_devices = False
         self._told: dict[str, int] = {}  # exchanges of each log that somebody looks at
-        self._answers = Answers()
         self._site: TemporaryDirectory[str] | None = None
-        self._doers: dict[str, Callable[[Line], str]] = {
-            "pace": self._pace,
-            "seek": self._seek,
-            "open_recording": self._open,
-        }
+        self.take = ActionDispatcher(ActionPlace.REPLAY, [self], self._tell, NOBODY).take
 
     @property
     def now(self) -> float:
@@ -223,71 +218,58 @@ class Player:
             self._logs[name] = ExchangeLog(playback.recorder.traffic or (), node)
         return self._logs[name]
 
-    def _look(self, logs: Any, tables: Any) -> None:
-        """Pages look at these logs; those that are new to them are told from the beginning."""
-        self._looks_at_devices = isinstance(tables, list) and "devices" in tables
-        self._tell_devices()
-        names = list(logs) if isinstance(logs, dict) else []
-        self._told = {str(name): self._told.get(str(name), -1) for name in names}
-        self._tell_logs()
-
     # --- what is asked for -----------------------------------------------------------------
-
-    def take(self, line: Line) -> None:
-        """Do what a page asks for, once; what would tell somebody something is refused."""
-        what, number = line.get("do"), line.get("id")
-        if what == "watch":
-            self._watch(line.get("robots"))
-        elif what == "look":
-            self._look(line.get("logs"), line.get("tables"))
-        if isinstance(number, str):
-            self._answers.once(number, partial(self._do, str(what), line), self._tell)
-
-    def _do(self, what: str, line: Line, said: Said) -> None:
-        do = self._doers.get(what)
-        if do is None:
-            raise Refused(NOBODY)
-        said(True, do(line))
 
     def _tell(self, answer: Line) -> None:
         self.tell({**answer, "t": round(1000 * self.now)})
 
-    def _pace(self, line: Line) -> str:
+    @does("pace")
+    def _pace(self, _: str, line: Line, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
-        if factor is not None and not SLOWEST <= factor <= FASTEST:
-            raise Refused(f"factor should be a number from {SLOWEST:g} to {FASTEST:g}")
         if paused is False and self.now >= self._duration:
             self._go_to(0.0)
         self.clock.pace(factor, paused)
         self.tell_now()
-        return "it stands" if self.clock.paused else f"{self.clock.factor:g} times real time"
+        now = "it stands" if self.clock.paused else f"{self.clock.factor:g} times real time"
+        said(True, now)
 
-    def _seek(self, line: Line) -> str:
+    @does("seek")
+    def _seek(self, _: str, line: Line, said: Said) -> None:
         self._go_to(line["t_ms"] / 1000)
         self.tell_now()
-        return f"at {self.now:.1f} s"
+        said(True, f"at {self.now:.1f} s")
 
     def _go_to(self, time: float) -> None:
         self._offset = min(max(0.0, time), self._duration) - self.clock.now
         self._jumps += 1
         self._told = dict.fromkeys(self._told, -1)
 
-    def _open(self, line: Line) -> str:
+    @does("open_recording")
+    def _open(self, _: str, line: Line, said: Said) -> None:
         if self.shelf is None:
             raise Refused("there are no other recordings")
-        path = self.shelf.find(str(line.get("name")))
+        path = self.shelf.find(line["name"])
         self.run = RecordedRun(read_recording(path), path.name)
         self._watched.clear()
         self._logs.clear()
         self._go_to(0.0)
         self.clock.pace(paused=False)
         self._tell_scene()
-        return f"{path.name} is played"
+        said(True, f"{path.name} is played")
 
-    def _watch(self, robots: Any) -> None:
-        numbers = robots if isinstance(robots, list) else []
+    @does("watch")
+    def _watch(self, _: str, line: Line) -> None:
         things = () if self.run is None else self.run.things
-        self._watched = {t["id"] for t in things if t["i"] in numbers and t["kind"] == "robot"}
+        watched = (t for t in things if t["i"] in line["robots"])
+        self._watched = {t["id"] for t in watched if t["kind"] == "robot"}
+
+    @does("look")
+    def _look(self, _: str, line: Line) -> None:
+        """Pages look at these logs; those that are new to them are told from the beginning."""
+        self._looks_at_devices = "devices" in line["tables"]
+        self._tell_devices()
+        self._told = {name: self._told.get(name, -1) for name in line["logs"]}
+        self._tell_logs()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dva_sim.console.web.access import Entrance, Role, Tokens, rules
+from dva_sim.console.web.access import Entrance, Tokens, rules
 from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
 from dva_sim.console.web.audit import AuditPages
@@ -20,6 +20,8 @@ from dva_sim.console.web.phones import NoCertificate
 from dva_sim.console.web.server import make_server
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.static_files import StaticFiles
+from dva_sim.console.wire.actions import prepare_checks
+from dva_sim.console.wire.roles import Role
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.serving.listening import listen
 from dva_sim.serving.port_listener import fitting_places
@@ -79,7 +81,9 @@ async def run(options: argparse.Namespace) -> None:
     simulation.send(serving(access, options.host, port) | about)
     if options.pictures_fd is not None:
         await cameras.open(options.pictures_fd)
-    telling = asyncio.gather(cameras.keep_telling(), hub.keep_tidy())
+    telling = asyncio.gather(
+        cameras.keep_telling(), hub.keep_tidy(), asyncio.to_thread(prepare_checks)
+    )
     closing = asyncio.ensure_future(_close_when(ended, hub, cameras))
     files, over, audit = StaticFiles(), _after(closing), AuditPages(options.audit)
     app = make_app(access, hub, cameras, files, door=door, audit=audit, report=options.report)

@@ -14,33 +14,14 @@ import secrets
 import socket
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
-from enum import IntEnum
 from http.cookies import CookieError, SimpleCookie
+
+from dva_sim.console.wire.roles import Role
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
 _HOST = re.compile(
     r"(?:\[(?P<six>[0-9a-fA-F:.]{2,45})\]|(?P<name>[A-Za-z0-9._-]{1,253}))(?::\d{1,5})?"
 )
-
-
-class Role(IntEnum):
-    """What a client may do; each may do what those before it may.
-
-    A phone drives its own robot, or is a guard's; whoever may drive changes the link, too. Who
-    dispatches sends others, and who supervises takes robots from their holders.
-    """
-
-    NOBODY = 0
-    LOOK = 1
-    PHONE = 2
-    DRIVE = 3
-    DISPATCH = 4
-    SUPERVISE = 5
-
-    @property
-    def acts(self) -> bool:
-        """Whether it may do anything but look."""
-        return self >= Role.PHONE
 
 
 @dataclass(frozen=True)

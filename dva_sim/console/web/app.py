@@ -22,7 +22,7 @@ from starlette.websockets import WebSocket
 
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import CameraStreams, headers_of
-from dva_sim.console.web.access import Asked, Entrance, Role
+from dva_sim.console.web.access import Asked, Entrance
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_requests import LogRequests
@@ -30,6 +30,7 @@ from dva_sim.console.web.phones import AUTHORITY, UNGUARDED, PhoneDoor, PhonePag
 from dva_sim.console.web.report import StudyReport
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, Rest, TooStrange, problem
 from dva_sim.console.web.static_files import StaticFiles
+from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import place_of
 
 POLICY = (

@@ -15,9 +15,9 @@ from typing import Any
 
 from starlette.websockets import WebSocket
 
-from dva_sim.console.web.access import Role
 from dva_sim.console.web.feed import OWN_KEPT, PageFeed
 from dva_sim.console.web.state import RunState
+from dva_sim.console.wire.roles import Role
 
 MOST_CLIENTS = 64
 REMEMBERED = 30.0  # a page that is gone may come back under its name for so long [s]

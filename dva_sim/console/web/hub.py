@@ -14,13 +14,15 @@ from typing import Any
 from starlette.responses import PlainTextResponse
 from starlette.websockets import WebSocket
 
-from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import SILENT, Bucket, asked_of, check_role, id_of, read
-from dva_sim.console.web.checks import BadMessage, robots
+from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, read
 from dva_sim.console.web.clients import REMEMBERED, Client, Clients, Driver
 from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.web.sockets import heard, say
 from dva_sim.console.web.state import body_of, encode
+from dva_sim.console.wire.actions import ACTIONS
+from dva_sim.console.wire.arguments import OfRobots
+from dva_sim.console.wire.kinds import BadMessage, read_arguments
+from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import wire_of
 
 TIDY = 10.0  # from one look at silent programs to the next [s]
@@ -104,7 +106,8 @@ class Hub:
         elif what == "resync":
             client.feed.resync()
         elif what == "watch":
-            client.watches = frozenset(robots(said.get("robots"), self.simulation.labels))
+            asked = read_arguments(OfRobots, {"robots": said.get("robots")}, self.simulation.labels)
+            client.watches = frozenset(asked["robots"])
             client.feed.watches = client.watches
             self.watching()
         elif what == "look" and client.role is not Role.PHONE:
@@ -210,7 +213,7 @@ class Hub:
             check_role(client.role, name)
             asked = asked_of(name, said, self.simulation.labels, silent=True)
             asked["client"] = client.name
-            if name in SILENT:
+            if not ACTIONS[name].has_answer:
                 self.simulation.send(asked)
                 return
             if client.role is Role.PHONE and "robots" not in said:

@@ -14,12 +14,12 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from dva_sim.console.web.access import Role
-from dva_sim.console.web.checks import BadMessage
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.log_entries import Entry
 from dva_sim.console.web.logs import AT_ONCE, KEPT, KeptLog, LogFilter, Looks
 from dva_sim.console.web.rest import NOT_KEPT, ROLE, problem
+from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.roles import Role
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.mistakes import check_message
 

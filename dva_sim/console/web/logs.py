@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any, Final
 
-from dva_sim.console.web.checks import BadMessage
 from dva_sim.console.web.log_entries import UNANSWERED, Entry, Names
+from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]

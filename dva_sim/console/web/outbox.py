@@ -6,7 +6,8 @@ import json
 from collections import deque
 from typing import Any
 
-URGENT = ("emergency", "gone")
+from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, Queueing
+
 MOST = 64  # actions that may wait
 MOST_URGENT = 4096  # emergency stops and ends of drives that may wait, if the simulation hangs
 MOST_BATCHES = 8  # of samples that may wait, of a phone: at 40 ms each, as long as a drive lasts
@@ -35,16 +36,19 @@ class OutgoingLines:
     def put(self, asked: Asked) -> bool:
         """Add a line: whether there was room."""
         kind, client = asked["do"], asked.get("client", "")
-        if kind in ("input", "watch", "look"):
+        known = ACTIONS.get(kind) or OF_THE_WEB.get(kind)
+        waits = known.waits if known is not None else Queueing.IN_TURN
+        if waits is Queueing.NEWEST:
             self._newest[client, kind] = asked
             return True
-        if kind == "samples":
+        if waits is Queueing.BATCH:
             self._samples.setdefault(client, deque(maxlen=MOST_BATCHES)).append(asked)
             return True
         if kind == "gone":
-            self._newest.pop((client, "input"), None)
+            for hand in ("input", "manual"):
+                self._newest.pop((client, hand), None)
             self._samples.pop(client, None)
-        is_urgent = kind in URGENT
+        is_urgent = waits is Queueing.FIRST
         queue = self._urgent if is_urgent else self._actions
         if len(queue) >= (MOST_URGENT if is_urgent else MOST):
             self.refused += 1

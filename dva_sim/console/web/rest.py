@@ -11,20 +11,27 @@ from typing import Any
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
-from dva_sim.console.web.access import Role
-from dva_sim.console.web.actions import MOST_BYTES, asked_of, check_role, id_of, is_id, read
-from dva_sim.console.web.checks import BadMessage, NotAllowed
+from dva_sim.console.web.actions import (
+    MOST_BYTES,
+    NotAllowed,
+    asked_of,
+    check_role,
+    id_of,
+    is_id,
+    read,
+)
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.simulation import Answer
 from dva_sim.console.web.state import RunState
+from dva_sim.console.wire.actions import ACTIONS
+from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.roles import Role
 from dva_sim.worlds.geo import GeoFrame
 
 NOT_KEPT = {"Cache-Control": "no-store"}
 ROLE = "dva_sim.role"  # what is known of who asks, in a request's scope
 BODY_WITHIN = 10.0  # [s]
 PROGRAM = "program"  # with its role: the client of a request without a key
-# Actions that need a seat, or another thing of one's own, from then on.
-SEATING = ("take", "take_over", "manual_take", "phone_register", "guard_join", "room_join")
 
 
 def state_of(state: RunState, clients: int) -> dict[str, Any]:
@@ -133,7 +140,7 @@ class Rest:
             check_role(role, name)
             asked = asked_of(name, said.get("arguments", {}), self._simulation.labels)
             key = id_of(said.get("id"))
-            if name in SEATING and "key" not in said:
+            if ACTIONS[asked["do"]].seats and "key" not in said:
                 return await self._do_in_new_seat(asked, key, role)
             return self._answer(await self._do(asked, key, client, role))
         except NotAllowed as error:

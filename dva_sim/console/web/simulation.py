@@ -13,30 +13,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.console.web.actions import CONTROL_ROOM
-from dva_sim.console.web.checks import Labels
-from dva_sim.console.web.outbox import URGENT, Asked
+from dva_sim.console.web.outbox import Asked
 from dva_sim.console.web.pipes import Lines, PipeEnd
 from dva_sim.console.web.state import RunState
+from dva_sim.console.wire.actions import ACTIONS, Queueing
+from dva_sim.console.wire.kinds import Labels
 
-PATIENCE = 5.0  # for an answer [s]
-LONG = 60.0  # for one that a robot or the DVA gives, or does not give after all attempts [s]
-OVER_THE_LINK = (
-    "take",
-    "start",
-    "stop",
-    "emergency",
-    "confirm",
-    "refute",
-    "robot_register",
-    "phone_register",
-    "phone_devices",
-    "phone_permission",
-    "fake_add",
-    "guard_say",
-    "guard_report",
-    *CONTROL_ROOM,
-)
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
 MOST_PENDING = 256  # questions without an answer; an emergency stop is always asked for
@@ -147,7 +129,8 @@ class Simulation:
         if self.ended.is_set():
             answered({"k": "done", "ok": False, "text": self.why})
             return
-        is_urgent = asked["do"] in URGENT
+        action = ACTIONS[asked["do"]]
+        is_urgent = action.waits is Queueing.FIRST
         waiting = self._pending.get(key)
         if waiting is not None and is_urgent and len(waiting) >= MOST_WAITING:
             waiting.pop(0)  # repeated questions: the newest ones get the answer
@@ -159,8 +142,8 @@ class Simulation:
             answered({"k": "done", "ok": False, "text": "too many requests at once; try again"})
             return
         self._pending[key] = [answered]
-        patience = LONG if asked["do"] in OVER_THE_LINK else PATIENCE
-        asyncio.get_running_loop().call_later(patience, self._give_up, key, answered, patience)
+        loop, patience = asyncio.get_running_loop(), action.patience
+        loop.call_later(patience, self._give_up, key, answered, patience)
 
     def _give_up(self, key: str, told: Told, patience: float) -> None:
         if told in self._pending.get(key, ()):

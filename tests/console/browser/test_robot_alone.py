@@ -127,4 +127,8 @@ def test_a_dva_that_is_not_there_is_told_and_the_robot_stays_off(visit, programs
     told = page.get_by_role("status", name="Station")
     expect(told).to_contain_text(f"no DVA answers at {nobody} within 1.5 s")
     assert state(page) == "off"
-    assert [link.inner_text() for link in page.locator(".rail a").all()] == ["Map", "Robots"]
+    assert [link.inner_text() for link in page.locator(".rail a").all()] == [
+        "Map",
+        "Robots",
+        "Audit",
+    ]

@@ -30,7 +30,7 @@ export function AlarmList() {
 /** @param {{alarm: AlarmRow}} props */
 function Row({ alarm }) {
   const [busy, setBusy] = useState(false);
-  const ask = async (/** @type {string} */ what, /** @type {object} */ more = {}) => {
+  const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more = {}) => {
     setBusy(true);
     await act(what, { alarm: alarm.key, ...more });
     setBusy(false);

@@ -51,7 +51,7 @@ function Doing({ event }) {
   const field = useRef(/** @type {HTMLInputElement | null} */ (null));
   const words = reason.value.trim();
   const about = { event: event.number, decisions: event.decisions ?? null };
-  const ask = async (/** @type {string} */ what, /** @type {object} */ more) => {
+  const ask = async (/** @type {import('../net/actions.js').Action} */ what, /** @type {object} */ more) => {
     const done = await act(what, more);
     tell(done.ok ? done.text : '');
     if (done.ok) reason.value = '';

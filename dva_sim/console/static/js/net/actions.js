@@ -1,30 +1,13 @@
 /** What the person asks of the world, with the answer to each. */
 import { signal } from '../../vendor/preact.js';
 import { forget } from '../drive/hold.js';
+import { PATIENCE_MS } from '../declared.js';
 import { notice } from '../store.js';
 import { steer } from './wire.js';
 
-const PATIENCE_MS = 8000;
-const LONG_MS = 65000; // for what a robot or the DVA answers, or does not after all attempts
-const OVER_THE_LINK = [
-  'take',
-  'start',
-  'stop',
-  'emergency',
-  'confirm',
-  'refute',
-  'robot_register',
-  'phone_register',
-  'phone_devices',
-  'phone_permission',
-  'fake_add',
-  'guard_say',
-  'guard_report',
-  ...['event_raise', 'event_acknowledge', 'event_assign', 'event_take_off', 'event_false_alarm'],
-  ...['event_escalate', 'event_note', 'event_proposal', 'alarm_acknowledge', 'room_join'],
-  ...['dispatch_mode', 'mission', 'take_over'],
-];
 const ENDS = ['stop', 'release'];
+
+/** @typedef {keyof typeof PATIENCE_MS} Action what may be asked for */
 
 /** @type {Map<string, (done: {ok: boolean, text: string}) => void>} */
 const waiting = new Map();
@@ -40,7 +23,7 @@ export function newId() {
 
 /**
  * Ask for something; what is refused is told to the person.
- * @param {string} what
+ * @param {Action} what
  * @param {object} [more]
  */
 export async function act(what, more = {}) {
@@ -49,7 +32,7 @@ export async function act(what, more = {}) {
 
 /**
  * Ask for something, as a page does by itself: a refusal is not shown.
- * @param {string} what
+ * @param {Action} what
  * @param {object} [more]
  * @param {string} [id] by which the world knows a repeated request
  * @returns {Promise<import('../types.js').Done>} without an id if no answer came
@@ -60,7 +43,7 @@ export async function ask(what, more = {}, id = newId()) {
     return { ok: false, text: 'There is no connection to the world; nothing was sent.' };
   }
   const answer = new Promise((resolve) => waiting.set(id, resolve));
-  const patience = OVER_THE_LINK.includes(what) ? LONG_MS : PATIENCE_MS;
+  const patience = PATIENCE_MS[what];
   const timer = window.setTimeout(
     () => settle(id, { ok: false, text: `No answer to “${what}” within ${patience / 1000} s.` }),
     patience,

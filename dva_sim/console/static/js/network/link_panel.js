@@ -1,5 +1,6 @@
 /** The link that one chooses, and how fast the world runs. */
 import { html, useEffect, useRef, useState } from '../../vendor/preact.js';
+import { FASTEST } from '../declared.js';
 import { clock, isModelled, link, maySteer, scene } from '../store.js';
 import { act } from '../net/actions.js';
 import { Slider } from '../ui/slider.js';
@@ -7,7 +8,6 @@ import { rateText } from '../ui/words.js';
 
 const SETTLE_MS = 120;
 const QUIET_MS = 1500;
-const FASTEST = 20;
 const EACH = 100; // steps of the rate's slider
 
 /**

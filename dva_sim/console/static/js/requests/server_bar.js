@@ -1,10 +1,10 @@
 /** The DVA's server: whether it listens and where, and how it is started and stopped. */
 import { html, useState } from '../../vendor/preact.js';
+import { MOST_PORT } from '../declared.js';
 import { maySteer, rows } from '../store.js';
 import { act } from '../net/actions.js';
 import { Field, wrongNumber } from '../ui/fields.js';
 
-const MOST = 65534;
 
 /** The panel. */
 export function ServerBar() {
@@ -13,7 +13,7 @@ export function ServerBar() {
   if (!server) return null;
   const { listens, modelled } = server;
   const shown = port ?? String(server.port ?? '');
-  const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MOST, '');
+  const wrong = listens || server.port === null ? '' : wrongNumber(shown, 1, MOST_PORT, '');
   const start = () => act('server_start', { port: Number(shown) });
   return html`<section class="panel server" aria-label="Server">
     <p role="status" aria-label="Server state" class=${listens ? 'state' : 'state stopped'}>

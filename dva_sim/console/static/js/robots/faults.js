@@ -1,12 +1,12 @@
 /** Knobs that let things go wrong with a robot; all are undone when they are switched off. */
 import { html, useEffect, useState } from '../../vendor/preact.js';
+import { MOST_PROCESSING_S } from '../declared.js';
 import { maySteer } from '../store.js';
 import { act } from '../net/actions.js';
 import { Slider } from '../ui/slider.js';
 import { plain } from '../ui/words.js';
 import { windowOf } from './window.js';
 
-const SLOWEST_S = 3;
 const KNOBS = /** @type {[string, string, string][]} */ ([
   ['replies', 'Drop replies', 'It does what it is asked, and its answers are lost: whoever asks has a time-out.'],
   ['freeze', 'Freeze', 'Its computer hangs: it hears and says nothing. Its watchdog stops it; it starts anew idle.'],
@@ -59,7 +59,7 @@ function useAsked(told, ask) {
 /** @param {{robot: Thing}} props */
 function Processing({ robot }) {
   const told = windowOf(robot.i)?.faults.processing_s ?? null;
-  const [own, set] = useState(SLOWEST_S);
+  const [own, set] = useState(MOST_PROCESSING_S);
   const ask = (/** @type {boolean} */ on, seconds = own) =>
     act('fault', { robot: robot.i, what: 'processing', on, ...(on ? { seconds } : {}) });
   const [isSlow, slow] = useAsked(told !== null, (on) => ask(on));
@@ -70,7 +70,7 @@ function Processing({ robot }) {
   return html`<div class="processing">
     <label class="tick" title="Each message takes its computer so long."><input type="checkbox" checked=${isSlow}
       disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => slow(event.currentTarget.checked)} /> Slow computer</label>
-    <${Slider} name="Processing time" min=${0} max=${SLOWEST_S} step=${0.1} value=${told ?? own}
+    <${Slider} name="Processing time" min=${0} max=${MOST_PROCESSING_S} step=${0.1} value=${told ?? own}
       disabled=${!maySteer.value} text=${(/** @type {number} */ s) => `${s.toFixed(1)} s`} onInput=${change} />
   </div>`;
 }

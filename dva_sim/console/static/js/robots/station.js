@@ -25,7 +25,7 @@ function Steps({ robot, station }) {
   const [dva, setDva] = useState(station.dva || '127.0.0.1:5600');
   const may = maySteer.value;
   const off = station.state === 'off';
-  const ask = (/** @type {string} */ what, more = {}) => act(what, { robot: robot.i, ...more });
+  const ask = (/** @type {import('../net/actions.js').Action} */ what, more = {}) => act(what, { robot: robot.i, ...more });
   return html`<div class="station">
     <${Field} name="DVA" value=${dva} disabled=${!off || station.asking} hint="HOST:PORT of a DVA, or of a simulator of one" onInput=${setDva} />
     <div class="buttons">

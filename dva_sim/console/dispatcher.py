@@ -1,0 +1,127 @@
+"""What pages ask for, done by what a console shows: each action once, and answered once.
+
+There is one dispatcher for all that a console can show - a world, a DVA elsewhere, a robot alone, a
+recording. Functions are marked with the names of the actions that they do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from dva_sim.console.answers import Answers, answering
+from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, ActionPlace, Queueing
+from dva_sim.console.wire.kinds import BadMessage
+
+Line = dict[str, Any]
+Doer = Callable[[str, Line, Said], object]
+Taker = Callable[[str, Line], object]
+_HEAD = frozenset({"do", "id", "client", "role"})
+_Marked = TypeVar("_Marked", bound=Callable[..., object])
+
+
+class AuditedActions(Protocol):
+    """Whatever keeps who did what."""
+
+    def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
+        """Whoever takes the answer to an action, once that is in the log."""
+
+
+def does(*names: str) -> Callable[[_Marked], _Marked]:
+    """Mark a method as that which does actions: it gets the client, the line, and who waits.
+
+    One that does what has no answer gets the client and the line.
+    """
+
+    def mark(method: _Marked) -> _Marked:
+        method.does = names  # type: ignore[attr-defined]
+        return method
+
+    return mark
+
+
+def doers_of(holders: Iterable[object]) -> dict[str, Callable[..., object]]:
+    """What was marked in some objects, by the names of the actions."""
+    found: dict[str, Callable[..., object]] = {}
+    for holder in holders:
+        for attribute in dir(type(holder)):
+            for name in getattr(getattr(type(holder), attribute), "does", ()):
+                found[name] = getattr(holder, attribute)
+    return found
+
+
+class ActionDispatcher:
+    """Does what lines of the web process ask for.
+
+    Args:
+        place: What is shown.
+        holders: Objects with marked methods, for all that is declared for this place.
+        tell: Takes the answers.
+        elsewhere: Why what is declared for other places is not done here.
+        audited: Gives what keeps who did what; None: nothing does.
+    """
+
+    def __init__(
+        self,
+        place: ActionPlace,
+        holders: Iterable[object],
+        tell: Callable[[Line], object],
+        elsewhere: str,
+        audited: Callable[[], AuditedActions | None] = lambda: None,
+    ) -> None:
+        self._tell, self._elsewhere, self._audited = tell, elsewhere, audited
+        self._answers, self._doers = Answers(), doers_of(holders)
+        declared = {name for name, one in _KNOWN.items() if place in one.at}
+        if declared != self._doers.keys():
+            differ = ", ".join(sorted(declared ^ self._doers.keys()))
+            raise TypeError(f"declared and done at {place.name} differ: {differ}")
+
+    def take(self, line: Line) -> None:
+        """Do what a line asks for; nothing that it can hold does any harm."""
+        what, client, number = str(line.get("do", "")), str(line.get("client", "")), line.get("id")
+        known = _KNOWN.get(what)
+        if known is not None and not known.has_answer:
+            self._hear(what, client, line)
+        elif isinstance(number, str):
+            repeats = known is not None and known.waits is Queueing.FIRST
+            do = partial(self.do, client, line | {"do": what})
+            self._answers.once(number, do, self._tell, repeats=repeats)
+
+    def _hear(self, what: str, client: str, line: Line) -> None:
+        """What makes no sense, or is nothing for this place, counts as silence."""
+        take = self._doers.get(what)
+        if take is not None:
+            try:
+                asked = _checked(line)
+            except BadMessage:
+                return
+            take(client, asked)
+
+    def do(self, client: str, line: Line, said: Said) -> None:
+        """Do an action, and keep who did it.
+
+        Raises:
+            Refused: it cannot be done here, or not now.
+            BadMessage: its arguments make no sense.
+        """
+        what = line["do"]
+        do = self._doers.get(what)
+        if do is None:
+            raise Refused(self._elsewhere.format(what=what))
+        asked, audited = _checked(line), self._audited()
+        if audited is not None:
+            said = audited.answered(what, client, asked, said)
+        answering(partial(do, client, asked), said)
+
+
+_KNOWN: Mapping[str, Any] = {**ACTIONS, **OF_THE_WEB}
+
+
+def _checked(line: Line) -> Line:
+    """A line whose arguments are as they are declared."""
+    head = {key: value for key, value in line.items() if key in _HEAD}
+    given = {key: value for key, value in line.items() if key not in _HEAD}
+    asked: Line = _KNOWN[line["do"]].read(given) | head
+    return asked

@@ -1,0 +1,354 @@
+"""What clients may ask for: a declaration for each action, and everything else follows from it.
+
+A new action is an entry of `ACTIONS`, a function in what it acts on (found there by its name), and
+whatever shows it on a page. Checks at the web, roles, patience, rows of the audit log, the page's
+constants (`python -m dva_sim.console.wire.generated`) and the table in `docs/console.md` follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, Flag, auto
+from itertools import pairwise
+from typing import Any, Final
+
+from dva_sim.console.wire.arguments import (
+    AssignAsked,
+    CalibrationAsked,
+    FakeAsked,
+    FaultSwitch,
+    GuardAnswer,
+    GuardAsked,
+    GuardWord,
+    LinkChange,
+    LogsLooked,
+    MissionAsked,
+    ModeAsked,
+    MomentAsked,
+    NoteAsked,
+    Nothing,
+    OfAlarm,
+    OfDevice,
+    OfEvent,
+    OfRobot,
+    OfRobots,
+    OfSome,
+    PaceChange,
+    PatternChoice,
+    PhoneIdentity,
+    PhoneWish,
+    PlaceAsked,
+    PortAsked,
+    RecordingAsked,
+    RegistrationAsked,
+    ReportAsked,
+    RobotsWatched,
+    RoomName,
+    SampleBatch,
+    ShelveAsked,
+    TakeOffAsked,
+    TakeoverAsked,
+    TourTime,
+    Wish,
+    WithGoodReason,
+    WithReason,
+)
+from dva_sim.console.wire.kinds import BadMessage, Labels, adapter_of, read_arguments
+from dva_sim.console.wire.roles import Role
+
+PATIENCE: Final = 5.0  # for an answer [s]
+LONG: Final = 60.0  # for one that a robot or the DVA gives, or does not give after all attempts [s]
+
+
+class ActionPlace(Flag):
+    """Where an action acts."""
+
+    WORLD = auto()
+    ATTACHED = auto()
+    ROBOT = auto()
+    REPLAY = auto()
+
+
+class Audit(Enum):
+    """Which row of the audit log tells of an action.
+
+    Attributes:
+        OWN: One that the console writes when it is answered.
+        DVA: That of the DVA's decision.
+    """
+
+    OWN = auto()
+    DVA = auto()
+
+
+class Queueing(Enum):
+    """How an action waits on its way to what it acts on.
+
+    Attributes:
+        IN_TURN: Behind those before it.
+        FIRST: Before all others, and never refused for want of room.
+        NEWEST: Of one client only the newest.
+        BATCH: A few of each client, in their order; of too many the oldest are lost.
+    """
+
+    IN_TURN = auto()
+    FIRST = auto()
+    NEWEST = auto()
+    BATCH = auto()
+
+
+@dataclass(frozen=True)
+class Action:
+    """One action.
+
+    Attributes:
+        name: By which it is asked for.
+        does: What it does, as a sentence of the documentation goes on.
+        arguments: A `TypedDict` that pydantic checks.
+        at: Where it acts.
+        role: The least that may ask for it.
+        audit: Which row of the audit log tells of it; or else why none does.
+        stops: Whether it only stops or gives back something: then it never waits for a disk.
+        over_link: Whether the answer comes from a robot or the DVA, over links that may be slow.
+        waits: How it waits on its way.
+        seats: Whether a program needs a seat, or another thing of its own, from then on.
+        has_answer: Whether it is answered.
+    """
+
+    name: str
+    does: str
+    arguments: type = Nothing
+    at: ActionPlace = ActionPlace.WORLD
+    role: Role = Role.PHONE
+    audit: Audit | str = Audit.OWN
+    stops: bool = False
+    over_link: bool = False
+    waits: Queueing = Queueing.IN_TURN
+    seats: bool = False
+    has_answer: bool = True
+
+    @property
+    def patience(self) -> float:
+        """How long its answer is waited for [s]."""
+        return LONG if self.over_link else PATIENCE
+
+    def read(self, given: Any, labels: Labels | None = None) -> dict[str, Any]:
+        """Check its arguments; see `read_arguments`.
+
+        Raises:
+            BadMessage: they make no sense.
+        """
+        try:
+            asked = read_arguments(self.arguments, given, labels)
+            if self.arguments is SampleBatch:
+                _check_times(asked)
+        except BadMessage as error:
+            raise BadMessage(f"{self.name}: {error}") from None
+        return asked
+
+
+def _check_times(asked: dict[str, Any]) -> None:
+    """A time for each sample, and each later than the one before.
+
+    Raises:
+        BadMessage: it is otherwise.
+    """
+    at = asked["at"]
+    if len(at) != len(asked["xyz"]):
+        raise BadMessage("at and xyz should be equally long")
+    if any(later <= one for one, later in pairwise(at)):
+        raise BadMessage("at should rise")
+
+
+_OFTEN = "comes many times a second; what became of it is in the recording"
+_LOOKS = "changes nothing but what a page shows"
+_RUN = ActionPlace.WORLD | ActionPlace.ATTACHED
+_HANDS = ActionPlace.WORLD | ActionPlace.ROBOT
+_ALL = ActionPlace.WORLD | ActionPlace.ATTACHED | ActionPlace.ROBOT | ActionPlace.REPLAY
+_DECIDE: Any = {"at": _RUN, "role": Role.DISPATCH, "audit": Audit.DVA, "over_link": True}
+_ALARM: Any = {"at": _RUN, "role": Role.DISPATCH}
+_ALONE: Any = {"at": ActionPlace.ROBOT, "role": Role.DRIVE}
+_PLAYED: Any = {"at": ActionPlace.REPLAY, "role": Role.DRIVE, "audit": _LOOKS}
+_LOOKED: Any = {"has_answer": False, "waits": Queueing.NEWEST, "audit": _LOOKS}
+_SILENT: Any = {"has_answer": False, "waits": Queueing.NEWEST, "audit": _OFTEN}
+
+_LIST = (
+    Action(
+        "take", "takes control of robots", OfRobots, over_link=True, seats=True, role=Role.DRIVE
+    ),
+    Action("release", "gives back all that one holds", at=_RUN | _HANDS, stops=True),
+    Action("start", "begins to drive", over_link=True),
+    Action("stop", "ends the drive", stops=True, over_link=True),
+    Action(
+        "emergency",
+        "stops robots before all else; one's own, or all",
+        OfSome,
+        at=_RUN | _HANDS,
+        stops=True,
+        over_link=True,
+        waits=Queueing.FIRST,
+    ),
+    Action("link", "changes the link", LinkChange, role=Role.DRIVE),
+    Action(
+        "pattern", "changes the pattern of a robot's next drive", PatternChoice, role=Role.DRIVE
+    ),
+    Action(
+        "pace",
+        "halts time, or lets it go by faster",
+        PaceChange,
+        at=ActionPlace.WORLD | ActionPlace.REPLAY,
+        role=Role.DRIVE,
+    ),
+    Action("confirm", "reports an event as real", over_link=True),
+    Action("refute", "reports an event as false", over_link=True),
+    Action("decline", "declines an order"),
+    Action("tour", "finds goals for the guided tour", audit=_LOOKS, role=Role.DRIVE),
+    Action("tour_time", "notes how long a goal of the tour took", TourTime, role=Role.DRIVE),
+    # --- recordings
+    Action("seek", "goes to a moment", MomentAsked, **_PLAYED),
+    Action("open_recording", "plays another recording", RecordingAsked, **_PLAYED),
+    # --- a robot's windows
+    Action("manual_take", "takes a robot by hand", OfRobot, at=_HANDS, role=Role.DRIVE, seats=True),
+    Action("manual_release", "lets the robot go", at=_HANDS, stops=True),
+    Action(
+        "fault",
+        "makes something go wrong with a robot, or ends that",
+        FaultSwitch,
+        at=_HANDS,
+        role=Role.DRIVE,
+    ),
+    Action(
+        "robot_register", "registers a robot at a DVA", RegistrationAsked, over_link=True, **_ALONE
+    ),
+    Action("robot_listen", "opens the robot's port", OfRobot, **_ALONE),
+    Action("robot_off", "switches the robot off", OfRobot, stops=True, **_ALONE),
+    # --- phones
+    Action(
+        "phone_register", "registers a phone at the DVA", PhoneIdentity, over_link=True, seats=True
+    ),
+    Action(
+        "phone_devices",
+        "asks the DVA who is there",
+        audit="only reads the list of devices",
+        over_link=True,
+    ),
+    Action("phone_permission", "asks for the permission for a robot", PhoneWish, over_link=True),
+    Action("phone_calibrate", "calibrates a phone", CalibrationAsked),
+    # --- guards
+    Action("guard_join", "plays a guard from then on", GuardAsked, seats=True),
+    Action("guard_leave", "plays the guard no longer", stops=True),
+    Action("guard_answer", "accepts or declines an order", GuardAnswer),
+    Action("guard_say", "says how far one has come", GuardWord, over_link=True),
+    Action(
+        "guard_place",
+        "says where one is",
+        PlaceAsked,
+        audit="comes every 2 s from a satellite; where a guard was is in the recording",
+    ),
+    Action("guard_report", "reports an event", ReportAsked, over_link=True),
+    # --- the DVA's server and devices
+    Action("server_start", "starts the DVA's server", PortAsked, role=Role.DRIVE),
+    Action("server_stop", "stops the DVA's server", role=Role.DRIVE),
+    Action("revoke", "ends the permission for a robot", OfDevice, at=_RUN, role=Role.SUPERVISE),
+    Action(
+        "fake_add",
+        "registers a device that is not there",
+        FakeAsked,
+        at=_RUN,
+        role=Role.DRIVE,
+        over_link=True,
+    ),
+    Action("fake_remove", "removes such a device", OfDevice, at=_RUN, role=Role.DRIVE),
+    # --- control rooms
+    Action(
+        "room_join",
+        "says who decides at a page",
+        RoomName,
+        at=_RUN,
+        role=Role.DRIVE,
+        over_link=True,
+        seats=True,
+    ),
+    Action("event_raise", "reports an event", ReportAsked, **_DECIDE | {"role": Role.DRIVE}),
+    Action("event_acknowledge", "says that somebody answers for an event", OfEvent, **_DECIDE),
+    Action("event_assign", "sends somebody to an event", AssignAsked, **_DECIDE),
+    Action("event_take_off", "calls somebody off an event", TakeOffAsked, **_DECIDE),
+    Action("event_false_alarm", "ends an event as a false alarm", WithGoodReason, **_DECIDE),
+    Action("event_escalate", "hands an event to others", WithReason, **_DECIDE),
+    Action("event_note", "writes a note at an event", NoteAsked, **_DECIDE),
+    Action(
+        "event_proposal",
+        "asks whom the policy would send",
+        OfEvent,
+        **_DECIDE | {"role": Role.DRIVE, "audit": "only reads what the policy would do"},
+    ),
+    Action(
+        "dispatch_mode",
+        "says whether the policy asks first",
+        ModeAsked,
+        **_DECIDE | {"role": Role.SUPERVISE},
+    ),
+    Action(
+        "mission",
+        "sends a robot to an event by itself",
+        MissionAsked,
+        at=_RUN,
+        role=Role.DRIVE,
+        over_link=True,
+    ),
+    Action(
+        "take_over",
+        "takes a robot from its holder",
+        TakeoverAsked,
+        at=_RUN,
+        role=Role.SUPERVISE,
+        over_link=True,
+        seats=True,
+    ),
+    Action("alarm_acknowledge", "says that an alarm is seen", OfAlarm, over_link=True, **_ALARM),
+    Action("alarm_shelve", "takes an alarm out of the list for a while", ShelveAsked, **_ALARM),
+    Action("alarm_unshelve", "puts an alarm back into the list", OfAlarm, **_ALARM),
+    # --- without an answer
+    Action("input", "says what a hand wants", Wish, **_SILENT),
+    Action(
+        "manual",
+        "says what a hand at a robot's window wants",
+        Wish,
+        at=_HANDS,
+        role=Role.DRIVE,
+        **_SILENT,
+    ),
+    Action(
+        "samples",
+        "says what a phone's sensor measures",
+        SampleBatch,
+        **_SILENT | {"waits": Queueing.BATCH},
+    ),
+    Action(
+        "gone",
+        "says that the page is hidden",
+        at=_HANDS,
+        stops=True,
+        **_SILENT
+        | {
+            "waits": Queueing.FIRST,
+            "audit": "nobody asks for it; the end of a drive is in the story",
+        },
+    ),
+)
+ACTIONS: Final[Mapping[str, Action]] = {action.name: action for action in _LIST}
+# What the web process says by itself, of all pages together.
+OF_THE_WEB: Final[Mapping[str, Action]] = {
+    action.name: action
+    for action in (
+        Action("watch", "says whose pictures are looked at", RobotsWatched, at=_ALL, **_LOOKED),
+        Action("look", "says which logs and tables are looked at", LogsLooked, at=_ALL, **_LOOKED),
+    )
+}
+
+
+def prepare_checks() -> None:
+    """Load what checks arguments, so that the first action need not wait for it."""
+    for action in ACTIONS.values():
+        adapter_of(action.arguments)
