@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dva_sim.console.audit_keeper import check_target as check_audit_target
 from dva_sim.console.kept_results import KeptResults
+from dva_sim.console.page_options import PageOptions
 from dva_sim.console.real_links import ConsoleSockets, MakeSockets
 from dva_sim.console.web.addresses import own_address
 from dva_sim.kernel.config_overrides import parse_changes, set_by
@@ -17,30 +18,7 @@ from dva_sim.recordings.writing import check_both
 from dva_sim.simulation.scenario import Scenario, build, load
 
 LINKS = "modelled", "real"
-DEFAULT, DEFAULT_PORT, PHONES_PORT = "hands-on", 8765, 8766
-
-
-@dataclass(frozen=True, kw_only=True)
-class PageOptions:
-    """Where pages are to be seen, and by whom.
-
-    Attributes:
-        host: Address to listen on.
-        port: 0: any that is free.
-        token: Whether the address has to hold a secret.
-        phones: Whether phones have an address of their own, by https.
-        phones_host: Address to listen on for them.
-        phones_port: 0: any that is free.
-        open: Whether a browser is opened, where there is one.
-    """
-
-    host: str = "127.0.0.1"
-    port: int = DEFAULT_PORT
-    token: bool = True
-    phones: bool = False
-    phones_host: str = "0.0.0.0"
-    phones_port: int = PHONES_PORT
-    open: bool = True
+DEFAULT = "hands-on"
 
 
 @dataclass(frozen=True, kw_only=True)

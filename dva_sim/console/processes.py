@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from dva_sim.cameras.children import END_WITHIN, Child
-from dva_sim.console.options import PageOptions
+from dva_sim.console.page_options import PageOptions
 from dva_sim.network.realtime import PacedClock
 from dva_sim.serving.listening import listen
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.audit_keeper import auditing
-from dva_sim.console.options import PageOptions
+from dva_sim.console.page_options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.refusal import Refused
 from dva_sim.console.robot_desk import RobotDesk

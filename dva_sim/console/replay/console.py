@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.options import PageOptions
+from dva_sim.console.page_options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
 from dva_sim.console.replay.player import Player, playing
 from dva_sim.console.replay.recorded_run import RecordedRun

@@ -1,0 +1,30 @@
+"""Where the pages of whatever is shown are to be seen, and by whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+DEFAULT_PORT, PHONES_PORT = 8765, 8766
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageOptions:
+    """Where pages are to be seen, and by whom.
+
+    Attributes:
+        host: Address to listen on.
+        port: 0: any that is free.
+        token: Whether the address has to hold a secret.
+        phones: Whether phones have an address of their own, by https.
+        phones_host: Address to listen on for them.
+        phones_port: 0: any that is free.
+        open: Whether a browser is opened, where there is one.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = DEFAULT_PORT
+    token: bool = True
+    phones: bool = False
+    phones_host: str = "0.0.0.0"
+    phones_port: int = PHONES_PORT
+    open: bool = True
