@@ -59,6 +59,7 @@ def test_the_last_moment_is_that_of_the_title_and_the_robot_is_where_it_was_then
     assert titles(typical)[-1] == "72.2 s: confirmation"
     robot = typical.figure.axes[-1].lines[-1].get_xydata()[0]
     assert robot == pytest.approx([12.0 + (BEGINS + 72.2) / 10, 12.0])
+    assert f"{BEGINS + 72.2:g},{robot[0]:g}," in typical.csv.decode()  # as all that is drawn
 
 
 def test_an_event_is_named_by_its_kind_in_its_room_once_it_has_begun(drawn):

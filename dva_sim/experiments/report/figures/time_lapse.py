@@ -87,7 +87,8 @@ class _TimeLapse(ReportFigure):
         """
         names = agents_of(episode.moments)
         ways = {name: way_of(episode.moments, name) for name in names}
-        moved = {name: way for name, way in ways.items() if len(way[0])}
+        times = instants(episode, _MOMENTS)
+        moved = {name: _with(times, *way) for name, way in ways.items() if len(way[0])}
         if not moved:
             return None
         site = site_of(scenario)
@@ -100,11 +101,11 @@ class _TimeLapse(ReportFigure):
         height = row_height(size, columns=abreast)
         figure, rows = panels(_MOMENTS // abreast, abreast, height, sharex=True, sharey=True)
         nose, numbers = _NOSE * float(size[0]), Numbers()
-        times, numbered = instants(episode, _MOMENTS), _numbered(list(moved))
+        numbered = _numbered(list(moved))
         for ax, time in zip((ax for row in rows for ax in row), times, strict=True):
             draw_ground(ax, site)
             for name, (when, places) in moved.items():
-                so_far = _until(when, places, time)
+                so_far = places[when <= time]
                 _agent(ax, so_far, look_of(kind_of(name)), nose)
                 if name in numbered and len(so_far):
                     _number(ax, name, so_far[-1])
@@ -150,15 +151,15 @@ def _clock(episode: KeptEpisode, time: float) -> str:
     return f"{number(time - span.begins)} s{end}"
 
 
-def _until(when: Floats, places: Floats, time: float) -> Floats:
-    """The way up to a moment, the last step as far as it was gone `(n, 3)`."""
-    so_far, after = places[when <= time], places[when > time]
-    if not len(so_far) or not len(after) or when[len(so_far) - 1] == time:
-        return so_far
-    before, following = when[len(so_far) - 1], when[len(so_far)]
-    x, y, heading = so_far[-1]
-    dx, dy = (after[0, :2] - (x, y)) * (time - before) / (following - before)
-    return np.vstack([so_far, (x + dx, y + dy, heading)])
+def _with(times: Sequence[float], when: Floats, places: Floats) -> tuple[Floats, Floats]:
+    """A way with its places at some moments between its samples, too: on the line between them."""
+    more = [t for t in times if when[0] < t < when[-1] and t not in when]
+    last = np.searchsorted(when, more, side="right") - 1  # a heading holds until the next one
+    between = [np.interp(more, when, places[:, i]) for i in (0, 1)]
+    every = np.concatenate([when, more])
+    order = np.argsort(every, kind="stable")
+    added = np.column_stack([*between, places[last, 2]])
+    return every[order], np.vstack([places, added])[order]
 
 
 def _place_of(incident: SeenIncident, site: Site | None) -> tuple[float, float]:
