@@ -191,3 +191,10 @@ def test_locks_that_cannot_be_shared_are_told_with_the_way_around(monkeypatch):
     with pytest.raises(DvaSimError) as error, workers.executor(2, load_study):
         pass
     assert unnamed(str(error.value), "/dev/shm", "--jobs 1") == []
+
+
+@pytest.mark.parametrize("name", ["dispatch", "network", "operators"])
+def test_evidence_is_no_study_and_its_command_is_named(name):
+    done = call("run", f"experiments/validation/{name}.yaml")
+    assert done.returncode == ExitCode.USAGE
+    assert unnamed(done.stderr, f"{name}.yaml", f"dva-sim validate {name}") == []

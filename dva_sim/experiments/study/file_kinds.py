@@ -133,6 +133,10 @@ def of_other_kind(document: Document, command: str, wanted: str) -> ConfigError 
         command: Which files of the right kind have.
         wanted: What these are called.
     """
+    folder = document.file.resolve().parent
+    if folder.as_posix().endswith(EVIDENCE):
+        validate = f"dva-sim validate {document.file.stem.partition('-')[0]}"
+        return ConfigError(f"is evidence, not a {wanted}; try: {validate}", document.file)
     kind = recognise(document)
     if kind is None or kind.command == command:
         return None
