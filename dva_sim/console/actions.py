@@ -330,6 +330,12 @@ class Actions:
         log.by = log.by._replace(tour_time=took)
         said(True, f"{took:.1f} s noted")
 
+    @does("mark")
+    def _mark(self, client: str, line: Line, said: Said) -> None:
+        world = self._world
+        world.recorder.tell(world.clock.now, world.author(client), f"marks: {line['text']}")
+        said(True, "marked")
+
     @does("watch")
     def _watch(self, _: str, line: Line) -> None:
         ids = {t["id"] for t in self._world.feed.things if t["i"] in line["robots"]}

@@ -110,6 +110,16 @@ def test_a_robot_alone_keeps_who_switched_it_off(tmp_path):
     assert rows["fault"].details["what"] == "processing"
 
 
+def test_a_mark_stands_in_the_story_under_the_name_of_its_author(monkeypatch):
+    page = Page(monkeypatch)
+    assert page.do("take", robots=[0])[0]
+    assert page.do("mark", text="the participant sighs")[0]
+    page.let(0.2)
+    told = [(line["who"], line["what"], line["kind"]) for line in page.told("story")]
+    assert ("console-1", "marks: the participant sighs", "event") in told
+    assert not page.do("mark", text="two\nlines")[0]
+
+
 def test_what_is_declared_for_a_place_has_to_be_done_there():
     with pytest.raises(TypeError, match="seek"):
         ActionDispatcher(ActionPlace.REPLAY, [], print, "nobody")

@@ -23,6 +23,7 @@ from dva_sim.console.wire.arguments import (
     GuardWord,
     LinkChange,
     LogsLooked,
+    MarkAsked,
     MissionAsked,
     ModeAsked,
     MomentAsked,
@@ -205,6 +206,7 @@ _LIST = (
     Action("decline", "declines an order"),
     Action("tour", "finds goals for the guided tour", audit=_LOOKS, role=Role.DRIVE),
     Action("tour_time", "notes how long a goal of the tour took", TourTime, role=Role.DRIVE),
+    Action("mark", "marks this moment in the story", MarkAsked, role=Role.DRIVE),
     # --- recordings
     Action("seek", "goes to a moment", MomentAsked, **_PLAYED),
     Action("open_recording", "plays another recording", RecordingAsked, **_PLAYED),

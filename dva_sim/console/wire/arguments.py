@@ -117,6 +117,12 @@ class TourTime(OfRobot):
     took_s: Annotated[float, Number(0, LONGEST_LEG)]
 
 
+class MarkAsked(TypedDict):
+    """Words that mark this moment."""
+
+    text: Annotated[str, Text(1, 256)]
+
+
 class MomentAsked(TypedDict):
     """A moment of a recording."""
 

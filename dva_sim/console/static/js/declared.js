@@ -13,6 +13,7 @@ export const PATIENCE_MS = {
  "decline": 10000,
  "tour": 10000,
  "tour_time": 10000,
+ "mark": 10000,
  "seek": 10000,
  "open_recording": 10000,
  "manual_take": 10000,

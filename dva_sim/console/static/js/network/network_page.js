@@ -6,6 +6,7 @@ import { driven } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
 import { isNumber, msText } from '../ui/words.js';
 import { LinkPanel } from './link_panel.js';
+import { MarkMoment } from './mark_moment.js';
 import { PatternSelect } from './pattern_select.js';
 import { KINDS, SPAN_S, read } from './samples.js';
 
@@ -20,6 +21,7 @@ export function NetworkPage() {
   return html`<main class="page network-page" id="main" tabindex="-1">
     <h1 class="hidden">Network</h1>
     <${LinkPanel} />
+    <${MarkMoment} />
     <${Figures} />
     <${Charts} />
   </main>`;

@@ -1,0 +1,23 @@
+/** A mark in the story, such as what a participant just said: a recording can be wound to it. */
+import { html, useState } from '../../vendor/preact.js';
+import { isOperator, maySteer } from '../store.js';
+import { act } from '../net/actions.js';
+import { Field } from '../ui/fields.js';
+
+/** The panel. */
+export function MarkMoment() {
+  const [text, setText] = useState('');
+  const [told, tell] = useState('');
+  const mark = async () => {
+    const done = await act('mark', { text: text.trim() });
+    tell(done.ok ? done.text : '');
+    if (done.ok) setText('');
+  };
+  return html`<section class="panel" aria-label="Mark">
+    <h2>Mark this moment</h2>
+    <${Field} name="Words" value=${text} most=${256} onInput=${setText}
+      hint="They stand in the story, in the recording and in the audit log." />
+    <button type="button" disabled=${!maySteer.value || !isOperator.value || !text.trim()}
+      onClick=${mark}>Mark</button>
+    <p role="status" aria-label="Marked">${told}</p></section>`;
+}
