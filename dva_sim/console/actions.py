@@ -10,12 +10,12 @@ from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.alarm_actions import AlarmActions
-from dva_sim.console.answers import BYE
-from dva_sim.console.audited import name_of_page
-from dva_sim.console.dispatcher import ActionDispatcher, does
+from dva_sim.console.asking.answers import BYE
+from dva_sim.console.asking.dispatcher import ActionDispatcher, does
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.audit.audited import name_of_page
 from dva_sim.console.guard_actions import GuardActions
 from dva_sim.console.phone_actions import PhoneActions
-from dva_sim.console.refusal import Refused, Said
 from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.room_actions import RoomActions
 from dva_sim.console.seats import SILENT_AFTER, Seats

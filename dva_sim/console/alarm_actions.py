@@ -7,8 +7,8 @@ from typing import Any
 
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.console.alarm_desk import AlarmDesk
-from dva_sim.console.dispatcher import Doer, does
-from dva_sim.console.refusal import Said
+from dva_sim.console.asking.dispatcher import Doer, does
+from dva_sim.console.asking.refusal import Said
 
 Line = dict[str, Any]
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.device_rows import DeviceRows
-from dva_sim.console.dispatcher import does
 from dva_sim.console.dva_port import DvaPort
 from dva_sim.console.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.real_links import ConsoleSockets
-from dva_sim.console.refusal import Refused, Said
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
 

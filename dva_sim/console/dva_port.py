@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, cast
 
+from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.real_links import ConsoleSockets
-from dva_sim.console.refusal import Refused
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.sockets import NetworkError, split_address
 from dva_sim.network.virtual_network import VirtualNetwork

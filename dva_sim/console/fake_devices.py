@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from dva_sim.agents.device import AgentDevice
-from dva_sim.console.refusal import Refused, Said, unanswered
+from dva_sim.console.asking.refusal import Refused, Said, unanswered
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.limits import pattern

@@ -11,7 +11,7 @@ from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.played_run import PlayedRun
-from dva_sim.console.stands import why_stands
+from dva_sim.console.robots.stands import why_stands
 from dva_sim.core.event_status import state_since
 from dva_sim.core.events import FINAL, Event, EventBook
 from dva_sim.kernel.recorder import Moment

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from dva_sim.agents.people.person_guard import PersonGuard
-from dva_sim.console.dispatcher import does
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.world import ConsoleWorld
 
 Line = dict[str, Any]

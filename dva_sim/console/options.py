@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from dva_sim.console.audit_keeper import check_target as check_audit_target
+from dva_sim.console.audit.audit_keeper import check_target as check_audit_target
 from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.page_options import PageOptions
 from dva_sim.console.real_links import ConsoleSockets, MakeSockets

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.operator.person_at_console import PersonAgent
-from dva_sim.console.dispatcher import does
-from dva_sim.console.phone_input import samples_of, settings_of
-from dva_sim.console.phone_seat import PhoneSeat
-from dva_sim.console.refusal import NO_ANSWER, Refused, Said
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import NO_ANSWER, Refused, Said
+from dva_sim.console.phones.phone_input import samples_of, settings_of
+from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.seats import Seats
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.protocol import messages as m

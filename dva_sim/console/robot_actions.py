@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from dva_sim.agents.robot.controller import Decision
-from dva_sim.console.dispatcher import does
-from dva_sim.console.refusal import Refused, Said
-from dva_sim.console.robot_windows import RobotWindow, RobotWindows
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.robots.robot_windows import RobotWindow, RobotWindows
 from dva_sim.console.seats import SILENT_AFTER
 from dva_sim.protocol import messages as m
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from dva_sim.console.dispatcher import ActionDispatcher, does
-from dva_sim.console.refusal import Said
+from dva_sim.console.asking.dispatcher import ActionDispatcher, does
+from dva_sim.console.asking.refusal import Said
 from dva_sim.console.robot_actions import RobotActions
 from dva_sim.console.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ActionPlace

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.audit_keeper import auditing
+from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.page_options import PageOptions
 from dva_sim.console.processes import ConsoleProcesses
-from dva_sim.console.refusal import Refused
 from dva_sim.console.robot_desk import RobotDesk
 from dva_sim.console.robot_world import RobotWorld
 from dva_sim.console.web.addresses import own_address

@@ -14,17 +14,17 @@ from typing import Any
 from dva_sim.agents.observation import Cameras
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.screens import OwnScreens, camera_url, topic_of
-from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.audited import Audited, name_of_page
+from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.feed import Feed
 from dva_sim.console.lag import LagRule
 from dva_sim.console.logs import PERIOD, Logs
 from dva_sim.console.real_links import ConsoleSockets
 from dva_sim.console.recorder import ConsoleRecorder
-from dva_sim.console.robot_station import LISTENING, OwnStation
-from dva_sim.console.robot_windows import RobotWindows
+from dva_sim.console.robots.robot_station import LISTENING, OwnStation
+from dva_sim.console.robots.robot_windows import RobotWindows
+from dva_sim.console.robots.stands import why_stands
 from dva_sim.console.scene import scene_of
-from dva_sim.console.stands import why_stands
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link.link import Link

@@ -9,7 +9,7 @@ from typing import Any
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.feed import Feed
-from dva_sim.console.phone_seat import PhoneSeat
+from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run

@@ -9,7 +9,7 @@ from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
 from dva_sim.console.actions import Actions
-from dva_sim.console.audit_keeper import auditing
+from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.processes import ConsoleProcesses

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
-from dva_sim.console.refusal import Said, unanswered
+from dva_sim.console.asking.refusal import Said, unanswered
 from dva_sim.console.rooms import why
 from dva_sim.protocol import messages as m
 

@@ -9,22 +9,22 @@ from typing import Any
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.screens import Screens
 from dva_sim.console.alarm_desk import AlarmDesk
-from dva_sim.console.audited import Audited
+from dva_sim.console.audit.audited import Audited
 from dva_sim.console.decisions import about_event
 from dva_sim.console.dva_pages import DvaPages
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
 from dva_sim.console.logs import PERIOD, Logs
-from dva_sim.console.phones import Phones
+from dva_sim.console.phones.phones import Phones
 from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.recorder import ConsoleRecorder
-from dva_sim.console.robot_windows import RobotWindows
+from dva_sim.console.robots.robot_windows import RobotWindows
+from dva_sim.console.robots.stands import why_stands
 from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.scene import scene_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders
-from dva_sim.console.stands import why_stands
 from dva_sim.console.strangers import Strangers
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run

@@ -8,7 +8,7 @@ from helpers.console.attached_console import OWN, AttachedPage, attached
 from helpers.wording import unnamed
 
 from dva_sim.agents.device import AUDIT
-from dva_sim.console.audit_measures import measured
+from dva_sim.console.audit.audit_measures import measured
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.audit_log import verify
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from helpers.processes.patience import becomes
 
-from dva_sim.console import audit_keeper
-from dva_sim.console.audit_keeper import AuditKeeper, check_target
+from dva_sim.console.audit import audit_keeper
+from dva_sim.console.audit.audit_keeper import AuditKeeper, check_target
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.audit_log import BEGIN, END, AuditRow, read_rows, verify
 

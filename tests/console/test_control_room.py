@@ -9,7 +9,7 @@ from helpers.console.simulated_phone import FIRE, PhonePage
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.core.events import State
 from dva_sim.protocol.mistakes import check_message
 from dva_sim.recordings.audit_log import AuditRow, read_rows, verify

@@ -7,9 +7,9 @@ import pytest
 from helpers.console.simulated_console import Page
 from helpers.paths import ROOT
 
-from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.audited import Audited
-from dva_sim.console.dispatcher import ActionDispatcher
+from dva_sim.console.asking.dispatcher import ActionDispatcher
+from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audited import Audited
 from dva_sim.console.robot_desk import RobotDesk
 from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.wire import generated

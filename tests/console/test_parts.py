@@ -7,10 +7,10 @@ import socket
 import pytest
 
 from dva_sim.cameras.pipes import MOST_WAITING, LineOutbox, LinePipe
-from dva_sim.console.answers import Answers
+from dva_sim.console.asking.answers import Answers
+from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.lag import GOOD_FOR, LIMIT, LagRule
 from dva_sim.console.link import changed
-from dva_sim.console.refusal import Refused
 from dva_sim.console.seats import MOST_SEATS, SILENT_AFTER, Seats
 from dva_sim.console.tour import FAR, LEAST, tour_of
 from dva_sim.console.wire.actions import ACTIONS

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.phone_input import samples_of
+from dva_sim.console.phones.phone_input import samples_of
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
 

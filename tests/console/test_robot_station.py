@@ -10,8 +10,8 @@ from helpers.wording import unnamed
 
 from dva_sim.console.robot_desk import RobotDesk
 from dva_sim.console.robot_simulator import RobotOptions
-from dva_sim.console.robot_station import two_free_ports
 from dva_sim.console.robot_world import RobotWorld
+from dva_sim.console.robots.robot_station import two_free_ports
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import hints_of
 from dva_sim.kernel.errors import ConfigError

@@ -6,7 +6,7 @@ from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.latencies import KEPT, Latencies
+from dva_sim.console.robots.latencies import KEPT, Latencies
 
 
 @pytest.fixture

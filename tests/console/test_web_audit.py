@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from helpers.console.served_console import Served, serving
 
-from dva_sim.console.audit_measures import measured
+from dva_sim.console.audit.audit_measures import measured
 from dva_sim.console.web.audit import csv_of
 from dva_sim.recordings.audit_log import (
     BEGIN,

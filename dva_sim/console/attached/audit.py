@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
+from dva_sim.console.asking.refusal import Said
 from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.audited import Audited
-from dva_sim.console.refusal import Said
+from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audited import Audited
 from dva_sim.console.wire.actions import ACTIONS, Action, Audit
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m

@@ -8,12 +8,12 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import NO_ANSWER, Refused, Said, unanswered
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.dispatcher import does
 from dva_sim.console.missions import inspection_of, send_on_mission
-from dva_sim.console.refusal import NO_ANSWER, Refused, Said, unanswered
 from dva_sim.console.takeover import Takeover
 from dva_sim.protocol import messages as m
 

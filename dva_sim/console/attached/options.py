@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dva_sim.console.audit_keeper import check_target
+from dva_sim.console.audit.audit_keeper import check_target
 from dva_sim.console.page_options import PageOptions
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError

@@ -15,7 +15,7 @@ from dva_sim.console.attached.audit import AttachedAudit
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.sensing import ToldSensors
 from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.decisions import about_event, dispatch_line
 from dva_sim.core.registry import ROBOT
 from dva_sim.kernel.recorder import Moment

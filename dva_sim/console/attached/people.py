@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dva_sim.console.audited import name_of_page
+from dva_sim.console.audit.audited import name_of_page
 from dva_sim.core.roles import ControlRoomRole
 
 Line = dict[str, Any]

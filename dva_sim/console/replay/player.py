@@ -11,8 +11,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dva_sim.console.dispatcher import ActionDispatcher, does
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.asking.dispatcher import ActionDispatcher, does
+from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.replay.audit import RecordedAudit
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun

@@ -6,8 +6,8 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from typing import Any
 
-from dva_sim.console.latencies import KEPT, Latencies
-from dva_sim.console.robot_windows import WHEEL
+from dva_sim.console.robots.latencies import KEPT, Latencies
+from dva_sim.console.robots.robot_windows import WHEEL
 from dva_sim.kernel.recorder import Applied, DriveLog, Sent
 
 Line = dict[str, Any]

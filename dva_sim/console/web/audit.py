@@ -16,7 +16,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from dva_sim.console.audit_measures import measured
+from dva_sim.console.audit.audit_measures import measured
 from dva_sim.console.web.rest import NOT_KEPT, problem
 from dva_sim.kernel.csv_cells import harmless_row
 from dva_sim.kernel.errors import ConfigError

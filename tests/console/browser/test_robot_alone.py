@@ -14,7 +14,7 @@ from helpers.processes.patience import PATIENCE_S
 from helpers.processes.programs import Program, Programs
 from playwright.sync_api import Page, expect
 
-from dva_sim.console.robot_station import two_free_ports
+from dva_sim.console.robots.robot_station import two_free_ports
 
 # The client sends no heartbeats: a robot that takes seconds for each message would lose it.
 QUICK = "--set", "robot.processing_s=0.05"

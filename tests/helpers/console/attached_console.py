@@ -13,7 +13,7 @@ from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.recordings.audit_log import AuditRow, read_rows
 from dva_sim.simulation.full.stage import id_of

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.kernel.errors import DvaSimError
 

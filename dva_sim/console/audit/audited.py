@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from dva_sim.console.audit_keeper import AuditKeeper
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.wire.actions import ACTIONS, Action, Audit
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m

@@ -8,7 +8,7 @@ from contextlib import closing
 from typing import Any
 
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.console.refusal import Refused
+from dva_sim.console.asking.refusal import Refused
 from dva_sim.network.sockets import PORT_TRIES, NetworkError, SocketNetwork
 from dva_sim.protocol import messages as m
 

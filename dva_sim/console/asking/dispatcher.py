@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from dva_sim.console.answers import Answers, answering
-from dva_sim.console.refusal import Refused, Said
+from dva_sim.console.asking.answers import Answers, answering
+from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, ActionPlace, Queueing
 from dva_sim.console.wire.kinds import BadMessage
 

@@ -16,7 +16,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.console.latencies import Latencies
+from dva_sim.console.robots.latencies import Latencies
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.tap import Exchange
 from dva_sim.protocol import messages as m

@@ -17,7 +17,7 @@ from dva_sim.agents.tilt import PhoneClock, PhoneProfile, TiltSources
 from dva_sim.agents.tilt.accelerometer import Triple
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.device_axes import to_tilt_axes
-from dva_sim.console.phone_input import PhoneSettings, Samples
+from dva_sim.console.phones.phone_input import PhoneSettings, Samples
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.motion import MotionApp, MotionSample, MotionWriter
 

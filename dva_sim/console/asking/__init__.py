@@ -1,0 +1,1 @@
+"""Actions of pages, done once and answered once, or refused with the reason."""
