@@ -196,5 +196,5 @@ def test_locks_that_cannot_be_shared_are_told_with_the_way_around(monkeypatch):
 @pytest.mark.parametrize("name", ["dispatch", "network", "operators"])
 def test_evidence_is_no_study_and_its_command_is_named(name):
     done = call("run", f"experiments/validation/{name}.yaml")
-    assert done.returncode == ExitCode.USAGE
+    assert done.returncode == 2
     assert unnamed(done.stderr, f"{name}.yaml", f"dva-sim validate {name}") == []
