@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from dva_sim.agents.operator.handheld import Gathered
-from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.asking.dispatcher import Doer, does
 from dva_sim.console.asking.refusal import Said
+from dva_sim.console.events.alarm_desk import AlarmDesk
 
 Line = dict[str, Any]
 

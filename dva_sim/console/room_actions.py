@@ -8,11 +8,11 @@ from typing import Any
 
 from dva_sim.console.asking.dispatcher import Doer, does
 from dva_sim.console.asking.refusal import Refused, Said
-from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.missions import inspection_of, send_on_mission
-from dva_sim.console.rooms import ConsoleRoom
+from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.events.missions import inspection_of, send_on_mission
+from dva_sim.console.events.rooms import ConsoleRoom
+from dva_sim.console.events.takeover import Takeover
 from dva_sim.console.seats import Seats
-from dva_sim.console.takeover import Takeover
 from dva_sim.console.world import ConsoleWorld
 from dva_sim.protocol import messages as m
 

@@ -8,10 +8,11 @@ from typing import Any
 
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.cameras.screens import Screens
-from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.audit.audited import Audited
-from dva_sim.console.decisions import about_event
 from dva_sim.console.dva_pages import DvaPages
+from dva_sim.console.events.alarm_desk import AlarmDesk
+from dva_sim.console.events.decisions import about_event
+from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
@@ -21,7 +22,6 @@ from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.robots.stands import why_stands
-from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.scene import scene_of
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders

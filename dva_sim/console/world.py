@@ -16,10 +16,11 @@ from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.cameras.screens import Screens, camera_url, topic_of
-from dva_sim.console.alarm_desk import AlarmDesk, RunFacts
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.dva_pages import DvaPages
+from dva_sim.console.events.alarm_desk import AlarmDesk, RunFacts
+from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.feed import Feed
 from dva_sim.console.fields import HazardFeed
 from dva_sim.console.lag import LagRule
@@ -29,7 +30,6 @@ from dva_sim.console.played_guards import PlayedGuards
 from dva_sim.console.real_links import MakeSockets
 from dva_sim.console.recorder import ConsoleRecorder
 from dva_sim.console.robots.robot_windows import RobotWindows
-from dva_sim.console.rooms import ConsoleRooms
 from dva_sim.console.seat_lines import SeatLines
 from dva_sim.console.sliders import LinkSliders, setup_of
 from dva_sim.console.strangers import Strangers

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dva_sim.console.alarms import AlarmCondition, Alarms
+from dva_sim.console.events.alarms import AlarmCondition, Alarms
 from dva_sim.recordings.audit_log import BEGIN, AuditEntry, AuditLog
 
 Line = dict[str, Any]

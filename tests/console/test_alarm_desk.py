@@ -6,8 +6,8 @@ import pytest
 from helpers.console.simulated_phone import PhonePage
 from helpers.wording import unnamed
 
-from dva_sim.console.alarm_desk import ESCALATED_FOR, AlarmDesk, RunFacts
 from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.events.alarm_desk import ESCALATED_FOR, AlarmDesk, RunFacts
 from dva_sim.worlds.bodies import TickTarget
 
 

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from dva_sim.console.alarms import (
+from dva_sim.console.events.alarms import (
     LONGEST_SHELF,
     MOST_ALARMS,
     PRIORITIES,

@@ -12,9 +12,9 @@ from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import NO_ANSWER, Refused, Said, unanswered
 from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.system import AttachedSystem
-from dva_sim.console.decisions import DECISIONS, answer_of, decision_of, report_of
-from dva_sim.console.missions import inspection_of, send_on_mission
-from dva_sim.console.takeover import Takeover
+from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.events.missions import inspection_of, send_on_mission
+from dva_sim.console.events.takeover import Takeover
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from dva_sim.console.alarm_desk import AlarmDesk
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.alarm_facts import ToldFacts
 from dva_sim.console.attached.audit import AttachedAudit
@@ -16,7 +15,8 @@ from dva_sim.console.attached.people import AttachedPeople
 from dva_sim.console.attached.sensing import ToldSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
-from dva_sim.console.decisions import about_event, dispatch_line
+from dva_sim.console.events.alarm_desk import AlarmDesk
+from dva_sim.console.events.decisions import about_event, dispatch_line
 from dva_sim.core.registry import ROBOT
 from dva_sim.kernel.recorder import Moment
 from dva_sim.protocol import messages as m

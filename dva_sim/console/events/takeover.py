@@ -13,7 +13,7 @@ from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.asking.refusal import Said, unanswered
-from dva_sim.console.rooms import why
+from dva_sim.console.events.rooms import why
 from dva_sim.protocol import messages as m
 
 AGAIN: Final = 0.5  # while a robot is brought to a standstill, or the policy was quicker [s]

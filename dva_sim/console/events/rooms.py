@@ -14,7 +14,7 @@ from typing import Any, Final
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import Said, unanswered
-from dva_sim.console.decisions import dispatch_line
+from dva_sim.console.events.decisions import dispatch_line
 from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.core.roles import Roles
 from dva_sim.kernel.labels import with_id

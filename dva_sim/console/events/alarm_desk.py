@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, Protocol
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.alarms import AlarmCondition, Alarms
 from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.events.alarms import AlarmCondition, Alarms
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.recorder import Breach
 from dva_sim.simulation.full.run import Run

@@ -1,0 +1,1 @@
+"""Events and alarms: what people in control rooms decide, and the messages that it becomes."""
