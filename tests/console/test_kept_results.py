@@ -16,9 +16,9 @@ from dva_sim.console.recorder import KEPT
 from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.execution.checkpoint import load_so_far
 from dva_sim.experiments.execution.kept_run import KEPT_RUN, KeptRun
-from dva_sim.experiments.report import answer_table
 from dva_sim.experiments.report.blocks import Printed
 from dva_sim.experiments.report.report import blocks_of
+from dva_sim.experiments.report.study_size import size_of
 from dva_sim.experiments.report.summary import Reading
 from dva_sim.experiments.results.folder_lock import FolderInUse
 from dva_sim.experiments.results.results import Results
@@ -140,7 +140,7 @@ def test_each_command_that_took_effect_is_a_row(whole):
 
 def test_its_report_shows_the_drives_of_people_by_pattern_and_link_and_compares_nothing(whole):
     reading = Reading(whole)
-    told = [reading.answer.lead, answer_table.size_of(reading)]
+    told = [reading.answer.lead, size_of(reading)]
     assert unnamed(" ".join(told), "1 person", "4 drives", "2 robots", "people drove") == []
     (table,) = reading.cells
     assert [row[:4] for row in table.rows] == [
