@@ -59,7 +59,13 @@ def bytes_of(folder: Path) -> dict[str, bytes]:
 
 
 HEAVY = {"matplotlib", "scipy", "numpy", "pymunk", "duckdb", "lxml", "shapely", "PIL", "pandas"}
-HEAVY |= {"rich", "distributed", "dask", "multiprocessing", "pydantic", "dva_sim.kernel.config"}
+HEAVY |= {
+    "rich",
+    "distributed",
+    "dask",
+    "multiprocessing",
+    "dva_sim.kernel.config",
+}  # Typer: pydantic
 HEAVY |= {"dva_sim.simulation", "dva_sim.experiments", "dva_sim.core"}
 
 
