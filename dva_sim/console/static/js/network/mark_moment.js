@@ -14,10 +14,9 @@ export function MarkMoment() {
     if (done.ok) setText('');
   };
   return html`<section class="panel" aria-label="Mark">
-    <h2>Mark this moment</h2>
-    <${Field} name="Words" value=${text} most=${256} onInput=${setText}
-      hint="They stand in the story, in the recording and in the audit log." />
-    <button type="button" disabled=${!maySteer.value || !isOperator.value || !text.trim()}
-      onClick=${mark}>Mark</button>
+    <h2>Mark this moment <span class="soft">a note in the story, the recording and the audit log</span></h2>
+    <div class="filters"><${Field} name="Note" value=${text} most=${256} onInput=${setText} />
+      <button type="button" disabled=${!maySteer.value || !isOperator.value || !text.trim()}
+        onClick=${mark}>Mark</button></div>
     <p role="status" aria-label="Marked">${told}</p></section>`;
 }
