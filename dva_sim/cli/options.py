@@ -2,7 +2,8 @@
 
 A command that stands for a function of `dva_sim` takes its parameters with their defaults
 (`takes`), each in the form of its entry in `OPTIONS`. Numbers are read here too, so that a wrong
-one is told with what would be right. Nothing heavy is imported: every command begins here.
+one is refused with the range that is allowed. Nothing heavy is imported: every command starts
+here.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def argument(help: str, metavar: str, completer: Completer | None = None) -> Any:
-    """What has to be given, by its place."""
+    """A required argument, given by its position."""
     return Annotated[str, Argument(metavar=metavar, autocompletion=completer, help=help)]
 
 

@@ -211,7 +211,7 @@ class Actions:
 
     @does("input")
     def _input(self, client: str, line: Line) -> None:
-        """What a person wants now; who does not hold on wants to stand."""
+        """Steer as a person wants now; a stick that is let go asks for a stop."""
         self._drew(client, line)
         held = line["held"]
         if not held and self._phones.is_tilted(client):

@@ -1,4 +1,4 @@
-"""Where the pages of whatever is shown are to be seen, and by whom."""
+"""Options of the pages: addresses, ports and tokens."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ DEFAULT_PORT, PHONES_PORT = 8765, 8766
 
 @dataclass(frozen=True, kw_only=True)
 class PageOptions:
-    """Where pages are to be seen, and by whom.
+    """Addresses of the pages, and the secrets they ask for.
 
     Attributes:
         host: Address to listen on.

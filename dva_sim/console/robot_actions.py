@@ -110,7 +110,7 @@ class RobotActions:
 
     @does("manual")
     def input(self, client: str, line: Line) -> None:
-        """What a hand wants now, as shares of the limits; what is not held wants to stand."""
+        """Steer as a hand wants now, in shares of the limits; letting go asks for a stop."""
         hand = self._hands.get(client)
         if hand is None:
             return

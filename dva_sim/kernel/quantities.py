@@ -1,4 +1,4 @@
-"""Numbers written with a unit: what to write instead, where a file wants the number alone."""
+"""Numbers written with a unit, and the number to write where a file wants it alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which of several continuous factors the outcome varies with: Sobol's indices."""
+"""Sobol's indices: the share of the outcome's variance that each continuous factor explains."""
 
 from __future__ import annotations
 

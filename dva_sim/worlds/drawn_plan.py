@@ -1,4 +1,4 @@
-"""What is drawn on a plan, as a floor: walls opened at doors, rooms, zones, cameras."""
+"""The floor that a drawn plan describes: walls opened at doors, rooms, zones, cameras."""
 
 from __future__ import annotations
 

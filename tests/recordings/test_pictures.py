@@ -20,7 +20,7 @@ from dva_sim.recordings.pictures.bodies import DrawnBody
 from dva_sim.recordings.pictures.film import Film
 from dva_sim.recordings.pictures.film_files import write_film
 from dva_sim.recordings.pictures.moments import Moments
-from dva_sim.recordings.pictures.names import Box, Names
+from dva_sim.recordings.pictures.name_labels import Box, Names
 from dva_sim.recordings.pictures.run_endings import verdicts
 from dva_sim.recordings.pictures.scene import Scene
 from dva_sim.recordings.pictures.stills import best_time, even_times, still, strip

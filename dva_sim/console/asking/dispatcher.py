@@ -1,4 +1,4 @@
-"""What pages ask for, done by what a console shows: each action once, and answered once.
+"""The dispatcher of actions: each is done once and answered once, whatever is shown.
 
 There is one dispatcher for all that a console can show - a world, a DVA elsewhere, a robot alone, a
 recording. Functions are marked with the names of the actions that they do.
@@ -23,16 +23,17 @@ _Marked = TypeVar("_Marked", bound=Callable[..., object])
 
 
 class AuditedActions(Protocol):
-    """Whatever keeps who did what."""
+    """The interface of an audit log."""
 
     def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
-        """Whoever takes the answer to an action, once that is in the log."""
+        """Return a callback that passes an answer on once its row is in the log."""
 
 
 def does(*names: str) -> Callable[[_Marked], _Marked]:
-    """Mark a method as that which does actions: it gets the client, the line, and who waits.
+    """Mark a method as the one that does some actions.
 
-    One that does what has no answer gets the client and the line.
+    It is called with the client, the line and the callback for the answer; for an action without
+    an answer, with the client and the line.
     """
 
     def mark(method: _Marked) -> _Marked:
@@ -43,7 +44,7 @@ def does(*names: str) -> Callable[[_Marked], _Marked]:
 
 
 def doers_of(holders: Iterable[object]) -> dict[str, Callable[..., object]]:
-    """What was marked in some objects, by the names of the actions."""
+    """Collect the marked methods of some objects by the names of their actions."""
     found: dict[str, Callable[..., object]] = {}
     for holder in holders:
         for attribute in dir(type(holder)):
@@ -56,11 +57,11 @@ class ActionDispatcher:
     """Does what lines of the web process ask for.
 
     Args:
-        place: What is shown.
+        place: Of the actions that are done here.
         holders: Objects with marked methods, for all that is declared for this place.
         tell: Takes the answers.
-        elsewhere: Why what is declared for other places is not done here.
-        audited: Gives what keeps who did what; None: nothing does.
+        elsewhere: The refusal of actions that are declared for other places only.
+        audited: Gives the audit log; None: there is none.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class ActionDispatcher:
             self._answers.once(number, do, self._tell, repeats=repeats)
 
     def _hear(self, what: str, client: str, line: Line) -> None:
-        """What makes no sense, or is nothing for this place, counts as silence."""
+        """Do an action without an answer; invalid ones, and those of other places, are ignored."""
         take = self._doers.get(what)
         if take is not None:
             try:
@@ -100,7 +101,7 @@ class ActionDispatcher:
             take(client, asked)
 
     def do(self, client: str, line: Line, said: Said) -> None:
-        """Do an action, and keep who did it.
+        """Do an action, and note it in the audit log.
 
         Raises:
             Refused: it cannot be done here, or not now.
@@ -120,7 +121,7 @@ _KNOWN: Mapping[str, Any] = {**ACTIONS, **OF_THE_WEB}
 
 
 def _checked(line: Line) -> Line:
-    """A line whose arguments are as they are declared."""
+    """Check the arguments of a line against their declaration."""
     head = {key: value for key, value in line.items() if key in _HEAD}
     given = {key: value for key, value in line.items() if key not in _HEAD}
     asked: Line = _KNOWN[line["do"]].read(given) | head

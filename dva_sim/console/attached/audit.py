@@ -81,7 +81,7 @@ class AttachedAudit(Audited):
         return wait
 
     def is_noted(self, action: Action) -> bool:
-        """See `Audited`: all, but that nothing is in hand here which could be released."""
+        """Return True of all but `release`: an attached console holds nothing."""
         return action.name != "release"
 
     def _finish(self, number: str) -> None:

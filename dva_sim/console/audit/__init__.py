@@ -1,1 +1,1 @@
-"""The audit log of a console: its rows, who writes them, and what they say of people."""
+"""The audit log of a console: its rows, their authors, and measures of what people did."""

@@ -41,7 +41,7 @@ class Audited:
         self._author, self._label = author, label
 
     def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
-        """Whoever takes the answer to an action, once that is in the log.
+        """Return a callback that passes an answer on once its row is in the log.
 
         Raises:
             Refused: the log cannot be written, and the action stops nothing.

@@ -1,1 +1,1 @@
-"""Events and alarms: what people in control rooms decide, and the messages that it becomes."""
+"""Events and alarms: decisions of people in control rooms, and the messages they become."""

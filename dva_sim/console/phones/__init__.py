@@ -1,1 +1,1 @@
-"""Phones at a console: what their pages say, their seats, and all of them together."""
+"""Phones at a console: messages of their pages, their seats, and all of them together."""

@@ -1,4 +1,4 @@
-"""What a phone's page says: samples of its sensor, and how a person has calibrated it."""
+"""Messages of a phone's page: samples of its sensor, and its calibration."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Samples(NamedTuple):
 
 @dataclass(frozen=True)
 class PhoneSettings:
-    """How a person has calibrated a phone.
+    """The calibration of a phone.
 
     Attributes:
         reference: What it measures in the pose that means nothing, in its own axes [m/s^2].
@@ -63,7 +63,7 @@ def samples_of(line: dict[str, Any]) -> Samples:
 
 
 def settings_of(line: dict[str, Any]) -> PhoneSettings:
-    """What a calibration says.
+    """Read a calibration.
 
     Raises:
         ConfigError: there is no such filter or mapping; says which there are.

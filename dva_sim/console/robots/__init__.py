@@ -1,1 +1,1 @@
-"""Windows of a robot: its state, its station, why it stands and how late messages reach it."""
+"""Windows of a robot: its state, its station, reasons for standing, lateness of messages."""

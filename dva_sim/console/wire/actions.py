@@ -1,4 +1,4 @@
-"""What clients may ask for: a declaration for each action, and everything else follows from it.
+"""The declarations of all actions that clients may request; the rest is derived from them.
 
 A new action is an entry of `ACTIONS`, a function in what it acts on (found there by its name), and
 whatever shows it on a page. Checks at the web, roles, patience, rows of the audit log, the page's
@@ -7,7 +7,7 @@ constants (`python -m dva_sim.console.wire.generated`) and the table in `docs/co
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from itertools import pairwise
@@ -63,7 +63,7 @@ LONG: Final = 60.0  # for one that a robot or the DVA gives, or does not give af
 
 
 class ActionPlace(Flag):
-    """Where an action acts."""
+    """Places in which an action can act."""
 
     WORLD = auto()
     ATTACHED = auto()
@@ -72,11 +72,11 @@ class ActionPlace(Flag):
 
 
 class Audit(Enum):
-    """Which row of the audit log tells of an action.
+    """The row of the audit log that records an action.
 
     Attributes:
-        OWN: One that the console writes when it is answered.
-        DVA: That of the DVA's decision.
+        OWN: The console writes one when the action is answered.
+        DVA: The DVA's decision has one.
     """
 
     OWN = auto()
@@ -84,7 +84,7 @@ class Audit(Enum):
 
 
 class Queueing(Enum):
-    """How an action waits on its way to what it acts on.
+    """The order in which requests wait.
 
     Attributes:
         IN_TURN: Behind those before it.
@@ -99,22 +99,40 @@ class Queueing(Enum):
     BATCH = auto()
 
 
+def _agree(_: dict[str, Any]) -> None:
+    return None
+
+
+def check_times(asked: dict[str, Any]) -> None:
+    """A time for each sample, and each later than the one before.
+
+    Raises:
+        BadMessage: it is otherwise.
+    """
+    at = asked["at"]
+    if len(at) != len(asked["xyz"]):
+        raise BadMessage("at and xyz should be equally long")
+    if any(later <= one for one, later in pairwise(at)):
+        raise BadMessage("at should rise")
+
+
 @dataclass(frozen=True)
 class Action:
     """One action.
 
     Attributes:
         name: By which it is asked for.
-        does: What it does, as a sentence of the documentation goes on.
+        does: Its effect, in words for the documentation.
         arguments: A `TypedDict` that pydantic checks.
-        at: Where it acts.
+        at: Places in which it acts.
         role: The least that may ask for it.
-        audit: Which row of the audit log tells of it; or else why none does.
-        stops: Whether it only stops or gives back something: then it never waits for a disk.
+        audit: The row of the audit log that records it, or the reason why none does.
+        stops: Whether it only stops or releases something: then it never waits for a disk.
         over_link: Whether the answer comes from a robot or the DVA, over links that may be slow.
-        waits: How it waits on its way.
+        waits: Its order among other requests.
         seats: Whether a program needs a seat, or another thing of its own, from then on.
         has_answer: Whether it is answered.
+        check: Raises `BadMessage` if the arguments contradict each other.
     """
 
     name: str
@@ -128,10 +146,11 @@ class Action:
     waits: Queueing = Queueing.IN_TURN
     seats: bool = False
     has_answer: bool = True
+    check: Callable[[dict[str, Any]], object] = _agree
 
     @property
     def patience(self) -> float:
-        """How long its answer is waited for [s]."""
+        """Time allowed for its answer [s]."""
         return LONG if self.over_link else PATIENCE
 
     def read(self, given: Any, labels: Labels | None = None) -> dict[str, Any]:
@@ -142,24 +161,10 @@ class Action:
         """
         try:
             asked = read_arguments(self.arguments, given, labels)
-            if self.arguments is SampleBatch:
-                _check_times(asked)
+            self.check(asked)
         except BadMessage as error:
             raise BadMessage(f"{self.name}: {error}") from None
         return asked
-
-
-def _check_times(asked: dict[str, Any]) -> None:
-    """A time for each sample, and each later than the one before.
-
-    Raises:
-        BadMessage: it is otherwise.
-    """
-    at = asked["at"]
-    if len(at) != len(asked["xyz"]):
-        raise BadMessage("at and xyz should be equally long")
-    if any(later <= one for one, later in pairwise(at)):
-        raise BadMessage("at should rise")
 
 
 _OFTEN = "comes many times a second; what became of it is in the recording"
@@ -325,6 +330,7 @@ _LIST = (
         "samples",
         "says what a phone's sensor measures",
         SampleBatch,
+        check=check_times,
         **_SILENT | {"waits": Queueing.BATCH},
     ),
     Action(
@@ -340,7 +346,7 @@ _LIST = (
     ),
 )
 ACTIONS: Final[Mapping[str, Action]] = {action.name: action for action in _LIST}
-# What the web process says by itself, of all pages together.
+# Sent by the web process itself, for all pages together.
 OF_THE_WEB: Final[Mapping[str, Action]] = {
     action.name: action
     for action in (

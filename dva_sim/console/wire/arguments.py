@@ -1,4 +1,4 @@
-"""Arguments of actions: what a client may say, and the limits that are known in one place.
+"""Arguments of actions, with all their limits in one place.
 
 The annotations are read when a class is made, so that pydantic and the page's types have them.
 """

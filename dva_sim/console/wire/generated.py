@@ -1,4 +1,4 @@
-"""What pages and documentation say of the declarations: written from them, never by hand.
+"""Parts of the pages and the documentation that are generated from the declarations.
 
     python -m dva_sim.console.wire.generated
 

@@ -1,4 +1,4 @@
-"""Kinds of arguments: limits that pydantic checks, and the words for what would be right.
+"""Kinds of arguments: limits that pydantic checks, and the words of an error.
 
     delay_s: Annotated[float, Number(0, 5)]
 

@@ -6,10 +6,10 @@ from enum import IntEnum
 
 
 class Role(IntEnum):
-    """What a client may do; each may do what those before it may.
+    """The permissions of a client, in ascending order.
 
-    A phone drives its own robot, or is a guard's; whoever may drive changes the link, too. Who
-    dispatches sends others, and who supervises takes robots from their holders.
+    A phone drives its own robot, or belongs to a guard. Drivers may change the link as well,
+    dispatchers may send others, and supervisors may take robots from their holders.
     """
 
     NOBODY = 0

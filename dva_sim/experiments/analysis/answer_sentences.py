@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.experiments.analysis.answer import Answer, Finding, too_few
-from dva_sim.experiments.analysis.places import at, condition, is_ordered, places
+from dva_sim.experiments.analysis.level_phrases import at, condition, is_ordered, places
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import factor_name, level_name, measure_called, measure_name
 

@@ -1,4 +1,4 @@
-"""What arithmetic predicts of lock-step messaging: its rate, and from which delay on it binds."""
+"""Theory of lock-step messaging: its command rate, and the delay from which it binds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the conditions hold that a comparison should fail by."""
+"""Verdicts on the conditions under which a comparison fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which cells of two results folders are the same, as far as both vary the same things."""
+"""Matching cells of two results folders, as far as both vary the same factors."""
 
 from __future__ import annotations
 

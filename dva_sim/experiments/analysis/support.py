@@ -1,4 +1,4 @@
-"""Which cells lie beyond the delays at which people were watched: extrapolations."""
+"""Cells beyond the delays at which people were studied: extrapolations."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.competing_risks import CLEARED, CONFIRMED, NOTHING, Ended, Endings
-from dva_sim.experiments.analysis.places import place_of
+from dva_sim.experiments.analysis.level_phrases import place_of
 from dva_sim.experiments.analysis.run_grid import Setting
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.cell_table import CellTable

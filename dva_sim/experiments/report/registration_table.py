@@ -1,4 +1,4 @@
-"""What was registered beside what was run, line by line."""
+"""The registration beside the run, line by line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many persons it would take to settle what stayed open, as a table and in lines."""
+"""Persons needed to settle what stayed open, as a table and in lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large a study was as it was run, and whether that is its usual size."""
+"""The size of a study as it was run, and whether that is its usual size."""
 
 from __future__ import annotations
 

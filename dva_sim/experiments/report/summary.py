@@ -23,8 +23,8 @@ from dva_sim.experiments.analysis.study_view import (
     possible_values,
 )
 from dva_sim.experiments.analysis.support import support_of_part
+from dva_sim.experiments.report.answer_conditions import depends
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
-from dva_sim.experiments.report.depends import depends
 from dva_sim.experiments.report.heavy_runs import few_that_weigh
 from dva_sim.experiments.report.hypothesis_tables import verdict_sentences
 from dva_sim.experiments.report.results_reading import ResultsReading

@@ -1,4 +1,4 @@
-"""Where in a study a mistake of one of its scenarios was made: by `--set`, or in a file."""
+"""The origin of a mistake in a study's scenario: `--set`, or a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a YAML file is, by its keys and its folder; and a study opened by its name.
+"""Kinds of YAML files, told by their keys and folders; studies opened by name.
 
 A file of another kind than the one that is asked for is told what it is, and which command takes
 it. Files of evidence are known above (`testing/file_kinds.py`).

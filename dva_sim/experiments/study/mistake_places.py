@@ -1,4 +1,4 @@
-"""Mistakes in a scenario, told where they were made.
+"""Mistakes in a scenario, with the place where each was made.
 
 Looking for the place takes all kinds of files, which a scenario without a mistake never needs:
 `scenario_mistakes.mistakes_of` loads this module only when there is one.

@@ -1,4 +1,4 @@
-"""When nothing gets through: outages of a link, and partitions between nodes of a network."""
+"""Outages of a link, and partitions between nodes of a network."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Direction, Link, LinkConfig, Serialiser
 from dva_sim.network.tcp import TcpConnection
 from dva_sim.network.transports.config import Rtnp, TransportConfig, Udp
-from dva_sim.network.transports.session import Ends, TransportMessage, TransportSession
+from dva_sim.network.transports.interface import Ends, TransportMessage, TransportSession
 from dva_sim.network.transports.sessions import ALL, open_session
 
 WAYS: tuple[Direction, Direction] = ("up", "down")

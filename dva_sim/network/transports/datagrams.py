@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
 from dva_sim.network.transports.feedback import REPEATED, Echo, Feedback
+from dva_sim.network.transports.interface import Deliver, TransportMessage
 from dva_sim.network.transports.message_parts import IP_UDP, Assembly, MessagePart, parts_of
 from dva_sim.network.transports.pace import Pace
 from dva_sim.network.transports.rate_control import RateLaw
-from dva_sim.network.transports.session import Deliver, TransportMessage
 
 SLACK = 1e-6  # the clock's grain [s]
 

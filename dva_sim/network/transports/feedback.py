@@ -1,4 +1,4 @@
-"""What the sender of datagrams learns from acknowledgements: round trips, losses, when to give up.
+"""Acknowledgements as the sender reads them: round trips, losses, and when to give up.
 
 Each datagram is acknowledged by its number, and an acknowledgement repeats those before it, so
 that a lost one costs nothing. A datagram is lost when three later ones were acknowledged (the

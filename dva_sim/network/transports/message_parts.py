@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dva_sim.network.transports.session import Deliver, TransportMessage
+from dva_sim.network.transports.interface import Deliver, TransportMessage
 
 IP_UDP = 28  # headers: RFC 791 and 768 [B]
 PACKET = 1500  # largest IP packet of Ethernet: RFC 894 [B]

@@ -1,4 +1,4 @@
-"""How fast datagrams leave: a law of congestion control, and the round trips it goes by."""
+"""Pace of the datagrams: a law of congestion control, and the round trips it goes by."""
 
 from __future__ import annotations
 

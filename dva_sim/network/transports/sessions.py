@@ -19,9 +19,9 @@ from dva_sim.network.transports.config import (
 )
 from dva_sim.network.transports.datagrams import DatagramSender
 from dva_sim.network.transports.feedback import Echo
+from dva_sim.network.transports.interface import Deliver, Ends, TransportMessage, TransportSession
 from dva_sim.network.transports.message_parts import IP_UDP, Assembly, parts_of
 from dva_sim.network.transports.rate_control import Aimd, LeastRoundTrip, RateLaw, ThreeTerms
-from dva_sim.network.transports.session import Deliver, Ends, TransportMessage, TransportSession
 from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
 
 

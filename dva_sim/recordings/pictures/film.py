@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from dva_sim.recordings.pictures import style
 from dva_sim.recordings.pictures.colours import ROBOT
 from dva_sim.recordings.pictures.moments import Moments
+from dva_sim.recordings.pictures.picture_layout import Sheet, heading_of
 from dva_sim.recordings.pictures.run_endings import pattern_name, verdicts
 from dva_sim.recordings.pictures.scene import Scene
-from dva_sim.recordings.pictures.sheet import Sheet, heading_of
 from dva_sim.recordings.pictures.traffic_strip import Traffic
 from dva_sim.simulation.full import Playback
 

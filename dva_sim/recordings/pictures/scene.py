@@ -17,7 +17,7 @@ from dva_sim.recordings.pictures.bodies import DrawnBody
 from dva_sim.recordings.pictures.colours import BYSTANDER, GUARD, ROBOT
 from dva_sim.recordings.pictures.fields import LAYER, DrawnFields
 from dva_sim.recordings.pictures.moments import Moments
-from dva_sim.recordings.pictures.names import Names
+from dva_sim.recordings.pictures.name_labels import Names
 from dva_sim.recordings.pictures.run_endings import RunVerdict
 from dva_sim.worlds.view import draw_site
 from dva_sim.worlds.view_marks import points_per_metre

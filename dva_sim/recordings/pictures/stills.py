@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.pictures.moments import Moments
+from dva_sim.recordings.pictures.picture_layout import Sheet, heading_of
 from dva_sim.recordings.pictures.run_endings import RunVerdict, decided_at, pattern_name, verdicts
 from dva_sim.recordings.pictures.scene import Scene
-from dva_sim.recordings.pictures.sheet import Sheet, heading_of
 from dva_sim.simulation.full import Playback
 
 DPI = 200

@@ -1,4 +1,4 @@
-"""How long an answer takes over a link, and how long one should wait for it."""
+"""Time that an answer takes over a link, and time-outs that allow for it."""
 
 from __future__ import annotations
 

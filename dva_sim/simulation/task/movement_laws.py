@@ -1,4 +1,4 @@
-"""What the literature measures of pointing, steering and tracking.
+"""Laws and measures of movement in the literature: pointing, steering and tracking.
 
 References:
     I. S. MacKenzie: Fitts' law as a research and design tool in human-computer interaction.

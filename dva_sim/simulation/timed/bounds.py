@@ -1,4 +1,4 @@
-"""How soon a run's events could have been answered at best, and how near to that one came.
+"""The earliest possible responses of a run, and how near the policy came to them.
 
 **The bound of an event** is the response if the best unit for it stood idle at its base, or at a
 station, at the moment of the report: no queue, no limit of operators, nothing to wait for; with

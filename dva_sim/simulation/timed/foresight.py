@@ -1,4 +1,4 @@
-"""What the oracle knows: the events of a run before they happen, and what each unit would need."""
+"""The oracle's knowledge: a run's events before they happen, and the needs of each unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Something that happens in the world, whatever the DVA knows of it."""
+"""Events as they happen in the world, whatever the DVA knows of them."""
 
 from __future__ import annotations
 

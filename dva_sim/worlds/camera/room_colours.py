@@ -1,4 +1,4 @@
-"""Which room is where on a site, and the colour that each is known by."""
+"""Rooms on a site's grid, and the colour by which each is known."""
 
 from __future__ import annotations
 

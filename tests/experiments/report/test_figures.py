@@ -20,7 +20,7 @@ from dva_sim.experiments.report.figures.distribution import Distributions
 from dva_sim.experiments.report.figures.effect import Differences, Levels, _band, _possible
 from dva_sim.experiments.report.figures.factorial import FactorialEffects
 from dva_sim.experiments.report.figures.heat_map import HeatMap
-from dva_sim.experiments.report.figures.keys import apart, columns_of
+from dva_sim.experiments.report.figures.legend import apart, columns_of
 from dva_sim.experiments.report.figures.palette import ONE
 from dva_sim.experiments.report.figures.scatter import trend
 from dva_sim.experiments.report.figures.story import Events, StoryOutcomes, StoryTimes, fates

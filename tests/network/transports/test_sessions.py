@@ -8,7 +8,7 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.transports.competition import Bottleneck, BottleneckConfig, ends_at
 from dva_sim.network.transports.config import Btp, Irtp, Rtnp, Trinomial, Udp
-from dva_sim.network.transports.session import TransportMessage
+from dva_sim.network.transports.interface import TransportMessage
 from dva_sim.network.transports.sessions import open_session
 
 TRINOMIAL = Trinomial(kind="trinomial", header_bytes=12, linear=0.2, square=0.0, decrease=0.125)

@@ -8,7 +8,7 @@ order; what a figure of one's own needs is offered here.
 from dva_sim.experiments.analysis.run_grid import Floats, nan_mean, person_means
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_unit
-from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.legend import legend
 from dva_sim.experiments.report.figures.palette import Look, looks
 from dva_sim.experiments.report.figures.style import (
     Drawn,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import Finding, too_few
-from dva_sim.experiments.analysis.places import condition
+from dva_sim.experiments.analysis.level_phrases import condition
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style

@@ -1,4 +1,4 @@
-"""What becomes of the commands: how old they are, and how many arrive."""
+"""Fate of the commands: their age, and how many arrive."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.cadence_line import cadences, mark_boundary
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.keys import Ends, legend, name_lines
+from dva_sim.experiments.report.figures.legend import Ends, legend, name_lines
 from dva_sim.experiments.report.figures.palette import INK, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.network.patterns import PATTERNS

@@ -1,4 +1,4 @@
-"""Where the delay comes from: one stack of stages for each cell, beside what was measured."""
+"""Origin of the delay: one stack of stages for each cell, beside the measured loop delay."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting, nan_m
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.keys import box
+from dva_sim.experiments.report.figures.legend import box
 from dva_sim.experiments.report.figures.palette import INK, PAPER, STAGES
 from dva_sim.experiments.report.figures.stacks import Stacks, stack
 from dva_sim.experiments.report.prose import caption

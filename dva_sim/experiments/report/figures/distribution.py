@@ -11,7 +11,7 @@ from dva_sim.experiments.analysis.run_grid import Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.keys import legend
+from dva_sim.experiments.report.figures.legend import legend
 from dva_sim.experiments.report.figures.palette import INK, PAPER, SOFT, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.kernel.wording import capital

@@ -16,7 +16,7 @@ from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.cadence_line import boundary, cadences, mark_boundary
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, in_units
 from dva_sim.experiments.report.figures.cut_bars import Bars, fit_to, mark_cuts
-from dva_sim.experiments.report.figures.keys import Ends, legend, name_lines
+from dva_sim.experiments.report.figures.legend import Ends, legend, name_lines
 from dva_sim.experiments.report.figures.palette import FAINT, INK, PAPER, Look, looks
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level

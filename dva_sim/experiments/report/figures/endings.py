@@ -1,4 +1,4 @@
-"""How it ended, and when: the ways compete, so they are stacked and fill the whole."""
+"""Endings and their times: competing causes, stacked so that they fill the whole."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.keys import box, key
+from dva_sim.experiments.report.figures.legend import box, key
 from dva_sim.experiments.report.figures.palette import FATES, PAPER, Fill
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level

@@ -12,7 +12,7 @@ from dva_sim.experiments.analysis.shift_effects import BEST, FLOOR, Shifts, pool
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.csv_numbers import Numbers, with_limits
 from dva_sim.experiments.report.figures.endings import shares_of, stack_in_time
-from dva_sim.experiments.report.figures.keys import box, key
+from dva_sim.experiments.report.figures.legend import box, key
 from dva_sim.experiments.report.figures.palette import FAINT, FATES, INK, PAPER, SOFT, Look, looks
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure, panels
 from dva_sim.experiments.report.prose import caption

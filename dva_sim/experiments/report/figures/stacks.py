@@ -10,7 +10,7 @@ import numpy as np
 from dva_sim.experiments.analysis.run_grid import Factor, Floats, Setting
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.keys import key, key_height
+from dva_sim.experiments.report.figures.legend import key, key_height
 from dva_sim.experiments.report.figures.palette import PAPER, Fill
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital

@@ -12,7 +12,7 @@ from dva_sim.experiments.analysis.run_grid import Floats, Setting, Table, as_flo
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.keys import box, legend
+from dva_sim.experiments.report.figures.legend import box, legend
 from dva_sim.experiments.report.figures.palette import FATES, Look, looks
 from dva_sim.experiments.report.figures.stacks import Stacks, stack
 from dva_sim.experiments.report.prose import caption

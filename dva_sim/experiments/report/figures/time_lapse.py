@@ -19,14 +19,14 @@ from dva_sim.experiments.analysis.kept_episodes import (
 from dva_sim.experiments.analysis.run_grid import Floats
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.ground import (
+from dva_sim.experiments.report.figures.legend import key
+from dva_sim.experiments.report.figures.map_background import (
     draw_ground,
     frame_of,
     row_height,
     scale_bar,
     site_of,
 )
-from dva_sim.experiments.report.figures.keys import key
 from dva_sim.experiments.report.figures.palette import HAZARD, INK, PAPER, Look, look_of
 from dva_sim.experiments.report.figures.style import ASIDE, Drawn, ReportFigure, panels
 from dva_sim.experiments.report.prose import caption

@@ -1,4 +1,4 @@
-"""The ways that robots took, on the map of the site."""
+"""Paths that robots took, on the map of the site."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dva_sim.experiments.analysis.run_grid import Floats, Table, as_floats, codes_of
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures.csv_numbers import Numbers
-from dva_sim.experiments.report.figures.ground import (
+from dva_sim.experiments.report.figures.map_background import (
     draw_ground,
     frame_of,
     row_height,

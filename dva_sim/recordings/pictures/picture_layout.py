@@ -1,4 +1,4 @@
-"""Where things stand on a picture from above: a heading, maps in columns, a key; all in inches."""
+"""Layout of a picture from above: a heading, maps in columns, a key; all in inches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an answer depends on, beside its numbers: the persons, the settings, the delays.
+"""Conditions of an answer, beside its numbers: the persons, the settings, the delays.
 
 A number can be reproducible to the last digit and still hang on what was assumed. So each of
 these is told beside the answer, with what was measured of it in the same study.
@@ -15,7 +15,7 @@ import numpy as np
 from dva_sim.experiments.analysis.answer import Finding
 from dva_sim.experiments.analysis.answer_sentences import telling_stop
 from dva_sim.experiments.analysis.conditions import get
-from dva_sim.experiments.analysis.places import at, places
+from dva_sim.experiments.analysis.level_phrases import at, places
 from dva_sim.experiments.analysis.robustness import RepeatedAnswer
 from dva_sim.experiments.analysis.run_grid import (
     Floats,

@@ -1,4 +1,4 @@
-"""Where a finding holds, in words: `without delay`, `from 250 ms on`, `on the poor link`."""
+"""Levels at which a finding holds, in words: `without delay`, `from 250 ms on`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The site from above, as the ground of a figure."""
+"""The site from above, as the background of a figure."""
 
 from __future__ import annotations
 

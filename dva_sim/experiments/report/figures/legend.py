@@ -1,4 +1,4 @@
-"""Which mark is what: a key above the panels, or names at the ends of lines."""
+"""Legends: a key above the panels, or names at the ends of lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a transport of teleoperation carries, and what every transport offers."""
+"""The interface of transports of teleoperation: messages, ends and sessions."""
 
 from __future__ import annotations
 
