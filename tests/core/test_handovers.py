@@ -236,6 +236,7 @@ def test_who_drives_by_its_type_may_have_a_robot_and_is_listed(kind):
     assert isinstance(content, m.DeviceList)
     device = next(one for one in content.devices if one.id_tag == OTHER_OPERATOR)
     assert (device.device_type, device.address) == (kind, ADDRESS)
+    assert device.label.startswith(kind.lower())
 
 
 @pytest.mark.parametrize(("kind", "sent"), [("Remote Control", False), ("Teleoperation", True)])
