@@ -140,10 +140,20 @@ def test_a_colour_of_the_palette_is_known_however_it_is_written():
     assert not is_of_palette("#00ff00")
 
 
-@pytest.mark.system
-def test_what_is_drawn_is_written_beside_the_worked_example(capsys, monkeypatch):
+@pytest.fixture
+def few_shapes():
+    """Tries fewer shapes; afterwards all are there in their order, by which others choose."""
+    whole = dict(SHAPES)
     for name in SHAPES.keys() - FEW if LONGER == 1 else ():
-        monkeypatch.delitem(SHAPES, name)
+        del SHAPES[name]
+    yield
+    SHAPES.clear()
+    SHAPES.update(whole)
+
+
+@pytest.mark.system
+@pytest.mark.usefixtures("few_shapes")
+def test_what_is_drawn_is_written_beside_the_worked_example(capsys):
     assert checks.check(["figure", "risk.py:Risk"]) == checks.VALID
     assert "risk.py:Risk: figure: valid" in capsys.readouterr().out
 
