@@ -366,7 +366,7 @@ def robot(
         dva-sim robot --number 2 --port 0  # another one beside it: robot-2
     """
     from dva_sim.cli import exposure  # late: start-up
-    from dva_sim.console.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
+    from dva_sim.console.alone.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
 
     options = RobotOptions(
         profile=profile,

@@ -8,13 +8,13 @@ from contextlib import closing, contextmanager, suppress
 from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.actions import Actions
 from dva_sim.console.audit.audit_keeper import auditing
-from dva_sim.console.kept_results import KeptResults
 from dva_sim.console.options import ConsoleOptions
-from dva_sim.console.processes import ConsoleProcesses
-from dva_sim.console.recorder import keep_run
-from dva_sim.console.world import ConsoleWorld
+from dva_sim.console.pages.processes import ConsoleProcesses
+from dva_sim.console.people.actions import Actions
+from dva_sim.console.running.recorder import keep_run
+from dva_sim.console.world.kept_results import KeptResults
+from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.pipes import Outlet
 from dva_sim.live.process import ending_when_asked

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from fake_phones import DVA_ADDRESS, OFFER
 
-from dva_sim.console.scene import site_of
+from dva_sim.console.shown.scene import site_of
 from dva_sim.worlds.site import Site, load_site
 
 PATTERNS = (("req-rep", "REQ/REP"), ("pub-sub", "PUB/SUB"), ("latest-wins", "PUB/SUB, latest wins"))

@@ -115,7 +115,7 @@ def test_a_web_process_that_is_killed_ends_it_in_one_line(programs, console):
 def test_without_the_process_that_draws_all_else_goes_on_without_a_token_for_everybody(programs):
     console = running(programs, "--no-token")
     assert "token" not in address_of(console)
-    pictures = next(p for p, words in programs.processes().items() if "console.pictures" in words)
+    pictures = next(p for p, words in programs.processes().items() if "pages.pictures" in words)
     os.kill(pictures, signal.SIGKILL)
     wait_until(lambda: pictures not in programs.processes(), "it ends")
     with client(address_of(console)) as page:

@@ -11,7 +11,7 @@ import pytest
 from helpers.paths import ROOT
 from helpers.processes.patience import run
 
-from dva_sim.console import palette
+from dva_sim.console.pages import palette
 
 HERE = Path(__file__).parent
 STATIC = ROOT / "dva_sim" / "console" / "static"
@@ -40,7 +40,7 @@ def test_every_vendored_package_that_is_shipped_has_its_licence():
 
 
 def test_colours_are_those_that_the_palette_writes():
-    """`python -m dva_sim.console.palette` writes them anew."""
+    """`python -m dva_sim.console.pages.palette` writes them anew."""
     for name, text in palette.FILES.items():
         assert (STATIC / name).read_text(encoding="utf-8") == text(), name
 

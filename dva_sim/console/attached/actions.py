@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import partial
 from typing import Any, Final
 
-from dva_sim.console.alarm_actions import AlarmActions
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import Refused, Said, unanswered
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
+from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace
 from dva_sim.protocol import messages as m
 

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from dva_sim.console.attached.told import ToldDevice
-from dva_sim.console.device_rows import link_of
-from dva_sim.console.feed import SEVERITIES
-from dva_sim.console.lag import LIMIT
-from dva_sim.console.scene import RULES, legend, site_of
-from dva_sim.console.strangers import UNKNOWN_ROBOT, row_of_stranger
+from dva_sim.console.dva.device_rows import link_of
+from dva_sim.console.running.lag import LIMIT
+from dva_sim.console.shown.feed import SEVERITIES
+from dva_sim.console.shown.scene import RULES, legend, site_of
+from dva_sim.console.shown.strangers import UNKNOWN_ROBOT, row_of_stranger
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.console.audit.audit_keeper import check_target
-from dva_sim.console.page_options import PageOptions
+from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.addresses import check_address

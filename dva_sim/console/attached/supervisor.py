@@ -11,7 +11,7 @@ from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import auditing
-from dva_sim.console.processes import ConsoleProcesses, Say
+from dva_sim.console.pages.processes import ConsoleProcesses, Say
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.page_options import PageOptions
-from dva_sim.console.processes import ConsoleProcesses
+from dva_sim.console.pages.page_options import PageOptions
+from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.replay.player import Player, playing
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf

@@ -10,8 +10,6 @@ from bisect import bisect_right
 from typing import Any
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.feed import event_line
-from dva_sim.console.fields import HazardFeed
 from dva_sim.console.replay.device_table import RecordedDevices
 from dva_sim.console.replay.moments import (
     ROUNDED,
@@ -23,7 +21,9 @@ from dva_sim.console.replay.moments import (
     set_point,
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
-from dva_sim.console.scene import scene_of
+from dva_sim.console.shown.feed import event_line
+from dva_sim.console.shown.fields import HazardFeed
+from dva_sim.console.shown.scene import scene_of
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.recordings.reading import Opened, RecordedHazard

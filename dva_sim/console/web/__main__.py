@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dva_sim.console.pages.addresses import address_of, own_address
 from dva_sim.console.web.access import Entrance, Tokens, rules
-from dva_sim.console.web.addresses import address_of, own_address
 from dva_sim.console.web.app import make_app
 from dva_sim.console.web.audit import AuditPages
 from dva_sim.console.web.camera import ConsoleCameras

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from dva_sim.console.pages.addresses import address_of, own_address, own_hosts
 from dva_sim.console.web.access import Entrance, Tokens, rules
-from dva_sim.console.web.addresses import address_of, own_address, own_hosts
 from dva_sim.console.web.certificate_files import certificates, data_folder
 from dva_sim.console.web.certificates import Hosts
 from dva_sim.console.web.phones import PhoneDoor

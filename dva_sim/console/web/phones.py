@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 
-from dva_sim.console.qr_code import svg
+from dva_sim.console.pages.qr_code import svg
 from dva_sim.console.web.rest import NOT_KEPT
 from dva_sim.console.web.static_files import StaticFiles
 from dva_sim.kernel.errors import DvaSimError

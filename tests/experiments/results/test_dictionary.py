@@ -28,7 +28,7 @@ SHORT = {
 }
 
 
-# Filled where people drive alone: tests/console/test_kept_results.py holds their columns to these.
+# Filled where people drive alone: console/world/test_kept_results.py holds their columns to these.
 OF_PEOPLE = {"full": {"drives", "commands"}}
 
 

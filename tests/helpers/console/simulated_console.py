@@ -5,8 +5,8 @@ Over modelled links without real time: pulses come by virtual time, so that noth
 
 import time
 
-from dva_sim.console.actions import Actions
-from dva_sim.console.world import ConsoleWorld
+from dva_sim.console.people.actions import Actions
+from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.clock import US
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.scenario import build, load

@@ -1,4 +1,4 @@
-// Written by dva_sim/console/palette.py.
+// Written by dva_sim/console/pages/palette.py.
 export const LIGHT = {
  "page": "#f7f7f5",
  "card": "#ffffff",

@@ -1,0 +1,1 @@
+"""One simulated robot as a program of its own."""

@@ -1,0 +1,88 @@
+"""What pages of a robot that runs alone ask for: each action is done once, and answered once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dva_sim.console.alone.robot_world import RobotWorld
+from dva_sim.console.asking.dispatcher import ActionDispatcher, does
+from dva_sim.console.asking.refusal import Said
+from dva_sim.console.robots.robot_actions import RobotActions
+from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.network.addresses import check_address
+
+Line = dict[str, Any]
+LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
+
+
+class RobotDesk:
+    """Does what lines of the web process ask for.
+
+    Args:
+        world: The robot.
+
+    Attributes:
+        take: Does what a line asks for.
+    """
+
+    def __init__(self, world: RobotWorld) -> None:
+        self._world = world
+        self._hands = RobotActions(
+            world.windows,
+            lambda _: world.robot.device.id_tag,
+            why_not=lambda: "held: this machine cannot keep up" if world.lag.held else "",
+            labels=world.stage.labels,
+            deaf=world.deafen,
+            slow=world.slowed,
+        )
+        self.take = ActionDispatcher(
+            *(ActionPlace.ROBOT, (self, self._hands), self._tell),
+            "a robot that runs alone does not know {what!r}",
+            lambda: world.audited,
+        ).take
+        world.hold = lambda _: self._hands.stop(world.field.robots)
+        world.clock.pulse(LOOK, self._hands.look_for_the_silent)
+
+    def _tell(self, answer: Line) -> None:
+        self._world.tell({**answer, "t": self._world.feed.now_ms})
+        self._world.tell_now()
+
+    @does("emergency")
+    def _emergency(self, _: str, line: Line, said: Said) -> None:
+        self._hands.stop(self._world.field.robots)
+        self._hands.press_emergency(self._world.robot.device.id_tag)
+        said(True, f"{self._world.robot.device.label} has stopped")
+
+    @does("robot_register")
+    def _register(self, _: str, line: Line, said: Said) -> None:
+        dva = line["dva"].strip()
+        check_address(dva)
+        self._world.station.register(dva, said)
+
+    @does("robot_listen")
+    def _listen(self, _: str, line: Line, said: Said) -> None:
+        self._world.station.listen()
+        said(True, f"listens on {self._world.robot.device.address}")
+
+    @does("robot_off")
+    def _off(self, _: str, line: Line, said: Said) -> None:
+        self._world.station.switch_off()
+        said(True, "it is off")
+
+    @does("release")
+    def _release(self, _: str, line: Line, said: Said) -> None:
+        """Nothing is in hand but by `manual_take`."""
+        said(True, "released")
+
+    @does("gone")
+    def _gone(self, client: str, _: Line) -> None:
+        self._hands.gone(client)
+
+    @does("watch")
+    def _watch(self, _: str, line: Line) -> None:
+        own = {self._world.robot.device.id_tag}
+        self._world.screens.watch(own if line["robots"] else set())
+
+    @does("look")
+    def _look(self, _: str, line: Line) -> None:
+        self._world.logs.look(line["logs"])

@@ -1,0 +1,271 @@
+"""One simulated robot on real sockets, for anybody's DVA, with the windows that a console has.
+
+Nothing of the system is here but the robot itself, its place and its pages: who it is registered
+at, who is let drive it, and who does, is decided elsewhere.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from dva_sim.agents.observation import Cameras
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.screens import OwnScreens, camera_url, topic_of
+from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audited import Audited, name_of_page
+from dva_sim.console.robots.robot_station import LISTENING, OwnStation
+from dva_sim.console.robots.robot_windows import RobotWindows
+from dva_sim.console.robots.stands import why_stands
+from dva_sim.console.running.lag import LagRule
+from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.console.running.recorder import ConsoleRecorder
+from dva_sim.console.shown.feed import Feed
+from dva_sim.console.shown.logs import PERIOD, Logs
+from dva_sim.console.shown.scene import scene_of
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.network.keys import KeyRing
+from dva_sim.network.link.link import Link
+from dva_sim.network.realtime import PacedClock
+from dva_sim.network.sockets import SocketNetwork
+from dva_sim.simulation.full.observations import motion_of, terms_of
+from dva_sim.simulation.full.physical_world import Field
+from dva_sim.simulation.full.run import WATCH_PERIOD
+from dva_sim.simulation.full.safety_checks import SafetyAudit
+from dva_sim.simulation.full.stage import Stage, id_of
+from dva_sim.simulation.full.team import TeamBuilder
+from dva_sim.simulation.scenario import Scenario
+
+Line = dict[str, Any]
+Tell = Callable[..., object]
+
+POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
+SOON = 0.05  # from one look at what has changed to the next, real time [s]
+PAGES = "robots", "map", "audit"
+
+
+class RobotWorld:
+    """The robot, and what of it is told.
+
+    Args:
+        scenario: Says which robot, and where it stands.
+        number: Which of its robots it is, from 1.
+        seed: Decides all luck.
+        clock: Its time; real time.
+        ring: Keys of the devices; None to run without.
+        host: Address of this machine to listen on.
+        port: Of requests; 0: any two that are free.
+
+    Attributes:
+        clock: Real time.
+        robot: The robot.
+        station: How far it has come.
+        audited: Keeps who did what, once that is wanted.
+        windows: Its windows.
+        tell: Takes lines for pages, and a key for those of which the newest counts.
+        show: Takes lines for whoever draws pictures, likewise.
+
+    Raises:
+        ConfigError: the site has no place for it.
+        NetworkError: the host is not this machine.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        number: int = 1,
+        seed: int = 1,
+        *,
+        clock: PacedClock | None = None,
+        ring: KeyRing | None = None,
+        host: str = "127.0.0.1",
+        port: int = 0,
+    ) -> None:
+        self.scenario, self.seed = scenario, seed
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        self.sockets = ConsoleSockets(scenario, self.clock, self.recorder, host, ring=ring)
+        try:
+            self._place(number, host, port)
+        except DvaSimError:
+            self.sockets.close()
+            raise
+        self.tell: Tell = lambda *_: None
+        self.show: Tell = lambda *_: None
+        self.dropped: Callable[[], int] = lambda: 0
+        self.lag, self._newest = LagRule(), dict[str, Any]()
+        self.hold: Callable[[str], object] = lambda _: None
+        self.clock.on_late = self._late
+        self.audited: Audited | None = None
+        self._watch()
+
+    @property
+    def network(self) -> SocketNetwork:
+        """What carries its messages."""
+        return self.sockets.network
+
+    @property
+    def links(self) -> Mapping[str, tuple[Link, Link]]:
+        """No link is modelled here."""
+        return {}
+
+    def _place(self, number: int, host: str, port: int) -> None:
+        """Put the robot where it begins; it is off."""
+        cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
+        self.stage = Stage(
+            *(self.scenario, self.seed, self.network, self.recorder),
+            lambda kind, number: host,
+            self.sockets.time_of_day(),
+            cameras=cameras,
+        )
+        self.field = Field(self.stage)
+        team = TeamBuilder(self.stage, self.field.world, self.field)
+        self.robot = robot = team.add_robot(number, registers=False)
+        self.field.robots[robot.device.id_tag] = robot
+        self.station = OwnStation(robot, self.network, host, port)
+        self.station.deaf = partial(self.deafen, robot.device.id_tag)
+
+    def _watch(self) -> None:
+        """Feed, windows, log, camera and audit look at the robot from now on."""
+        robot, id_tag = self.robot, self.robot.device.id_tag
+        self.feed = Feed(self)
+        self.recorder.robots = {id_tag}
+        self.audit = SafetyAudit(
+            *(self.recorder, terms_of(self.scenario)),
+            lambda _: motion_of(robot),
+            self.field.place_of,
+        )
+        self.recorder.on_accepted, self.recorder.on_hand = self.audit.accepted, self.audit.by_hand
+        self.sockets.watch(self.audit)
+        about = self.feed.numbers, self.stage.labels
+        self.windows = RobotWindows(
+            self.recorder, self.field.robots, *about, self.recorder.sent_at, self._lost
+        )
+        self.windows.by_id[id_tag].station = self.station
+        self.feed.things[self.feed.numbers[id_tag]] |= self.windows.about(id_tag)
+        self.logs = Logs(
+            self.network, lambda label: id_tag if label == robot.device.label else None
+        )
+        self.logs.listen(robot.device.label, partial(self.windows.heard, id_tag), publications=True)
+        self.screens = OwnScreens(
+            self, id_of("console", 1), self.feed.numbers, lambda line, key: self.show(line, key)
+        )
+        self.clock.every(1.0 / self.scenario.camera.rate_hz, self.screens.look)
+        self.clock.every(WATCH_PERIOD, self._check_rules)
+
+    def _check_rules(self) -> None:
+        now = self.clock.now
+        self.field.world.advance_to(now)
+        self.audit.moves(now, {self.robot.device.id_tag: motion_of(self.robot)})
+
+    def _lost(self, robot: str, reply: bytes) -> None:
+        self.audit.sent(self.clock.now, robot, "", reply)
+
+    def keep_audit(self, keeper: AuditKeeper) -> None:
+        """Keep what people do from now on."""
+        label = self.robot.device.label
+        self.audited = Audited(keeper, name_of_page, lambda named: named and label)
+
+    def deafen(self, robot: str, on: bool) -> None:
+        """The audit is told that the robot hears nothing, or hears again."""
+        self.audit.deafened(self.clock.now, robot, on)
+
+    def slowed(self, processing: float) -> None:
+        """Note how long a message takes the robot's computer from now on [s]."""
+        self.audit.slowed(self.clock.now, processing)
+
+    # --- what a console shows: see `ConsoleSubject` ------------------------------------------
+
+    def serve_cameras(self, base: str) -> None:
+        """See `ConsoleSubject`."""
+        self.robot.controller.camera_url = camera_url(base, self.robot.device.label)
+
+    def begin(self) -> None:
+        """See `ConsoleSubject`."""
+        scene = scene_of(
+            *(self.scenario, self.stage.site, (), self.feed.things),
+            name=f"robot {self.scenario.robot.profile}",
+            seed=self.seed,
+        )
+        link = {"kind": "real", "processing_s": 0.0}
+        self.tell(scene | {"link": link, "pages": PAGES})
+        self.show_scene()
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(WINDOWS, self._tell_windows)
+        self.clock.pulse(ROWS, self.tell_now)
+        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def show_scene(self) -> None:
+        """See `ConsoleSubject`."""
+        scenario = self.scenario.model_dump(mode="json")
+        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+
+    def note(self, text: str) -> None:
+        """See `ConsoleSubject`."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
+
+    # --- what is told ----------------------------------------------------------------------
+
+    def tell_now(self) -> None:
+        """How the robot is."""
+        self.lag.measured(time.monotonic(), self.clock.worst_lag())
+        clock = {
+            "factor": self.clock.factor,
+            "paused": self.clock.paused,
+            "lag_s": round(self.lag.newest, 3),
+            "given_up_s": round(self.clock.given_up, 2),
+            "held_by_lag": self.lag.held,
+        }
+        self.tell(
+            {
+                "k": "rows",
+                "t": self.feed.now_ms,
+                "clock": clock,
+                "link": {"kind": "real", "processing_s": 0.0},
+                "dropped": self.dropped(),
+                "robots": self.feed.robots(self.lag.held),
+                "people": [],
+                "order": None,
+            }
+        )
+
+    def _tell_positions(self) -> None:
+        self._tell_new(self.feed.positions())
+
+    def _tell_windows(self) -> None:
+        def stands(robot: RobotAgent) -> str:
+            if self.station.state != LISTENING:
+                return f"it is {self.station.state}"
+            return why_stands(robot, self.clock.now, self.lag.held)
+
+        for line in self.windows.lines(self.screens.watched, stands):
+            self._tell_new(line)
+
+    def _tell_news(self) -> None:
+        for line in self.feed.story():
+            self.tell(line)
+        if self.audited is not None:
+            self._tell_new(self.audited.keeper.line(self.feed.now_ms))
+
+    def _tell_logs(self) -> None:
+        for line in self.logs.batches():
+            self.tell(line)
+
+    def _tell_new(self, line: Line) -> None:
+        said = {name: value for name, value in line.items() if name != "t"}
+        if self._newest.get(line["k"]) != said:
+            self._newest[line["k"]] = said
+            self.tell(line)
+
+    def _late(self, behind: float) -> None:
+        if self.lag.measured(time.monotonic(), behind):
+            self.hold(f"stopped: this machine is {behind:.2f} s behind real time")
+
+    # --- the end ----------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Close all sockets; what was sent last has a moment to leave."""
+        self.sockets.close()

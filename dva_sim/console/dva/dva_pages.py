@@ -1,0 +1,119 @@
+"""What the pages Main and Devices show of the DVA, and what people may do there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.dva.device_rows import DeviceRows
+from dva_sim.console.dva.dva_port import DvaPort
+from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
+from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA, address_of, id_of
+
+Line = dict[str, Any]
+
+
+class DvaPages:
+    """The DVA of a run as people see and serve it.
+
+    Args:
+        run: Whose.
+        address: Where the DVA listens, or is said to.
+        sockets: What carries messages, if the links are real.
+        moved: Called when the DVA listens elsewhere.
+
+    Attributes:
+        port: Where it listens.
+        looked: Whether somebody looks at the table of devices.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        address: str,
+        sockets: ConsoleSockets | None,
+        moved: Callable[[str], object],
+    ) -> None:
+        self._run, self._is_real, self._moved = run, sockets is not None, moved
+        self.port = DvaPort(run, run.recorder, address, sockets)
+        self.looked = False
+        self._rows = DeviceRows(run)
+        entries = run.dva.desk.registry.entries
+        self._fakes = FakeDevices(
+            self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
+        )
+
+    def devices(self, now_ms: int) -> Line | None:
+        """The table, once a second; None if nobody looks."""
+        if not self.looked:
+            return None
+        rows = self._rows.rows(self._fakes.devices)
+        return {"k": "devices", "t": now_ms, "devices": rows}
+
+    @does("server_start")
+    def _start(self, _: str, line: Line, said: Said) -> None:
+        self.port.start(line["port"])
+        self._moved(self.port.address)
+        said(True, f"the server listens on {self.port.address}")
+
+    @does("server_stop")
+    def _stop(self, _: str, __: Line, said: Said) -> None:
+        self.port.stop()
+        said(True, "the server is stopped")
+
+    @does("revoke")
+    def _revoke(self, _: str, line: Line, said: Said) -> None:
+        robot = line["device"]
+        grant = self._run.dva.desk.sessions.permissions.grants.get(robot)
+        if grant is None:
+            raise Refused(f"nobody has a permission for {robot}")
+        self._run.dva.revoke(grant.robot, None, holder_told=True)
+        labels = self._run.stage.labels
+        holder = labels.get(grant.holder, grant.holder)
+        said(
+            True, f"{holder} has no permission for {labels.get(grant.robot, grant.robot)} any more"
+        )
+
+    @does("fake_add")
+    def _add(self, _: str, line: Line, said: Said) -> None:
+        self._fakes.add(line, said)
+
+    @does("fake_remove")
+    def _remove(self, _: str, line: Line, said: Said) -> None:
+        said(True, f"{self._fakes.remove(line['device'])} is removed")
+
+    # --- fake devices ----------------------------------------------------------------------
+
+    def _make(self, id_tag: str, label: str, kind: str, address: str) -> AgentDevice:
+        stage, dva = self._run.stage, self._run.dva.device
+        device = AgentDevice(
+            id_tag=id_tag,
+            label=label,
+            device_type=kind,
+            address=address,
+            dva=DVA,
+            network=stage.network,
+            recorder=stage.recorder,
+            frame=stage.site.frame,
+            timeout=dva.timeout,
+            attempts=dva.attempts,
+            labels=stage.labels,
+            time_of_day=stage.time_of_day,
+        )
+        stage.devices.append(device)
+        return device
+
+    def _identity(self, number: int) -> tuple[str, str]:
+        nowhere = NOWHERE.format(number % 250 + 1)
+        return id_of("fake", number), nowhere if self._is_real else address_of("fake", number)
+
+    def _dismiss(self, id_tag: str) -> None:
+        stage = self._run.stage
+        stage.devices[:] = [d for d in stage.devices if d.id_tag != id_tag]
+        stage.labels.pop(id_tag, None)
+        self._run.dva.dismiss(id_tag)

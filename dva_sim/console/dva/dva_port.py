@@ -1,0 +1,91 @@
+"""The DVA's server under a person's hand: it listens on a port, or is silent."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.sockets import NetworkError, split_address
+from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA
+
+Line = dict[str, Any]
+
+
+class DvaPort:
+    """Where the DVA of a run listens, and whether.
+
+    On real links the port is closed and opened; on modelled ones no port ever opens: the DVA takes
+    part in the modelled network, or does not.
+
+    Args:
+        run: Whose DVA.
+        recorder: Told when it begins and ends to listen.
+        address: Where it listens, or is said to.
+        sockets: What carries messages, if the links are real.
+
+    Attributes:
+        address: Where it listens, or would.
+        listens: Whether it does.
+    """
+
+    def __init__(
+        self, run: Run, recorder: Recorder, address: str, sockets: ConsoleSockets | None
+    ) -> None:
+        self._run, self._recorder, self._sockets = run, recorder, sockets
+        self.address, self.listens = address, True
+
+    def line(self) -> Line:
+        """What a page is told."""
+        return {
+            "listens": self.listens,
+            "address": self.address,
+            "port": split_address(self.address)[1],
+            "modelled": self._sockets is None,
+        }
+
+    def stop(self) -> None:
+        """Take no more requests and say nothing; the devices find out by their time-outs.
+
+        Raises:
+            Refused: it does not listen.
+        """
+        if not self.listens:
+            raise Refused("the server is stopped already")
+        self._network.leave(DVA)
+        self._run.dva.silence(True)
+        self.listens = False
+        self._tell(f"listens on port {split_address(self.address)[1]} no more")
+
+    def start(self, port: int) -> None:
+        """Take requests on a port.
+
+        Raises:
+            Refused: it listens already, or the port cannot be had.
+        """
+        if self.listens:
+            raise Refused(f"the server listens on {self.address} already")
+        host = split_address(self.address)[0]
+        if self._sockets is None:
+            self._network.come_back(DVA)
+            self.address = f"{host}:{port}"
+        else:
+            try:
+                self.address = self._sockets.network.join(DVA, host, port)
+            except NetworkError as error:
+                raise Refused(str(error)) from None
+        self._run.dva.silence(False)
+        self.listens = True
+        self._tell(f"listens on port {split_address(self.address)[1]}")
+
+    @property
+    def _network(self) -> Any:
+        if self._sockets is not None:
+            return self._sockets.network
+        return cast(VirtualNetwork, self._run.network)
+
+    def _tell(self, what: str) -> None:
+        self._recorder.tell(self._run.clock.now, "dva", what, "link")

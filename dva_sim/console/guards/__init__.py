@@ -1,0 +1,1 @@
+"""Guards whom people play."""

@@ -1,0 +1,80 @@
+"""What people ask for who play guards; all of it becomes messages of the guard's device."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dva_sim.agents.people.person_guard import PersonGuard
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.guards.played_guards import PlayedGuards
+from dva_sim.worlds.site import Site
+
+Line = dict[str, Any]
+
+
+class GuardActions:
+    """Does what guards' pages ask for.
+
+    Args:
+        guards: Who plays whom.
+        site: Where they are.
+    """
+
+    def __init__(self, guards: PlayedGuards, site: Site) -> None:
+        self._guards, self._site = guards, site
+
+    def _guard(self, client: str) -> PersonGuard:
+        guard = self._guards.by_client.get(client)
+        if guard is None:
+            raise Refused("say first which guard you are")
+        return guard
+
+    @does("guard_join")
+    def _join(self, client: str, line: Line, said: Said) -> None:
+        label = line["guard"]
+        guard = self._guards.named(label)
+        if guard is None:
+            raise Refused(f"there is no guard {label!r} for people to play")
+        if self._guards.by_client.get(client) is guard:
+            said(True, f"you are {label} already")
+            return
+        if guard.attended:
+            raise Refused(f"somebody else is {label}")
+        self._guards.leave(client)
+        self._guards.join(client, guard)
+        said(True, f"you are {label}")
+
+    @does("guard_leave")
+    def _leave(self, client: str, _: Line, said: Said) -> None:
+        self._guards.leave(client)
+        said(True, "nobody plays the guard now")
+
+    @does("guard_answer")
+    def _answer(self, client: str, line: Line, said: Said) -> None:
+        self._guard(client).answer(line["accept"], line["reason"], said)
+
+    @does("guard_say")
+    def _say(self, client: str, line: Line, said: Said) -> None:
+        self._guard(client).say(line["what"], said)
+
+    @does("guard_place")
+    def _place(self, client: str, line: Line, said: Said) -> None:
+        self._guard(client).stand_at(*self._point(line), said)
+
+    @does("guard_report")
+    def _report(self, client: str, line: Line, said: Said) -> None:
+        point = self._point(line)
+        self._guard(client).report(line["kind"], *point, line["severity"], said)
+
+    def _point(self, line: Line) -> tuple[float, float]:
+        """A place on the site [m].
+
+        Raises:
+            Refused: it is none.
+        """
+        x, y = line["x_m"], line["y_m"]
+        left, low, right, high = self._site.extent
+        if not (left <= x <= right and low <= y <= high):
+            raise Refused("x_m and y_m should be a place on the site")
+        return x, y

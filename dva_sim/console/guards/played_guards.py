@@ -1,0 +1,100 @@
+"""The guards whom people play, and what each of them is told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from dva_sim.agents.people.person_guard import PersonGuard
+from dva_sim.console.shown.feed import Feed
+from dva_sim.simulation.full.run import Run
+
+Line = dict[str, Any]
+
+
+class PlayedGuards:
+    """Who plays whom.
+
+    Args:
+        run: In which.
+        feed: About it.
+
+    Attributes:
+        by_client: The guards that somebody plays, by their pages.
+    """
+
+    def __init__(self, run: Run, feed: Feed) -> None:
+        self._run, self._feed = run, feed
+        self.by_client: dict[str, PersonGuard] = {}
+        self._ways: dict[str, tuple[object, Line]] = {}  # the newest, and what it is of
+        self._left: list[str] = []  # who is to be told so
+
+    def named(self, label: str) -> PersonGuard | None:
+        """The guard of a label, if people may play it."""
+        found = (g for g in self._run.field.guards if g.device.label == label)
+        guard = next(found, None)
+        return guard if isinstance(guard, PersonGuard) else None
+
+    def join(self, client: str, guard: PersonGuard) -> None:
+        """A page's person plays a guard."""
+        self.by_client[client] = guard
+        guard.join()
+
+    def leave(self, client: str) -> bool:
+        """A page's person plays no longer; whether one did."""
+        guard = self.by_client.pop(client, None)
+        if guard is not None:
+            guard.leave()
+            self._left.append(client)
+            self._ways.pop(client, None)
+        return guard is not None
+
+    def lines(self) -> Iterator[tuple[str, Line]]:
+        """A line for each who plays."""
+        gone, self._left = self._left, []
+        for client in gone:
+            if client not in self.by_client:
+                yield client, self._line(client) | _NOBODY
+        for client, guard in self.by_client.items():
+            yield (
+                client,
+                self._line(client)
+                | {
+                    "guard": self._feed.numbers[guard.device.id_tag],
+                    "label": guard.device.label,
+                    "doing": guard.activity,
+                    "order": self._order(client, guard),
+                    "alert": guard.alert or guard.device.dva_alert,
+                },
+            )
+
+    def _line(self, client: str) -> Line:
+        return {"k": "guard", "t": self._feed.now_ms, "seat": client}
+
+    def _order(self, client: str, guard: PersonGuard) -> Line | None:
+        """The order, and the way there from where the person stands."""
+        order = guard.order
+        if order is None:
+            return None
+        of = order, guard.walking.place
+        known, line = self._ways.get(client, (None, {}))
+        if known != of:
+            line = self._way(guard)
+            self._ways[client] = of, line
+        about = {"event": order.event_id, "kind": order.kind, "task": order.task}
+        return {**about, **line, "answered": guard.answered}
+
+    def _way(self, guard: PersonGuard) -> Line:
+        goal = guard.goal()
+        assert goal is not None
+        (x, y), length, points = goal
+        return {
+            "x_m": round(x, 2),
+            "y_m": round(y, 2),
+            "room": self._run.stage.site.room_at(x, y),
+            "distance_m": round(length, 1) if length < 1e6 else None,
+            "way_m": points,
+        }
+
+
+_NOBODY: Line = {"guard": None, "label": "", "doing": "", "order": None, "alert": ""}

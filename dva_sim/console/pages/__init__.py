@@ -1,0 +1,1 @@
+"""The pages: their processes, addresses, options and colours."""

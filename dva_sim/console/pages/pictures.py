@@ -1,0 +1,31 @@
+"""The process that draws camera pictures: `python -m dva_sim.console.pages.pictures`.
+
+One socket leads to the simulation, the other one to the web process (`dva_sim.cameras.painting`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+
+from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    """Draw until the simulation has ended."""
+    parser = argparse.ArgumentParser(prog="dva_sim.console.pages.pictures", description=__doc__)
+    parser.add_argument("--fd", type=int, required=True, help="socket to the simulation")
+    parser.add_argument("--web-fd", type=int, required=True, help="socket to the web process")
+    options = parser.parse_args(given)
+    # Ctrl-C reaches all processes of a terminal; the simulation says when it is over.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(NICENESS)
+    run(PaintersEnd(options.fd), PaintersEnd(options.web_fd))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""The processes beside what a console shows: one serves pages, one draws pictures.
+
+Whatever is shown - a world, a recording - runs in the command's own process, tells its lines to
+both, and does what the pages ask for.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import socket
+import sys
+import time
+import webbrowser
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Protocol
+
+from dva_sim.cameras.children import END_WITHIN, Child
+from dva_sim.console.pages.page_options import PageOptions
+from dva_sim.network.realtime import PacedClock
+from dva_sim.serving.listening import listen
+
+WEB, PICTURES = "dva_sim.console.web", "dva_sim.console.pages.pictures"
+# What else is printed: an address for each of those who may do less than everything.
+ROLES = ("Dispatch only", "dispatch"), ("Drive only", "drive"), ("Look only", "look")
+BROWSERLESS = ("CI", "PYTEST_CURRENT_TEST", "DVA_SIM_NO_BROWSER")  # where none is opened
+FLUSH = 0.05  # from one look at what waits to be written to the next, real time [s]
+MOST_RESTARTS = 5  # of the process that draws
+NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
+
+Line = dict[str, Any]
+Say = Callable[[str], object]
+
+
+class ConsoleSubject(Protocol):
+    """What a console shows.
+
+    Attributes:
+        clock: Its time, at its pace.
+        tell: Takes lines for pages, and a key for those of which the newest counts.
+        show: Takes lines for whoever draws pictures, likewise.
+        dropped: How many lines for pages were dropped so far.
+    """
+
+    clock: PacedClock
+    tell: Callable[..., object]
+    show: Callable[..., object]
+    dropped: Callable[[], int]
+
+    def serve_cameras(self, base: str) -> None:
+        """The robots' pictures are to be had below this URL from now on."""
+
+    def begin(self) -> None:
+        """Tell the scene, and from then on what changes."""
+
+    def show_scene(self) -> None:
+        """Tell whoever draws, from the beginning, what there is to be seen."""
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+
+
+class ConsoleProcesses:
+    """The web process and the one that draws, and the lines to and from them.
+
+    Args:
+        options: Where pages are to be seen, and by whom.
+        say: Prints a line.
+
+    Attributes:
+        serving: What the web process said of itself first: its addresses.
+        failed: Why the web process has ended by itself; empty if it has not.
+    """
+
+    def __init__(self, options: PageOptions, say: Say) -> None:
+        self._options, self._say = options, say
+        self._children: list[Child] = []
+        self._to_web: socket.socket | None = None
+        self.serving: Mapping[str, Any] = {}
+        self.failed, self._restarts = "", 0
+
+    def start(
+        self,
+        subject: ConsoleSubject,
+        take: Callable[[Line], object],
+        report: Path | None = None,
+        audit: Path | None = None,
+    ) -> None:
+        """Start both, connect them with what is shown, say where it is, and begin.
+
+        Args:
+            subject: What is shown.
+            take: Does what a line of a page asks for.
+            audit: File of the audit log that pages show, if there is one.
+            report: A study's report that pages may show.
+
+        Raises:
+            ConfigError: a port is taken, or the host is not this machine.
+            ChildFailed: the web process could not begin.
+        """
+        web = self._start_web(report, audit)
+        pictures = self._start_pictures()
+        self.serving = web.first_line()
+        subject.serve_cameras(str(self.serving["base"]))
+        subject.tell = web.pipe.put
+        subject.dropped = lambda: web.pipe.outbox.dropped
+        self._listen(subject, web, take)
+        self._draw(subject, pictures)
+        subject.begin()
+        subject.clock.pulse(FLUSH, self._flush)
+        gc.freeze()  # what stays for the whole run is not looked through again and again
+        self._say(f"Console: {self.serving['supervise']}")
+        if self._options.token:
+            for name, role in ROLES:
+                self._say(f"{name}: {self.serving[role]}")
+        self._say_of_phones()
+        self._open_browser(str(self.serving["supervise"]))
+
+    def end(self) -> None:
+        """End both, as soon as they have written what they have."""
+        if self._to_web is not None:
+            self._to_web.close()
+        for child in self._children:
+            child.end()
+        deadline = time.monotonic() + END_WITHIN
+        for child in self._children:
+            child.make_sure(deadline)
+
+    def _start_web(self, report: Path | None, audit: Path | None) -> Child:
+        options = self._options
+        listen(options.host, options.port).close()  # else the web process alone would say so
+        if options.phones:
+            listen(options.phones_host, options.phones_port, "--phones-port").close()
+        ours, self._to_web = socket.socketpair()
+        words = ["--host", options.host, "--port", str(options.port)]
+        words += ["--pictures-fd", str(ours.fileno())]
+        words += [] if options.token else ["--no-token"]
+        words += [] if audit is None else ["--audit", str(audit)]
+        words += [] if report is None else ["--report", str(report)]
+        if options.phones:
+            words += ["--phones-host", options.phones_host]
+            words += ["--phones-port", str(options.phones_port)]
+        web = Child("web process", WEB, words, [ours])
+        self._children.append(web)
+        ours.close()
+        return web
+
+    def _start_pictures(self) -> Child:
+        """Our copy of its end stays open, so that another one can take its place."""
+        end = self._to_web
+        assert end is not None
+        pictures = Child("pictures process", PICTURES, ["--web-fd", str(end.fileno())], [end])
+        self._children.append(pictures)
+        return pictures
+
+    def _listen(self, subject: ConsoleSubject, web: Child, take: Callable[[Line], object]) -> None:
+        def hear() -> None:
+            for line in web.pipe.lines():
+                take(line)
+            if not web.pipe.is_open:
+                subject.clock.unwatch(web.pipe.fileno())
+                self.failed = web.why()
+                subject.clock.stop()
+
+        subject.clock.watch(web.pipe.fileno(), hear)
+
+    def _draw(self, subject: ConsoleSubject, pictures: Child) -> None:
+        """Without pictures all else goes on, and another process draws from then on."""
+        subject.show = pictures.pipe.put
+
+        def hear() -> None:
+            pictures.pipe.lines()
+            if pictures.pipe.is_open:
+                return
+            subject.clock.unwatch(pictures.pipe.fileno())
+            subject.note(pictures.why())
+            self._children.remove(pictures)
+            pictures.end()
+            pictures.make_sure(0.0)
+            if self._restarts < MOST_RESTARTS:
+                self._restarts += 1
+                self._draw(subject, self._start_pictures())
+                subject.show_scene()
+
+        subject.clock.watch(pictures.pipe.fileno(), hear)
+
+    def _flush(self) -> None:
+        for child in self._children:
+            child.pipe.flush()
+
+    def _say_of_phones(self) -> None:
+        """Their address, also for a camera; and what people should know of it."""
+        for told in self.serving["told"]:
+            self._say(told)
+        if address := self.serving["phone"]:
+            from dva_sim.console.pages.qr_code import half_blocks  # late: start-up
+
+            self._say(f"Phone: {address}")
+            if (sys.stdout.encoding or "").lower().replace("-", "") == "utf8":
+                self._say(half_blocks(address, sys.stdout.isatty()))
+            trust = address.partition("?")[0].removesuffix("phone")
+            self._say(f"A phone has to trust this machine once: {trust}trust says how.")
+
+    def _open_browser(self, address: str) -> None:
+        """Where there is one; never where nobody could see it."""
+        hidden = any(os.environ.get(name) for name in BROWSERLESS)
+        seen = sys.platform in ("darwin", "win32") or any(map(os.environ.get, NO_DISPLAY))
+        if self._options.open and seen and not hidden:
+            with suppress(webbrowser.Error):
+                webbrowser.open(address)

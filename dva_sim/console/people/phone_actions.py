@@ -1,0 +1,218 @@
+"""What people with phones ask for: to be registered, a robot, a calibration, and where they tilt.
+
+A phone is there from the first word of its page until that is gone for good. One phone holds one
+robot. What ends a drive ends it at once, and for good.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import NO_ANSWER, Refused, Said
+from dva_sim.console.asking.seats import Seats
+from dva_sim.console.phones.phone_input import samples_of, settings_of
+from dva_sim.console.phones.phone_seat import PhoneSeat
+from dva_sim.console.world.world import ConsoleWorld
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.errors import ProtocolError
+
+Line = dict[str, Any]
+LIFTED = "stopped: the thumb was lifted"
+TURNED = "stopped: the phone's screen has turned"
+
+
+class PhoneActions:
+    """Does what phones ask for.
+
+    Args:
+        world: In which.
+        seats: Who sits where.
+        robot: Gives the id of a robot by what a line calls it.
+        stop: Ends the drive of a client, and says why.
+    """
+
+    def __init__(
+        self,
+        world: ConsoleWorld,
+        seats: Seats,
+        robot: Callable[[Any], str],
+        stop: Callable[[str, str], object],
+    ) -> None:
+        self._world, self._seats, self._robot, self._stop = world, seats, robot, stop
+        self._phones = world.phones
+
+    def sits(self, client: str) -> bool:
+        """Whether a page has the seat of a phone, and none of the console."""
+        phone = self._phones.by_client.get(client)
+        return phone is not None and phone.person is not None
+
+    def is_tilted(self, client: str) -> bool:
+        """Whether a page is that of a phone that is steered by tilt now."""
+        phone = self._phones.by_client.get(client)
+        return phone is not None and phone.tilts
+
+    def let_go(self, client: str) -> None:
+        """The stick on a phone's screen is let go, if it is a phone."""
+        phone = self._phones.by_client.get(client)
+        if phone is not None:
+            phone.tilt.let_go()
+
+    def samples(self, client: str, line: Line) -> None:
+        """Samples of a phone have come."""
+        said, phone = samples_of(line), self._phones.seat(client)
+        if phone is None:
+            return
+        if phone.person is None:
+            seat = self._seats.taken.get(client)
+            phone.lend(None if seat is None else self._world.person(seat.number))
+        now = time.monotonic()
+        if phone.driven is not None and not said.hand:
+            self._stop(client, LIFTED)
+        elif phone.driven is not None and said.orientation != phone.orientation:
+            self._stop(client, TURNED)
+        phone.turn(said.orientation)
+        if phone.take(said, now):  # a sensor that says the same again and again is silent
+            self._seats.heard(client, now, said.hand)
+
+    def leaves(self, client: str) -> None:
+        """A page has left its seat of the console: another one there steers as it likes."""
+        phone = self._phones.by_client.get(client)
+        if phone is not None:
+            phone.lend(None)
+
+    def forget(self, client: str) -> None:
+        """Its page is gone for good: the device leaves."""
+        phone = self._phones.by_client.pop(client, None)
+        if phone is not None:
+            self._retire(client, phone)
+            phone.keep(None)
+            self._world.free_seat(client)
+
+    # --- who it is -------------------------------------------------------------------------
+
+    @does("phone_register")
+    def _register(self, client: str, line: Line, said: Said) -> None:
+        label, kind = line["label"], line["type"]
+        address = f"{line['server'].strip()}:{line['port']}"
+        seat = self._seats.taken.get(client)
+        if seat is not None and not self.sits(client):
+            raise Refused("this page has a seat of the console: release it first")
+        phone = self._phone(client)
+        self._retire(client, phone)
+        number = self._phones.new_person(phone, label, kind, address)
+        if number is None:
+            raise Refused("too many phones have come and gone: try again in two minutes")
+        person = phone.person
+        assert person is not None
+        self._world.let_in(number, person)
+        self._seats.sit_at(client, number)
+
+        def answered(reply: m.Reply) -> None:
+            if phone.person is not person:
+                said(False, "another registration has taken its place")
+            elif reply.code == m.OK:
+                phone.registered = True
+                self._world.client_of[number] = client
+                for robot in self._world.run.field.robots:
+                    person.device.connect(robot)  # an emergency does not wait for a connection
+                said(True, f"{label} is registered", phone=phone.identity())
+            else:
+                self._retire(client, phone)
+                said(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+
+        def unreachable() -> None:
+            if phone.person is person:
+                self._retire(client, phone)
+            said(False, f"no DVA answers at {address}")
+
+        try:
+            person.device.register_once(answered, unreachable)
+        except ProtocolError as error:
+            self._retire(client, phone)
+            raise Refused(error.reason) from None
+
+    def _phone(self, client: str) -> PhoneSeat:
+        phone = self._phones.seat(client)
+        if phone is None:
+            raise Refused("there are as many phones as there may be")
+        return phone
+
+    def _retire(self, client: str, phone: PhoneSeat) -> None:
+        """Whatever device a phone had is no more."""
+        if phone.person is None:
+            return
+        phone.person, phone.registered = None, False
+        number = self._seats.stand_up(client)
+        if number is not None:
+            self._world.client_of.pop(number, None)
+            self._world.see_off(number)
+
+    def _device(self, client: str) -> tuple[PhoneSeat, PersonAgent]:
+        phone = self._phones.by_client.get(client)
+        if phone is None or phone.person is None or not phone.registered:
+            raise Refused("this phone is not registered yet")
+        return phone, phone.person
+
+    # --- what it asks of the DVA ---------------------------------------------------------------
+
+    @does("phone_devices")
+    def _devices(self, client: str, _: Line, said: Said) -> None:
+        device = self._device(client)[1].device
+
+        def answered(reply: m.Reply) -> None:
+            if not isinstance(reply.content, m.DeviceList):
+                said(False, reply.text or m.CODE_NAMES.get(reply.code, str(reply.code)))
+                return
+            found = [_shown(one) for one in reply.content.devices]
+            said(True, f"{len(found)} devices", devices=found)
+
+        device.ask(device.dva, m.GetDeviceList(), answered, lambda: said(False, NO_ANSWER))
+
+    @does("phone_permission")
+    def _permission(self, client: str, line: Line, said: Said) -> None:
+        _, person = self._device(client)
+        level, robot = line["level"], self._asked(line["device"])
+        held = person.robots.get(robot)
+        if held is not None and held.level == level:
+            said(True, f"{held.label} is yours already")
+            return
+        for other in list(person.robots.values()):
+            other.give_back()
+        person.alert = ""
+
+        def answered(ok: bool, text: str) -> None:
+            held = {robot for one in self._world.persons for robot in one.robots}
+            self._world.screens.hold(held)
+            said(ok, text)
+
+        person.take([robot], answered, level)
+
+    def _asked(self, given: str) -> str:
+        """The id that is asked for: also of what is no robot, so that the DVA can say so.
+
+        Raises:
+            Refused: it is no device that anybody knows.
+        """
+        return given if given in self._world.run.stage.labels else self._robot(given)
+
+    @does("phone_calibrate")
+    def _calibrate(self, client: str, line: Line, said: Said) -> None:
+        phone = self._phone(client)
+        settings = settings_of(line)
+        kept = self._phones.keep_motion(phone, settings.keep)
+        phone.calibrate(settings)
+        later = " from the next drive on" if phone.driven is not None else ""
+        said(True, f"calibrated{later}{kept}")
+
+
+def _shown(device: m.Device) -> Line:
+    return {
+        "id": device.id_tag,
+        "label": device.label,
+        "type": device.device_type,
+        "address": device.address,
+    }

@@ -1,0 +1,176 @@
+"""What control rooms are asked for at pages: each becomes messages of the person's own device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from dva_sim.console.asking.dispatcher import Doer, does
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.seats import Seats
+from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.events.missions import inspection_of, send_on_mission
+from dva_sim.console.events.rooms import ConsoleRoom
+from dva_sim.console.events.takeover import Takeover
+from dva_sim.console.world.world import ConsoleWorld
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+
+class RoomActions:
+    """Does what control rooms are asked for.
+
+    Args:
+        world: In which.
+        seats: Who sits where.
+        robot: Finds the id of a robot that a line names.
+        take: Takes a robot for a page's seat.
+    """
+
+    def __init__(
+        self,
+        world: ConsoleWorld,
+        seats: Seats,
+        robot: Callable[[Any], str],
+        take: Doer,
+    ) -> None:
+        self._world, self._rooms, self._seats = world, world.rooms, seats
+        self._robot, self._take = robot, take
+
+    def forget(self, client: str) -> None:
+        """A page is gone for good."""
+        self._rooms.leave(client)
+
+    # --- who asks ---------------------------------------------------------------------------
+
+    @does("room_join")
+    def _join(self, client: str, line: Line, said: Said) -> None:
+        name = line["name"].strip()
+        self._rooms.join(client, str(line.get("role", "look")), name, said)
+
+    def _room(
+        self, client: str, line: Line, said: Said, then: Callable[[ConsoleRoom], object]
+    ) -> None:
+        """The control room of a page; it gets one with its first decision."""
+        room = self._rooms.by_client.get(client)
+        if room is not None and room.registered:
+            then(room)
+            return
+
+        def joined(ok: bool, text: str, /, **_: Any) -> None:
+            room = self._rooms.by_client.get(client)
+            if ok and room is not None:
+                then(room)
+            else:
+                said(False, text)
+
+        self._rooms.join(client, str(line.get("role", "look")), "", joined)
+
+    def _ask(
+        self,
+        client: str,
+        line: Line,
+        said: Said,
+        body: m.Body,
+        done: str,
+        then: Callable[[m.Reply], Line] | None = None,
+    ) -> None:
+        self._room(client, line, said, lambda room: room.ask(body, said, done, then))
+
+    # --- events -----------------------------------------------------------------------------
+
+    @does(*DECISIONS)
+    def decide(self, client: str, line: Line, said: Said) -> None:
+        """Decide on an event."""
+        body, done = decision_of(line, self._device, self._rooms.decisions)
+        self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
+
+    @does("event_raise")
+    def _raise(self, client: str, line: Line, said: Said) -> None:
+        body, done = report_of(line, self._place(line))
+
+        def then(_: m.Reply) -> Line:
+            event = self._world.run.dva.desk.book.near(body.kind, body.position)
+            return {} if event is None else {"event": event.number}
+
+        self._ask(client, line, said, body, done, then)
+
+    def _place(self, line: Line) -> m.Position:
+        """Where on earth a place of the site lies.
+
+        Raises:
+            Refused: it is none.
+        """
+        site = self._world.run.stage.site
+        x, y = line["x_m"], line["y_m"]
+        left, low, right, high = site.extent
+        if not (left <= x <= right and low <= y <= high):
+            raise Refused("x_m and y_m should be a place on the site")
+        return m.Position(*site.frame.to_latlon(x, y))
+
+    def _device(self, label: str) -> str:
+        """The id of a device by its label.
+
+        Raises:
+            Refused: there is none.
+        """
+        entries = self._world.run.dva.desk.registry.entries
+        found = (i for i, entry in entries.items() if entry.device.label == label)
+        id_tag = next(found, None)
+        if id_tag is None:
+            raise Refused(f"there is no device {label!r}")
+        return id_tag
+
+    def _is_robot(self, device: str) -> bool:
+        return device in self._world.run.field.robots
+
+    # --- robots -----------------------------------------------------------------------------
+
+    @does("mission")
+    def _mission(self, client: str, line: Line, said: Said) -> None:
+        """Have a robot go to an event by itself, and look at it."""
+        status = self._rooms.listener.events.get(line["event"])
+        if status is None:
+            raise Refused(f"there is no event {line['event']}")
+        robot = self._robot(line["robot"])
+        label, body = self._world.run.stage.labels[robot], inspection_of(status)
+
+        def send(room: ConsoleRoom) -> None:
+            send_on_mission(room.device, robot, label, body, said)
+
+        self._room(client, line, said, send)
+
+    @does("take_over")
+    def _take_over(self, client: str, line: Line, said: Said) -> None:
+        """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
+        robot, reason = self._robot(line["robot"]), line["reason"]
+
+        def begin(room: ConsoleRoom) -> None:
+            number = self._seats.sit(client)
+            if number is None:
+                said(False, "all seats are taken")
+                return
+            seat = self._world.person(number)
+            label = self._world.run.stage.labels[robot]
+            take = partial(self._take, client, line | {"robots": [label]})
+
+            def ended(ok: bool, text: str, /, **more: Any) -> None:
+                if not ok and not seat.robots:
+                    self._seats.stand_up(client)
+                    seat.attended = client in self._world.client_of.values()
+                said(ok, text, **more)
+
+            event = self._rooms.event_of(robot)
+            Takeover(
+                agent=room.agent,
+                robot=robot,
+                reason=reason,
+                event=event,
+                seat=seat.device.id_tag,
+                take=take,
+                said=ended,
+            ).begin()
+
+        self._room(client, line, said, begin)

@@ -1,0 +1,186 @@
+"""What people at a robot's windows do: drive it by hand, and let things go wrong with it.
+
+The page only says what it wants, again and again while something is held; the robot's controller
+decides. Whoever falls silent, hides the page or leaves it, asks for standstill by that.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from dva_sim.agents.robot.controller import Decision
+from dva_sim.console.asking.dispatcher import does
+from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.asking.seats import SILENT_AFTER
+from dva_sim.console.robots.robot_windows import RobotWindow, RobotWindows
+from dva_sim.protocol import messages as m
+
+Line = dict[str, Any]
+
+
+@dataclass
+class PageHand:
+    """A page that has a robot in hand.
+
+    Attributes:
+        robot: Its id.
+        heard: When its newest input came, real time [s].
+        holds: Whether that was held.
+    """
+
+    robot: str
+    heard: float = 0.0
+    holds: bool = False
+
+
+class RobotActions:
+    """Does what the windows of robots ask for.
+
+    Args:
+        windows: Of all robots.
+        robot: Gives the id of a robot by what a line calls it.
+        why_not: Why nobody may drive now; empty: one may.
+        labels: Of all devices, by id.
+        deaf: Told which robot's computer is made to hang, and that it is again as it should be.
+        slow: Told how long a message is made to take a robot's computer [s].
+    """
+
+    def __init__(
+        self,
+        windows: RobotWindows,
+        robot: Callable[[Any], str],
+        *,
+        why_not: Callable[[], str],
+        labels: Mapping[str, str],
+        deaf: Callable[[str, bool], object],
+        slow: Callable[[float], object],
+    ) -> None:
+        self._windows, self._robot, self._why_not = windows, robot, why_not
+        self._labels, self._deaf, self._slow = labels, deaf, slow
+        self._hands: dict[str, PageHand] = {}  # by client
+        self._count = 0
+
+    # --- by hand -----------------------------------------------------------------------
+
+    @does("manual_take")
+    def _take(self, client: str, line: Line, said: Said) -> None:
+        robot = self._robot(line["robot"])
+        window = self._windows.by_id[robot]
+        if why := self._why_not():
+            raise Refused(why)
+        if (state := window.station.line()["state"]) != "listening":
+            raise Refused(f"it is {state}: it has to be registered and listening first")
+        mine = self._hands.get(client)
+        if mine is not None and mine.robot != robot:
+            self._let_go(client, mine)
+        self._must(window.hand.take(client))
+        if mine is None or mine.robot != robot or window.number is None:
+            self._count += 1
+            window.number, window.notice = self._count, ""
+            self._hands[client] = PageHand(robot)
+        said(True, "manual control is yours", hand=window.number)
+
+    def _must(self, decision: Decision) -> None:
+        """Refuse what the robot refuses, by names that people know.
+
+        Raises:
+            Refused: the robot does not obey.
+        """
+        if decision.code != m.OK:
+            text = decision.text
+            for id_tag, label in self._labels.items():
+                text = text.replace(id_tag, label)
+            raise Refused(f"{m.CODE_NAMES[decision.code]}: {text}")
+
+    @does("manual_release")
+    def _release(self, client: str, _: Line, said: Said) -> None:
+        hand = self._hands.get(client)
+        if hand is not None:
+            self._let_go(client, hand)
+        said(True, "released")
+
+    def _let_go(self, client: str, hand: PageHand) -> None:
+        del self._hands[client]
+        window = self._windows.by_id[hand.robot]
+        if window.hand.let_go(client).code == m.OK:
+            window.number = None
+
+    @does("manual")
+    def input(self, client: str, line: Line) -> None:
+        """Steer as a hand wants now, in shares of the limits; letting go asks for a stop."""
+        hand = self._hands.get(client)
+        if hand is None:
+            return
+        held = line["held"] and not self._why_not()
+        hand.heard, hand.holds = time.monotonic(), held
+        if held:
+            self._drive(client, hand, line["speed"], line["turn"])
+        else:
+            self._drive(client, hand, 0.0, 0.0)
+
+    def _drive(self, client: str, hand: PageHand, speed: float, turn: float) -> None:
+        window = self._windows.by_id[hand.robot]
+        spec = window.robot.body.spec
+        wanted = speed * spec.max_speed, turn * spec.max_turn_rate
+        if window.hand.drive(client, *wanted).code == m.WRONG_MODE:
+            del self._hands[client]  # an emergency, or a long silence, has ended it
+
+    def gone(self, client: str) -> None:
+        """A page is hidden or closed: nobody has a hand on it."""
+        hand = self._hands.get(client)
+        if hand is not None:
+            hand.holds = False
+            self._drive(client, hand, 0.0, 0.0)
+
+    def look_for_the_silent(self) -> None:
+        """Who held on and says nothing any more wants to stand."""
+        now = time.monotonic()
+        for client, hand in list(self._hands.items()):
+            if hand.holds and now - hand.heard > SILENT_AFTER:
+                self.gone(client)
+        self._windows.look()
+
+    def stop(self, robots: Iterable[str]) -> None:
+        """Nobody drives these on: an emergency, or time stands still, or the machine lags."""
+        stopped = set(robots)
+        for client, hand in list(self._hands.items()):
+            if hand.robot in stopped:
+                self.gone(client)
+
+    def press_emergency(self, robot: str) -> None:
+        """The button at the robot itself."""
+        window = self._windows.by_id[robot]
+        now = window.robot.device.clock.now
+        window.emergency = {"at_ms": round(1000 * now), "by": "its own button"}
+        window.hand.press_emergency()
+
+    # --- faults ------------------------------------------------------------------------
+
+    @does("fault")
+    def _fault(self, _: str, line: Line, said: Said) -> None:
+        robot, what = self._robot(line["robot"]), line["what"]
+        window, on = self._windows.by_id[robot], line["on"]
+        if what == "processing":
+            seconds = line.get("seconds", 0.0)
+            window.faults.slow_down(seconds if on else None)
+            self._slow(seconds if on else 0.0)
+        elif what == "replies":
+            window.faults.drop_replies(on)
+        elif what == "freeze":
+            self._deaf(robot, on)
+            window.faults.freeze(on)
+        elif what == "camera":
+            window.faults.lose_camera(on)
+        else:
+            self._stick(window, line, on)
+        said(True, f"{what}: {'on' if on else 'off'}")
+
+    def _stick(self, window: RobotWindow, line: Line, on: bool) -> None:
+        sensor = line.get("sensor", "")
+        if sensor not in window.robot.sensors:
+            there = ", ".join(window.robot.sensors) or "none"
+            raise Refused(f"there is no sensor {sensor!r}; sensors: {there}")
+        window.faults.stick(sensor, on)

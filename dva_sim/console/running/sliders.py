@@ -1,0 +1,124 @@
+"""The link of a running world under the sliders of its pages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from dva_sim.agents.operator.attention import OperatorSetup
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.running.link import changed, with_link
+from dva_sim.console.running.real_links import TITLE
+from dva_sim.console.wire.arguments import LINK_LIMITS
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import Stage
+from dva_sim.simulation.scenario import Scenario, command_timeout_s, mean_processing_s
+
+
+class LinkSliders:
+    """What the link of all robots is like, and how it is changed while it carries.
+
+    Args:
+        run: Whose.
+        set_usual: Told how long a message usually takes the computer of a robot, by its id [s].
+
+    Attributes:
+        link: As it is now.
+    """
+
+    def __init__(self, run: Run, set_usual: Callable[[str, float], object]) -> None:
+        self._run, self.link = run, run.scenario.link
+        self._set_usual = set_usual
+        self._wanted: dict[str, float] = {}
+
+    def line(self) -> dict[str, Any]:
+        """What it is like, for pages."""
+        link, run = self.link, self._run
+        processing = self._wanted.get("processing_s", mean_processing_s(run.scenario))
+        if run.is_real:
+            return {"kind": "real", "processing_s": processing}
+        return {
+            "kind": "modelled",
+            "delay_s": link.delay_s,
+            "jitter_s": link.jitter_s,
+            "jitter_wanted_s": self._wanted.get("jitter_s", link.jitter_s),
+            "loss": link.loss,
+            "rate_bps": link.rate_bps,
+            "processing_s": processing,
+            "trace": link.trace_up or link.trace_down or link.delay_log,
+            "rate_trace": link.trace_up or link.trace_down,
+        }
+
+    def change(self, given: Mapping[str, Any]) -> tuple[str, Scenario]:
+        """Change it: what is changed, in words, and a scenario with the time-outs it needs.
+
+        Raises:
+            ConfigError: what cannot be.
+        """
+        run = self._run
+        wanted = {key: given[key] for key in LINK_LIMITS if key in given}
+        if run.is_real and wanted.keys() - {"processing_s"}:
+            raise ConfigError(TITLE)
+        self.link = changed(run.scenario.link, self._wanted | wanted)
+        self._wanted |= wanted
+        now = run.clock.now
+        for pair in run.links.values():
+            for each in pair:
+                each.change(now, self.link)
+        if "processing_s" in wanted:
+            self._change_processing(wanted["processing_s"])
+        scenario = with_link(run.scenario, self.link, self._wanted.get("processing_s"))
+        run.be_patient(scenario)
+        told = ", ".join(f"{key} {value:g}" for key, value in wanted.items())
+        if self.link.jitter_s < self._wanted.get("jitter_s", 0.0):
+            told += f"; jitter is kept within the delay, at {self.link.jitter_s:g} s"
+        run.recorder.tell(now, "console", f"link: {told}", "link")
+        return told, scenario
+
+    def _change_processing(self, seconds: float) -> None:
+        for robot in self._run.field.robots:
+            self._set_usual(robot, seconds)
+        self._run.slowed(seconds)
+
+
+def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
+    """How people's commands are made and sent, by a scenario that says how the link is now."""
+    command = scenario.command
+    return OperatorSetup(
+        pattern=stage.pattern_for,
+        window=command.window,
+        heeds=command.heeds,
+        rate_hz=command.rate_hz,
+        timeout=command_timeout_s(scenario),
+        attempts=command.attempts,
+        guarded=scenario.control == "coordinated",
+        topic=stage.cameras.topic,
+    )
+
+
+def change_pattern(
+    run: Run,
+    persons: Sequence[PersonAgent],
+    robot: str,
+    name: str,
+    said: Callable[[bool, str], object],
+) -> None:
+    """Drive a robot by another pattern from the next drive on; a drive is stopped first."""
+    agent = run.field.robots[robot]
+
+    def change(ok: bool = True, text: str = "") -> None:
+        if agent.controller.mode is Mode.TELEOPERATION:
+            said(False, text or f"{agent.device.label} is driven: it has to be stopped first")
+            return
+        run.stage.pattern_names[robot] = name
+        agent.expect(run.stage.pattern_for(robot))
+        run.recorder.tell(run.clock.now, agent.device.label, f"is driven by {name}", "link")
+        said(True, "")
+
+    holder = next((p.robots[robot] for p in persons if robot in p.robots), None)
+    if holder is not None and holder.is_driven:
+        holder.stop("stopped", change)
+    else:
+        change()

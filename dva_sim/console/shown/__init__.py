@@ -1,0 +1,1 @@
+"""What pages are shown of whatever runs: places, hazards, robots, logs."""

@@ -1,0 +1,212 @@
+"""What a page is told of a running world: who is where, how robots and events stand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from dva_sim.agents.people.bystander import SAFE
+from dva_sim.agents.people.person_guard import PersonGuard
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.robots.stands import why_stands
+from dva_sim.console.running.played_run import PlayedRun
+from dva_sim.core.event_status import state_since
+from dva_sim.core.events import FINAL, Event, EventBook
+from dva_sim.kernel.recorder import Moment
+from dva_sim.live.parts import Rate
+from dva_sim.worlds.site import Site
+
+Line = dict[str, Any]
+SEVERITIES = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
+KEPT_EVENTS = 50  # of those that are over
+
+
+class Feed:
+    """Lines about a run.
+
+    Args:
+        run: Which.
+        book: Events of its DVA, if there is one here.
+
+    Attributes:
+        things: Everybody, with the number that other lines call them by.
+        numbers: Those numbers, by id or name.
+    """
+
+    def __init__(self, run: PlayedRun, book: EventBook | None = None) -> None:
+        self._run, self._book = run, book or EventBook()
+        self.things: list[Line] = []
+        self.numbers: dict[str, int] = {}
+        self._rates: dict[str, Rate] = {}
+        self._commands_hz: dict[str, float] = {}
+        self._rated = -math.inf
+        self._number_all()
+
+    @property
+    def now_ms(self) -> int:
+        """Virtual time [ms]."""
+        return round(self._run.clock.now * 1000)
+
+    def _number_all(self) -> None:
+        camera = self._run.scenario.camera
+        for robot in self._run.field.robots.values():
+            spec = robot.body.spec
+            self._number(
+                robot.device.id_tag,
+                robot.device.label,
+                "robot",
+                radius_m=spec.radius,
+                max_speed_mps=spec.max_speed,
+                max_turn_rate_radps=spec.max_turn_rate,
+                camera={
+                    "field_of_view_deg": camera.field_of_view_deg,
+                    "range_m": camera.range_m,
+                    "rate_hz": camera.rate_hz,
+                    "frame_bytes": camera.frame_bytes,
+                },
+            )
+        for name, who in self._run.field.people():
+            device = getattr(who, "device", None)
+            kind = "bystander" if device is None else "guard"
+            id_tag = name if device is None else device.id_tag
+            played = {"person": True} if isinstance(who, PersonGuard) else {}
+            self._number(id_tag, name, kind, radius_m=who.walking.body.radius, **played)
+
+    def _number(self, id_tag: str, label: str, kind: str, **more: Any) -> None:
+        number = len(self.things)
+        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
+        self.numbers[id_tag] = self.numbers[label] = number
+
+    def add(self, id_tag: str, label: str, kind: str) -> None:
+        """Somebody without a place: an operator, a seat, the DVA."""
+        self._number(id_tag, label, kind)
+
+    def add_other(self, id_tag: str, label: str, kind: str, more: Line) -> None:
+        """Somebody who is none of the scenario's, and may be called as one of them."""
+        number = len(self.things)
+        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
+        self.numbers[id_tag] = number
+
+    # --- where everybody is ----------------------------------------------------------------
+
+    def positions(self) -> Line:
+        """Who has a place; who has left the site has none."""
+        field = self._run.field
+        field.world.advance_to(self._run.clock.now)
+        rows = []
+        for id_tag, robot in field.robots.items():
+            body = robot.body
+            pose = body.pose()
+            speed = round(1000 * body.speed)
+            rows.append(self._at(id_tag, pose.x, pose.y, pose.heading, speed))
+        for name, who in field.people():
+            if who.activity != SAFE:
+                x, y = who.walking.place
+                speed = round(1000 * who.walking.speed) if who.walking.walks else 0
+                rows.append(self._at(name, x, y, who.heading, speed))
+        return {"k": "pos", "t": self.now_ms, "p": rows}
+
+    def _at(self, name: str, x: float, y: float, heading: float, speed: int) -> list[int]:
+        turn = math.remainder(heading, 2.0 * math.pi)
+        return [self.numbers[name], round(100 * x), round(100 * y), round(1000 * turn), speed]
+
+    # --- how they are ----------------------------------------------------------------------
+
+    def robots(self, held_by_lag: bool) -> list[Line]:
+        """A row for each robot."""
+        now = self._run.clock.now
+        if now - self._rated >= 1.0:
+            self._rated = now
+            for id_tag, robot in self._run.field.robots.items():
+                rate = self._rates.setdefault(id_tag, Rate())
+                self._commands_hz[id_tag] = round(rate.of(robot.applied, now), 1)
+        return [self._robot(robot, held_by_lag) for robot in self._run.field.robots.values()]
+
+    def _robot(self, robot: RobotAgent, held_by_lag: bool) -> Line:
+        run, id_tag = self._run, robot.device.id_tag
+        now, (holder, held_for) = run.clock.now, robot.holder
+        mode, point = robot.controller.mode, robot.set_point
+        driven = mode is Mode.TELEOPERATION
+        drive = run.recorder.newest_drive.get(id_tag)
+        return {
+            "i": self.numbers[id_tag],
+            "mode": mode.value,
+            "by_hand": robot.controller.by_hand is not None,
+            "pattern": self.pattern_of(id_tag),
+            "battery": round(robot.charge, 3),
+            "holder": holder,
+            "holder_label": None if holder is None else run.stage.labels.get(holder, holder),
+            "session_age_s": round(held_for, 1) if holder else None,
+            "watchdog_left_s": round(max(0.0, point.until - now), 2) if driven else None,
+            "stands": why_stands(robot, now, held_by_lag),
+            "set_speed_mps": round(point.speed, 3) if now < point.until else 0.0,
+            "set_turn_rate_radps": round(point.turn_rate, 3) if now < point.until else 0.0,
+            "queue": len(robot.inbox),
+            "lost": sum(link.lost + link.dropped for link in run.links.get(id_tag, ())),
+            "commands_hz": self._commands_hz.get(id_tag, 0.0),
+            "refused": robot.refused,
+            "timeouts": 0 if drive is None else drive.timeouts,
+        }
+
+    def pattern_of(self, robot: str) -> str:
+        """The name of the pattern by which a robot is driven next, or now."""
+        return self._run.stage.pattern_names.get(robot, self._run.scenario.pattern)
+
+    def people(self) -> list[Line]:
+        """What those on foot are doing."""
+        return [
+            {"i": self.numbers[name], "doing": who.activity}
+            for name, who in self._run.field.people()
+        ]
+
+    # --- what happens ----------------------------------------------------------------------
+
+    def events(self) -> Line:
+        """All that are open, and the last that are over."""
+        book = self._book
+        over = list(book.closed.values())[-KEPT_EVENTS:]
+        return {
+            "k": "events",
+            "t": self.now_ms,
+            "events": [
+                event_line(event, self._run.stage.site, self._run.stage.labels)
+                for event in (*over, *book.open.values())
+            ],
+        }
+
+    def story(self) -> Iterator[Line]:
+        """What was told since the last time; it is forgotten then."""
+        recorder = self._run.recorder
+        moments, recorder.timeline = recorder.timeline, list[Moment]()
+        for time, who, what, kind in moments:
+            yield {"k": "story", "t": round(1000 * time), "who": who, "what": what, "kind": kind}
+
+
+def event_line(event: Event, site: Site, labels: Mapping[str, str]) -> Line:
+    """How an event stands; labels by id."""
+    where = event.position
+    x, y = site.frame.to_xy(where.latitude, where.longitude)
+    return {
+        "number": event.number,
+        "kind": event.kind,
+        "x_m": round(x, 2),
+        "y_m": round(y, 2),
+        "latitude_deg": where.latitude,
+        "longitude_deg": where.longitude,
+        "room": site.room_at(x, y),
+        "severity": next(name for least, name in SEVERITIES if event.severity >= least),
+        "severity_value": round(event.severity, 2),
+        "state": str(event.state),
+        "over": not event.open,
+        "since_ms": round(1000 * state_since(event)),
+        "reported_ms": round(1000 * event.times.get("detected", 0.0)),
+        "assigned": [labels.get(name, name) for name in _sent(event)],
+    }
+
+
+def _sent(event: Event) -> Iterator[str]:
+    """Who is at an event now."""
+    if event.state not in FINAL:
+        yield from (n for n in (event.responder, event.operator, event.actor) if n is not None)

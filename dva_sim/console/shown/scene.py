@@ -1,0 +1,185 @@
+"""What does not change while a console runs: the site, who there is, what the colours mean."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import mapping
+
+from dva_sim.console.running.lag import LIMIT
+from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
+from dva_sim.network.patterns import PATTERNS
+from dva_sim.recordings.pictures import colours
+from dva_sim.simulation.full.hazards import RunHazard
+from dva_sim.simulation.scenario import Scenario
+from dva_sim.worlds.maps import OCCUPIED
+from dva_sim.worlds.site import Site
+from dva_sim.worlds.site_export import features_of
+from dva_sim.worlds.tints import floor_tint
+
+Line = dict[str, Any]
+
+MOST_FEATURES = 20_000
+RULES = {
+    "S1": "A robot moves only by a command that came within the watchdog.",
+    "S2": "One robot obeys one holder at a time.",
+    "S3": "An emergency stop stops, and nothing sent before it moves the robot again.",
+}
+
+
+def scene_of(
+    scenario: Scenario,
+    site: Site,
+    incidents: Sequence[RunHazard],
+    things: list[Line],
+    *,
+    name: str,
+    seed: int,
+) -> Line:
+    """The first line that a page gets.
+
+    Args:
+        scenario: What is run.
+        site: Where.
+        incidents: Its hazards.
+        things: Everybody, with their numbers.
+        name: Of the scenario.
+        seed: Of the run.
+    """
+    return {
+        "k": "scene",
+        "t": 0,
+        "scenario": name,
+        "title": " ".join(scenario.description.split()) or name,
+        "seed": seed,
+        "site": site_of(site),
+        "things": things,
+        "patterns": patterns_of(scenario.pattern),
+        "link_limits": {key: list(limits) for key, limits in LINK_LIMITS.items()},
+        "pace_limits": [1.0, FASTEST],
+        "watchdog_s": scenario.robot.watchdog_s,
+        "stale_s": scenario.robot.max_age_s,
+        "lag_limit_s": LIMIT,
+        "rules": RULES,
+        "legend": legend(incidents),
+    }
+
+
+def patterns_of(own: str) -> list[Line]:
+    """All that may be chosen: the shipped ones, and the scenario's."""
+    names = dict.fromkeys([*PATTERNS, own])
+    kinds = {name: PATTERNS.get(name) for name in names}
+    return [
+        {
+            "name": name,
+            "title": kind.title if kind else name,
+            "label": kind.label if kind else name,
+            "when_slow": kind.when_slow if kind else "",
+            "answered": bool(kind and kind.answered),
+        }
+        for name, kind in kinds.items()
+    ]
+
+
+def site_of(site: Site) -> Line:
+    """The plan of a site, in metres and as GeoJSON in degrees."""
+    tints: dict[str, str] = {}
+    told: Line = {
+        "name": site.name,
+        "extent_m": _rounded(site.extent),
+        "origin": {
+            "latitude_deg": site.frame.latitude,
+            "longitude_deg": site.frame.longitude,
+        },
+        "features": geojson_of(site),
+        "rooms": [
+            {
+                "name": room.name,
+                "polygon_m": _rounded(room.polygon),
+                "holes_m": [_rounded(hole) for hole in room.holes],
+                "floor": floor_tint(room, tints),
+                "outdoor": room.outdoor,
+            }
+            for room in site.rooms
+        ],
+        "walls_m": _rounded(site.wall_lines if site.rooms else site.walls),
+        "solids_m": [_rounded(solid) for solid in site.solids],
+        "doors_m": _rounded(np.asarray(site.doors).reshape(-1, 4)),
+        "exits_m": [_rounded(way.ends) for way in site.exits],
+    }
+    if not site.rooms:
+        told["raster"] = raster_of(site)
+    return told
+
+
+def raster_of(site: Site) -> Line:
+    """Which cells of a bare map are taken, one bit each, row 0 to the south."""
+    grid = site.grid
+    taken = grid.cells == OCCUPIED
+    west, south = grid.to_xy(0, 0).tolist()
+    bits = np.packbits(taken, axis=None)
+    return {
+        "cell_m": grid.resolution,
+        "x0_m": west,
+        "y0_m": south,
+        "columns": int(taken.shape[1]),
+        "rows": int(taken.shape[0]),
+        "cells": base64.b64encode(bits.tobytes()).decode(),
+    }
+
+
+def geojson_of(site: Site) -> Line:
+    """Everything that is drawn on a site, with longitude and latitude."""
+    features = []
+    for feature in features_of(site):
+        there = _to_degrees(site, feature.shape)
+        properties = {"kind": feature.kind, **feature.properties}
+        features.append({"type": "Feature", "properties": properties, "geometry": there})
+        if len(features) >= MOST_FEATURES:
+            break
+    return {"type": "FeatureCollection", "features": features}
+
+
+def _to_degrees(site: Site, shape: Any) -> Line:
+    def convert(points: Any) -> Any:
+        degrees = np.array([site.frame.to_latlon(x, y) for x, y in points.tolist()])
+        return degrees[:, ::-1].round(8)
+
+    there = shapely.transform(shape, convert)
+    ring = there.geom_type == "LinearRing"
+    return dict(mapping(shapely.LineString(there) if ring else there))
+
+
+def legend(incidents: Sequence[RunHazard]) -> list[Line]:
+    """What the colours and marks of a map mean."""
+    kinds = [
+        {"kind": kind, "mode": mode, "colour": colour}
+        for kind, modes in (
+            (colours.ROBOT, colours.ROBOT_MODES),
+            ("person", colours.ACTIVITIES),
+        )
+        for mode, colour in modes.items()
+    ]
+    bodies = [{"kind": kind, "colour": colour} for kind, colour in colours.KINDS.items()]
+    hazards = {i.kind: i.hazard for i in incidents}
+    marks = [
+        {"kind": kind, "title": hazard.title, "colour": hazard.colour, "mark": hazard.mark}
+        for kind, hazard in hazards.items()
+    ]
+    fields = {
+        "smoke": colours.SMOKE,
+        "gas": colours.GAS,
+        "water": colours.WATER,
+        "heat": colours.FIRE,
+    }
+    shown = [{"kind": kind, "field": True, "colour": colour} for kind, colour in fields.items()]
+    return [*bodies, *kinds, *marks, *shown]
+
+
+def _rounded(numbers: Any) -> Any:
+    """Metres to the millimetre, as plain lists."""
+    return np.asarray(numbers, dtype=float).round(3).tolist()

@@ -1,0 +1,90 @@
+"""Robots and guards that are none of the scenario's: they have joined by themselves, or are fakes.
+
+Of them is shown what the DVA knows: that they are there, where, and in which mode.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from dva_sim.console.shown.feed import Feed
+from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
+from dva_sim.kernel.labels import distinct
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import kind_of
+
+Line = dict[str, Any]
+MOST: Final = 64
+UNKNOWN_ROBOT: Final = {"radius_m": 0.3, "max_speed_mps": 0.5, "max_turn_rate_radps": math.pi / 6}
+UNKNOWN_GUARD: Final = {"radius_m": 0.25, "person": True}
+
+
+def row_of_stranger(number: int, mode: str, **known: Any) -> Line:
+    """A robot of which little is known; what is not is null."""
+    unknown = dict.fromkeys(
+        (
+            *("pattern", "battery", "holder", "holder_label", "session_age_s", "watchdog_left_s"),
+            *("set_speed_mps", "set_turn_rate_radps", "queue", "lost", "commands_hz"),
+            *("refused", "timeouts"),
+        )
+    )
+    return {"i": number, "mode": mode, "stands": "", **unknown, **known}
+
+
+class Strangers:
+    """Those of a run.
+
+    Args:
+        run: Which.
+        feed: Gives numbers.
+    """
+
+    def __init__(self, run: Run, feed: Feed) -> None:
+        self._run, self._feed = run, feed
+        self._version = -1
+        self._known: dict[str, str] = {}  # kinds, by id
+
+    def come(self) -> bool:
+        """Whether somebody has come since the last time; each has a number from then on."""
+        registry = self._run.dva.desk.registry
+        if registry.version == self._version:
+            return False
+        self._version = registry.version
+        new = [e for i, e in registry.entries.items() if self._is_new(i, e)]
+        for entry in new[: MOST - len(self._known)]:
+            self._meet(entry)
+        return bool(new)
+
+    def _is_new(self, id_tag: str, entry: DeviceEntry) -> bool:
+        is_shown = id_tag in self._feed.numbers or kind_of(id_tag)[0] == "phone"
+        return entry.kind in (ROBOT, GUARD) and not is_shown and len(self._known) < MOST
+
+    def _meet(self, entry: DeviceEntry) -> None:
+        device, is_robot = entry.device, entry.kind == ROBOT
+        self._known[device.id_tag] = "robot" if is_robot else "guard"
+        more = UNKNOWN_ROBOT if is_robot else UNKNOWN_GUARD
+        label = distinct(device.label, device.id_tag, self._run.stage.labels.values())
+        self._feed.add_other(device.id_tag, label, self._known[device.id_tag], more)
+
+    def positions(self) -> list[list[int]]:
+        """Of those who have said where they are."""
+        frame, rows = self._run.stage.site.frame, []
+        for id_tag, entry in self._here():
+            if entry.position is not None:
+                x, y = frame.to_xy(entry.position.latitude, entry.position.longitude)
+                rows.append([self._feed.numbers[id_tag], round(100 * x), round(100 * y), 0, 0])
+        return rows
+
+    def robots(self) -> list[Line]:
+        """A row for each robot."""
+        return [
+            row_of_stranger(self._feed.numbers[id_tag], entry.mode)
+            for id_tag, entry in self._here()
+            if self._known[id_tag] == "robot"
+        ]
+
+    def _here(self) -> list[tuple[str, DeviceEntry]]:
+        entries = self._run.dva.desk.registry.entries
+        known = ((i, entries.get(i)) for i in self._known)
+        return [(i, entry) for i, entry in known if entry is not None and not entry.silent]

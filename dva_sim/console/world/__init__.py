@@ -1,0 +1,1 @@
+"""A console's own run, and what of it is told and kept."""

@@ -1,0 +1,162 @@
+"""What a person in a seat is told of the own drives, 20 times a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.console.phones.phone_seat import PhoneSeat
+from dva_sim.console.shown.feed import Feed
+from dva_sim.kernel.recorder import DriveLog
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.run import Run
+
+Line = dict[str, Any]
+PHASES = ("driving", "starting", "stopping", "asking", "held")  # the first that holds is told
+
+
+class SeatLines:
+    """Lines for those who sit somewhere.
+
+    Args:
+        run: In which.
+        feed: About it.
+        persons: By the numbers of their seats.
+        client_of: Who sits there, by the same numbers.
+        phones: By their clients.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        feed: Feed,
+        persons: dict[int, PersonAgent],
+        client_of: dict[int, str],
+        phones: dict[str, PhoneSeat],
+    ) -> None:
+        self._run, self._feed, self._persons, self._client_of = run, feed, persons, client_of
+        self._phones = phones
+        self._acted: dict[str, Line] = {}  # by robot: of the newest command that has taken effect
+
+    def applied(self, drive: DriveLog) -> None:
+        """A command has taken effect: which input was behind it?"""
+        held = self._held(drive)
+        if held is None or not drive.applied:
+            return
+        command = drive.applied[-1]
+        acted = self._acted.setdefault(drive.robot, {})
+        acted["age_ms"] = round(1000 * (command.time - command.issued), 1)
+        given = held.acted(command.issued, command.sample_age)
+        if given is not None:
+            acted["input"] = {"n": given.number, "at_ms": round(1000 * time.time(), 1)}
+            acted["loop_ms"] = round(1000 * (command.time - given.time), 1)
+
+    def _held(self, drive: DriveLog) -> HeldRobot | None:
+        for person in self._persons.values():
+            held = person.robots.get(drive.robot)
+            if held is not None and held.log is drive:
+                return held
+        return None
+
+    def waiting_order(self) -> Line | None:
+        """An order for a seat in which nobody sits yet."""
+        persons = self._persons.values()
+        orders = [p.order for p in persons if p.order is not None and not p.attended]
+        return self._order(orders[0]) if orders else None
+
+    def lines(self) -> Iterator[tuple[str, Line]]:
+        """A line for each client that sits somewhere."""
+        for number, client in self._client_of.items():
+            yield client, self._line(client, self._persons[number]) | self._phone(client)
+        for client in self._phones.keys() - self._client_of.values():
+            yield client, self._of_nobody(client) | self._phone(client)
+
+    def _phone(self, client: str) -> Line:
+        phone = self._phones.get(client)
+        return {"phone": None if phone is None else phone.line(time.monotonic())}
+
+    def _of_nobody(self, client: str) -> Line:
+        """Of a phone that has not registered yet."""
+        line = {"k": "seat", "t": self._feed.now_ms, "seat": client, "label": ""}
+        return line | {"phase": "free", "order": None, "alert": "", "drives": []}
+
+    def _line(self, client: str, person: PersonAgent) -> Line:
+        held = list(person.robots.values())
+        phases = {each.phase for each in held}
+        return {
+            "k": "seat",
+            "t": self._feed.now_ms,
+            "seat": client,
+            "label": person.device.label,
+            "phase": next((phase for phase in PHASES if phase in phases), "free"),
+            "order": None if person.order is None else self._order(person.order),
+            "alert": person.alert or person.device.dva_alert,
+            "drives": [self._drive(each) for each in held],
+        }
+
+    def _order(self, order: m.Order) -> Line:
+        where = order.position
+        x, y = self._run.stage.site.frame.to_xy(where.latitude, where.longitude)
+        return {
+            "event": order.event_id,
+            "kind": order.kind,
+            "robot": self._feed.numbers.get(order.device or ""),
+            "x_m": round(x, 2),
+            "y_m": round(y, 2),
+            "room": self._run.stage.site.room_at(x, y),
+        }
+
+    def _drive(self, held: HeldRobot) -> Line:
+        run, log = self._run, held.log
+        robot, reach = run.field.robots.get(held.robot), run.stage.reach(held.robot)
+        acted = self._acted.get(held.robot, {})
+        frame = held.frame
+        told: Line = {
+            "i": self._feed.numbers.get(held.robot),  # of a robot from elsewhere there is none
+            "pattern": self._feed.pattern_of(held.robot),
+            "phase": held.phase,
+            "mode": "" if robot is None else robot.controller.mode.value,
+            "session": held.session,
+            "wanted": [
+                round(held.last.speed * reach.speed, 3),
+                round(held.last.turn * reach.turn_rate, 3),
+            ],
+            "command": [0.0, 0.0],
+            "command_age_ms": acted.get("age_ms"),
+            "picture_ms": None if frame is None else round(1000 * frame.captured),
+            "picture_arrived_ms": None if frame is None else round(1000 * held.arrived),
+            "loop_ms": acted.get("loop_ms"),
+            "input": acted.get("input"),
+        }
+        return told | (_counts(log) if log is not None else _NONE)
+
+
+_NONE: Line = {
+    "sent": 0,
+    "answered": 0,
+    "timeouts": 0,
+    "refused": 0,
+    "superseded": 0,
+    "round_trip_ms": None,
+    "outcome": None,
+}
+
+
+def _counts(log: DriveLog) -> Line:
+    """How the commands of a drive fared."""
+    trips = log.round_trips
+    counts: Line = {
+        "sent": log.sent,
+        "answered": len(trips),
+        "timeouts": log.timeouts,
+        "refused": sum(log.refused.values()),
+        "superseded": log.superseded,
+        "round_trip_ms": round(1000 * trips[-1], 1) if trips else None,
+        "outcome": log.outcome if log.ended is not None else None,
+    }
+    if log.commands and log.ended is None:
+        counts["command"] = [round(number, 3) for number in log.commands[-1][1:]]
+    return counts

@@ -1,0 +1,219 @@
+"""What pages are told of a console's world: each thing as it changes, and no more often."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.screens import Screens
+from dva_sim.console.audit.audited import Audited
+from dva_sim.console.dva.dva_pages import DvaPages
+from dva_sim.console.events.alarm_desk import AlarmDesk
+from dva_sim.console.events.decisions import about_event
+from dva_sim.console.events.rooms import ConsoleRooms
+from dva_sim.console.guards.played_guards import PlayedGuards
+from dva_sim.console.phones.phones import Phones
+from dva_sim.console.robots.robot_windows import RobotWindows
+from dva_sim.console.robots.stands import why_stands
+from dva_sim.console.running.lag import LagRule
+from dva_sim.console.running.recorder import ConsoleRecorder
+from dva_sim.console.running.sliders import LinkSliders
+from dva_sim.console.shown.feed import Feed
+from dva_sim.console.shown.fields import HazardFeed
+from dva_sim.console.shown.logs import PERIOD, Logs
+from dva_sim.console.shown.scene import scene_of
+from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.world.seat_lines import SeatLines
+from dva_sim.network.realtime import PacedClock
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.scenario import Scenario
+
+Line = dict[str, Any]
+
+# From one line to the next, real time [s].
+POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = 0.1, 0.1, 0.5, 1.0, 1.0, 1.0
+SOON = 0.05  # from one look at what has changed to the next, real time [s]
+
+
+class ToldWorld:
+    """A world whose pages are told what changes.
+
+    It says when and how; what there is to be told belongs to the world that this is the base of.
+    """
+
+    clock: PacedClock
+    recorder: ConsoleRecorder
+    scenario: Scenario
+    name: str
+    seed: int
+    run: Run
+    feed: Feed
+    lag: LagRule
+    sliders: LinkSliders
+    phones: Phones
+    windows: RobotWindows
+    strangers: Strangers
+    seat_lines: SeatLines
+    screens: Screens
+    logs: Logs
+    hazards: HazardFeed
+    rooms: ConsoleRooms
+    alarms: AlarmDesk
+    guards: PlayedGuards
+    dva: DvaPages
+    audited: Audited | None
+    tell: Callable[..., object]
+    show: Callable[..., object]
+    dropped: Callable[[], int]
+
+    def __init__(self) -> None:
+        self._newest: dict[str, Any] = {}
+        self._events: list[Line] = []
+
+    def show_scene(self) -> None:
+        """Tell whoever draws, from the beginning, what there is to be seen."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """Tell the scene, and from then on what changes."""
+        self.tell_scene()
+        self.show_scene()
+        self.clock.pulse(POSITIONS, self._tell_positions)
+        self.clock.pulse(WINDOWS, self._tell_windows)
+        self.clock.pulse(ROWS, self._tell_rows)
+        self.clock.pulse(HAZARDS, self._tell_hazards)
+        self.clock.pulse(SOON, self._tell_news)
+        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(DEVICES, self._tell_devices)
+        self.clock.pulse(TIDY, self.recorder.tidy)
+
+    def tell_scene(self) -> None:
+        """Tell what does not change, but for where the DVA listens."""
+        run = self.run
+        scene = scene_of(
+            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            name=self.name,
+            seed=self.seed,
+        )
+        scene["link"] = self.sliders.line()
+        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
+        self.tell(scene)
+
+    def _tell_audit(self) -> None:
+        if self.audited is not None:
+            self._tell_new(self.audited.keeper.line(self.feed.now_ms), but="t")
+
+    def clock_line(self) -> Line:
+        """How time goes by."""
+        return {
+            "factor": self.clock.factor,
+            "paused": self.clock.paused,
+            "lag_s": round(self.lag.newest, 3),
+            "given_up_s": round(self.clock.given_up, 2),
+            "held_by_lag": self.lag.held,
+        }
+
+    def _tell_positions(self) -> None:
+        line = self.feed.positions()
+        line["p"] += self.strangers.positions()
+        self._tell_new(line, but="t")
+
+    def _tell_rows(self) -> None:
+        if self.strangers.come():
+            self.tell_scene()
+        self.lag.measured(time.monotonic(), self.clock.worst_lag())
+        rows: Line = {
+            "k": "rows",
+            "t": self.feed.now_ms,
+            "clock": self.clock_line(),
+            "link": self.sliders.line(),
+            "dropped": self.dropped(),
+            "server": self.dva.port.line(),
+            "robots": [
+                *self.feed.robots(self.lag.held),
+                *self.strangers.robots(),
+            ],
+            "people": self.feed.people(),
+            "order": self.seat_lines.waiting_order(),
+        }
+        self.tell(rows)
+        self._tell_alarms(rows["robots"])
+
+    def _tell_windows(self) -> None:
+        def stands(robot: RobotAgent) -> str:
+            return why_stands(robot, self.clock.now, self.lag.held)
+
+        for line in self.windows.lines(self.screens.watched, stands):
+            self._tell_new(line, but="t", key=str(line["i"]))
+
+    def _tell_devices(self) -> None:
+        line = self.dva.devices(self.feed.now_ms)
+        if line is not None:
+            self.tell(line)
+
+    def _tell_logs(self) -> None:
+        for line in self.logs.batches():
+            self.tell(line)
+
+    def _tell_hazards(self) -> None:
+        self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
+        for number, when in self.run.field.contained.items():
+            self._tell_once("contain", number, round(1000 * when))
+
+    def _tell_once(self, kind: str, number: int, when: int) -> None:
+        if self._newest.get(f"{kind} {number}") != when:
+            self._newest[f"{kind} {number}"] = when
+            self.show({"k": kind, "t": when, "n": number})
+
+    def _tell_news(self) -> None:
+        """Events, story and seats, as soon as they change; rows when a mode or holder does."""
+        self._tell_events()
+        for line in self.feed.story():
+            self.tell(line)
+        robots = self.run.field.robots.values()
+        modes = [(robot.controller.mode, robot.holder[0]) for robot in robots]
+        if self._newest.get("modes") != modes:
+            self._newest["modes"] = modes
+            self._tell_rows()
+        self._tell_seats()
+        self._tell_audit()
+
+    def _tell_events(self) -> None:
+        """Events with what was decided on them, and who decides."""
+        line = self.feed.events()
+        told = self.rooms.listener
+        self._events = line["events"] = [
+            event | about_event(told.events, told.told_at, event["number"])
+            for event in line["events"]
+        ]
+        self._tell_new(line, but="t")
+        self._tell_new(self.rooms.line(self.feed.now_ms), but="t")
+
+    def _tell_alarms(self, robots: list[Line]) -> None:
+        self._tell_new(self.alarms.look(self._events, robots, self.feed.now_ms), but="t")
+
+    def _tell_seats(self) -> None:
+        for client, line in (*self.seat_lines.lines(), *self.guards.lines()):
+            self._tell_new(line, but="t", key=client)
+
+    def _tell_new(self, line: Line, but: str, key: str = "") -> None:
+        """Tell a line unless nothing in it has changed, its time apart."""
+        said = {name: value for name, value in line.items() if name != but}
+        place = f"{line['k']} {key}"
+        if self._newest.get(place) != said:
+            self._newest[place] = said
+            self.tell(line, key)
+
+    def free_seat(self, client: str) -> None:
+        """A client sits nowhere any more, and is told so."""
+        empty = {"k": "seat", "t": self.feed.now_ms, "seat": client, "phase": "free"}
+        self.tell(empty | {"order": None, "alert": "", "drives": [], "phone": None}, client)
+        self._newest.pop(f"seat {client}", None)
+
+    def tell_now(self) -> None:
+        """Something has changed that nobody shall wait for."""
+        self._tell_rows()
+        self._tell_seats()
+        self._tell_audit()

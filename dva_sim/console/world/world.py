@@ -1,0 +1,302 @@
+"""The world of a console: a run on a paced clock, people's seats in it, and what pages are told.
+
+One thread does everything, and waits for nobody: lines to other processes go into outboxes.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from dva_sim.agents.observation import Cameras
+from dva_sim.agents.operator.handheld import Console
+from dva_sim.agents.operator.held_robot import HeldRobot
+from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.cameras.screens import Screens, camera_url, topic_of
+from dva_sim.console.audit.audit_keeper import AuditKeeper
+from dva_sim.console.audit.audited import Audited, name_of_page
+from dva_sim.console.dva.dva_pages import DvaPages
+from dva_sim.console.events.alarm_desk import AlarmDesk, RunFacts
+from dva_sim.console.events.rooms import ConsoleRooms
+from dva_sim.console.guards.played_guards import PlayedGuards
+from dva_sim.console.phones.phones import FIRST_SEAT, Phones
+from dva_sim.console.robots.robot_windows import RobotWindows
+from dva_sim.console.running.lag import LagRule
+from dva_sim.console.running.real_links import MakeSockets
+from dva_sim.console.running.recorder import ConsoleRecorder
+from dva_sim.console.running.sliders import LinkSliders, setup_of
+from dva_sim.console.shown.feed import Feed
+from dva_sim.console.shown.fields import HazardFeed
+from dva_sim.console.shown.logs import Logs
+from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.world.seat_lines import SeatLines
+from dva_sim.console.world.telling import ToldWorld
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.network.realtime import PacedClock
+from dva_sim.recordings.audit_log import AuditRow, plain_row
+from dva_sim.simulation.full.run import Run, Watched
+from dva_sim.simulation.full.stage import DVA, id_of
+from dva_sim.simulation.scenario import Scenario, phone_profile
+
+Line = dict[str, Any]
+Tell = Callable[..., object]
+
+PEOPLE = 1  # operators of the scenario whose places people take
+SCREEN = 0xFFFF  # number of the console's own screen among consoles
+
+
+class ConsoleWorld(ToldWorld):
+    """What runs, and what of it is told.
+
+    Args:
+        scenario: What the run consists of.
+        name: Of the scenario.
+        seed: Decides all luck.
+        clock: Its time; default: real time.
+        sockets: Makes what carries the messages; default: the link that the scenario models.
+        measured: Whether all that happens is kept, to be measured in the end.
+
+    Attributes:
+        clock: Virtual time, at its pace.
+        sockets: What carries the messages, if the links are real.
+        run: The run.
+        logs: What devices are asked, and answer.
+        windows: Those of the robots.
+        dva: The DVA as people see and serve it.
+        tell: Takes lines for pages, and a key for those of which the newest counts.
+        show: Takes lines for whoever draws pictures, likewise.
+
+    Raises:
+        ConfigError: the site cannot hold the team, or the events.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        seed: int,
+        clock: PacedClock | None = None,
+        sockets: MakeSockets | None = None,
+        measured: bool = False,
+    ) -> None:
+        super().__init__()
+        if scenario.transport == "zeromq" and scenario.network_depth == "auto":
+            # A later link may lose or delay anything: only the segments are right for all.
+            scenario = scenario.model_copy(update={"network_depth": "segment"})
+        self.scenario, self.name, self.seed = scenario, name, seed
+        self.clock, self.recorder = clock or PacedClock(), ConsoleRecorder()
+        cameras = Cameras(lambda label, _: camera_url("http:///", label), topic_of)
+        self.sockets = sockets(scenario, self.clock, self.recorder) if sockets else None
+        watched = Watched(self.clock, self.recorder, cameras, PEOPLE, measured, self.sockets)
+        try:
+            self.run = Run(scenario, seed, watched=watched)
+        except DvaSimError:
+            if self.sockets is not None:
+                self.sockets.close()
+            raise
+        self.feed, self.lag = Feed(self.run, self.run.dva.desk.book), LagRule()
+        self.tell: Tell = lambda *_: None
+        self.show: Tell = lambda *_: None
+        self.windows = self._windows()
+        self.sliders = LinkSliders(self.run, self.windows.set_usual)
+        self.dropped: Callable[[], int] = lambda: 0
+        self._console = Console(
+            setup=setup_of(self.run.stage, scenario),
+            phone=phone_profile(scenario),
+            reach=self.run.stage.reach,
+        )
+        self._persons: dict[int, PersonAgent] = {}
+        real = self.sockets.dva if self.sockets is not None else None
+        self.phones = Phones(self.run, self.clock, lambda: self._console, real)
+        self.client_of: dict[int, str] = {}
+        for number in range(max(PEOPLE, len(self.run.persons))):
+            self.person(number)
+        self.feed.add(DVA, "dva", "dva")
+        if self.sockets is not None:
+            self.sockets.join("console", SCREEN)
+        self.screens = Screens(
+            self.run, id_of("console", SCREEN), self.feed.numbers, self._show_frame
+        )
+        self.seat_lines = SeatLines(
+            self.run, self.feed, self._persons, self.client_of, self.phones.by_client
+        )
+        self.guards = PlayedGuards(self.run, self.feed)
+        self.strangers = Strangers(self.run, self.feed)
+        self.rooms = ConsoleRooms(self.run, self.run.dva.desk.roles)
+        self.alarms = AlarmDesk(RunFacts(self.run))
+        self.audited: Audited | None = None
+        self.dva = DvaPages(self.run, self.phones.address, self.sockets, self._dva_moved)
+        self.recorder.on_applied = self.seat_lines.applied
+        field = self.run.field
+        self.hazards = HazardFeed(
+            self.run.stage.site, field.incidents, field.surroundings, field.contained
+        )
+        self.logs = Logs(self.run.network, self._node_of)
+        self.logs.keep("dva")
+        for id_tag, robot in field.robots.items():
+            hears = partial(self.windows.heard, id_tag)
+            self.logs.listen(robot.device.label, hears, publications=True)
+        self.clock.on_late = self._late
+        self.hold: Callable[[str], object] = lambda _: None
+
+    def _windows(self) -> RobotWindows:
+        """The robots' windows; a reply that is dropped is audited and kept, like any that goes."""
+        run, recorder = self.run, self.recorder
+        recorder.robots = run.field.robots.keys()
+
+        def lost(robot: str, reply: bytes) -> None:
+            run.sent(run.clock.now, robot, "", reply)
+            if recorder.kept is not None:
+                recorder.kept.message(robot, reply, sent=True)
+
+        about = self.feed.numbers, run.stage.labels
+        windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
+        for id_tag in run.field.robots:
+            self.feed.things[self.feed.numbers[id_tag]] |= windows.about(id_tag)
+        return windows
+
+    def deafen(self, robot: str, on: bool) -> None:
+        """The audit is told that a robot hears nothing, or hears again."""
+        self.run.deafened(robot, on)
+
+    def is_ours(self, device: str) -> bool:
+        """Return True for a device of this console, whose messages are seen as they are sent."""
+        return self.sockets is None or self.sockets.network.is_here(device)
+
+    def serve_cameras(self, base: str) -> None:
+        """The robots' pictures are to be had below this URL from now on."""
+        for robot in self.run.field.robots.values():
+            robot.controller.camera_url = camera_url(base, robot.device.label)
+
+    def _dva_moved(self, address: str) -> None:
+        self.phones.address = address
+        self.tell_scene()
+
+    def show_scene(self) -> None:
+        """Tell whoever draws, from the beginning, what there is to be seen."""
+        scenario = self.scenario.model_dump(mode="json")
+        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+        for number, when in self.run.field.contained.items():
+            self.show({"k": "contain", "t": round(1000 * when), "n": number})
+
+    def note(self, text: str) -> None:
+        """Something of the console itself has gone wrong that people should know of."""
+        self.recorder.tell(self.clock.now, "console", text, "link")
+
+    # --- who did what ------------------------------------------------------------------------
+
+    def keep_audit(self, keeper: AuditKeeper) -> None:
+        """Keep what people do, and what the DVA decides, from now on."""
+        self.audited = Audited(keeper, self.author, self._named)
+        self.run.dva.on_fact = self.audited.decided
+        keeper.on_rows = self._audit_written
+
+    def _audit_written(self, rows: Sequence[AuditRow]) -> None:
+        if self.recorder.kept is not None:
+            for row in rows:
+                self.recorder.kept.put("audited", plain_row(row))
+
+    def author(self, client: str) -> str:
+        """What the person of a page is called."""
+        if room := self.rooms.label(client):
+            return room
+        if (guard := self.guards.by_client.get(client)) is not None:
+            return guard.device.label
+        seat = next((n for n, who in self.client_of.items() if who == client), None)
+        if seat is not None:
+            return self._persons[seat].device.label
+        return name_of_page(client)
+
+    def _named(self, device: str) -> str:
+        """The name of a device by its id, or of things by their numbers."""
+        names = {str(thing["i"]): thing["label"] for thing in self.feed.things}
+        found = [names.get(one, one) for one in device.split(", ")] if device else []
+        return self.run.stage.labels.get(device, ", ".join(found))
+
+    @property
+    def persons(self) -> list[PersonAgent]:
+        """Those of all seats, with or without somebody in them."""
+        return list(self._persons.values())
+
+    def numbered_persons(self) -> list[tuple[int, PersonAgent]]:
+        """Those of all seats with the numbers of their seats."""
+        return list(self._persons.items())
+
+    def person(self, number: int) -> PersonAgent:
+        """The person of a seat, by its number; new ones of the console, from 0, register first."""
+        while number < FIRST_SEAT and number not in self._persons:
+            place = sum(1 for known in self._persons if known < FIRST_SEAT)
+            device = self.run.stage.device("console", place + 1)
+            person = PersonAgent(device, self._console)
+            person.on_robot = self._watch_robot
+            device.register()
+            for robot in self.run.field.robots:
+                device.connect(robot)  # an emergency does not wait for a connection
+            self.feed.add(device.id_tag, device.label, "operator")
+            self._persons[place] = person
+        return self._persons[number]
+
+    def seat_of_order(self, robots: Sequence[str]) -> int | None:
+        """Where nobody sits and an order waits for one of these robots: it is kept for there."""
+        for number, person in self._persons.items():
+            waits = person.order is not None and person.order.device in robots
+            if waits and not person.attended and number < FIRST_SEAT:
+                return number
+        return None
+
+    def let_in(self, number: int, person: PersonAgent) -> None:
+        """A phone takes part, with a seat of its own."""
+        person.on_robot = self._watch_robot
+        self._persons[number] = person
+
+    def see_off(self, number: int) -> None:
+        """A phone takes part no more; its robots are given back first."""
+        person = self._persons.pop(number)
+        person.release(lambda *_: None)
+        self.phones.retire(number, person.device)
+
+    # --- in somebody's hands --------------------------------------------------------------
+
+    def _node_of(self, label: str) -> str | None:
+        """The id of a device of the run by its label."""
+        devices = self.run.stage.devices
+        return next((device.id_tag for device in devices if device.label == label), None)
+
+    def _show_frame(self, line: Line, robot: int) -> None:
+        self.show(line, robot)
+
+    def _watch_robot(self, held: HeldRobot) -> None:
+        """Frames of a robot in somebody's hands are those that the seat gets."""
+        usual = held.on_frame
+
+        def on_frame(held: HeldRobot, frame: Any) -> None:
+            usual(held, frame)
+            self.screens.arrived(held.robot, frame)
+
+        held.on_frame = on_frame
+
+    # --- lag -------------------------------------------------------------------------------
+
+    def _late(self, behind: float) -> None:
+        """An event comes too late: above the limit nobody drives on."""
+        if self.lag.measured(time.monotonic(), behind):
+            why = f"stopped: the world is {behind:.2f} s behind real time, more than a drive bears"
+            self.hold(why)
+            self.note(why)
+
+    # --- the link --------------------------------------------------------------------------
+
+    def change_link(self, given: Line) -> str:
+        """Change the link of all robots; what is changed, in words.
+
+        Raises:
+            ConfigError: what cannot be.
+        """
+        told, scenario = self.sliders.change(given)
+        self._console = replace(self._console, setup=setup_of(self.run.stage, scenario))
+        for person in self.persons:
+            person.console = self._console
+        return told

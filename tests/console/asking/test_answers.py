@@ -1,0 +1,45 @@
+import pytest
+
+from dva_sim.console.asking.answers import Answers
+from dva_sim.console.asking.refusal import Refused
+from dva_sim.kernel.errors import ConfigError, DvaSimError
+
+
+def test_an_action_is_done_once_and_answered_as_often_as_it_is_said():
+    answers, done, told = Answers(), [], []
+
+    def do(said):
+        done.append(1)
+        said(True, "done", more=3)
+
+    for _ in range(3):
+        answers.once("1", do, told.append)
+    assert done == [1]
+    assert told == [{"k": "done", "id": "1", "ok": True, "text": "done", "more": 3}] * 3
+
+
+def test_who_asks_again_before_there_is_an_answer_is_told_with_it():
+    answers, waiting, told = Answers(), [], []
+    answers.once("1", waiting.append, told.append)
+    answers.once("1", waiting.append, told.append)
+    assert told == []
+    (said,) = waiting
+    said(True, "at last")
+    assert [answer["text"] for answer in told] == ["at last"]
+
+
+@pytest.mark.parametrize("error", [Refused("no"), ConfigError("no"), DvaSimError("no")])
+def test_what_is_refused_is_the_answer(error):
+    def do(said):
+        raise error
+
+    answers, told = Answers(), []
+    answers.once("1", do, told.append)
+    assert told == [{"k": "done", "id": "1", "ok": False, "text": "no"}]
+
+
+def test_answers_are_forgotten_in_time():
+    answers = Answers()
+    for number in range(Answers.MOST + 10):
+        answers.once(str(number), lambda said: said(True, ""), lambda _: None)
+    assert len(answers.given) == Answers.MOST

@@ -1,0 +1,70 @@
+"""A world in real time whose machine cannot keep up: robots stop, and the page is told why."""
+
+import time
+
+import pytest
+from helpers.processes.patience import becomes
+
+from dva_sim.agents.robot.controller import Mode
+from dva_sim.console.people.actions import Actions
+from dva_sim.console.world.world import ConsoleWorld
+from dva_sim.simulation.scenario import build, load
+
+pytestmark = pytest.mark.system
+
+
+@pytest.fixture
+def world():
+    made = ConsoleWorld(build(load("hands-on")), "hands-on", 1)
+    made.lines = []
+    made.tell = lambda line, key="": made.lines.append(line)
+    made.actions = Actions(made)
+    made.begin()
+    made.clock.go()
+    return made
+
+
+def lets_time_pass(world, until):
+    """Whether something becomes true while the world goes on."""
+
+    def look():
+        world.clock.run(world.clock.now + 0.05)
+        return until()
+
+    return becomes(look)
+
+
+def answer(world, **action):
+    world.actions.take({"client": "c1", **action})
+    number = action["id"]
+
+    def find():
+        return [x for x in world.lines if x["k"] == "done" and x["id"] == number]
+
+    assert lets_time_pass(world, find)
+    return find()[0]["ok"]
+
+
+def test_a_slow_callback_stops_who_is_driven_and_nothing_begins_again_by_itself(world):
+    robot = next(iter(world.run.field.robots.values()))
+    assert answer(world, id="take", do="take", robots=[0])
+    starts = iter(range(1000))
+    assert lets_time_pass(world, lambda: answer(world, id=f"start{next(starts)}", do="start"))
+    world.lines.clear()
+    world.clock.call_after(0.1, time.sleep, 0.6)
+    assert lets_time_pass(world, lambda: robot.controller.mode is Mode.IDLE)
+    told = lambda: any("behind real" in line.get("what", "") for line in world.lines)  # noqa: E731
+    assert lets_time_pass(world, told)
+    assert lets_time_pass(world, lambda: not world.lag.held)
+    world.clock.run(world.clock.now + 1.0)
+    assert robot.controller.mode is Mode.IDLE
+
+
+def test_halted_with_nobody_there_it_takes_hardly_any_processor(world):
+    world.clock.pace(paused=True)
+    end = time.monotonic() + 3.0
+    world.clock.pulse(0.1, lambda: world.clock.stop() if time.monotonic() > end else None)
+    begun = time.process_time(), time.monotonic()
+    world.clock.run()
+    share = (time.process_time() - begun[0]) / (time.monotonic() - begun[1])
+    assert share < 0.06  # 1 to 2 % where nothing else runs
