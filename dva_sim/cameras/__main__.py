@@ -15,7 +15,6 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -24,11 +23,11 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from dva_sim.cameras.frames import MOST_PICTURE
-from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
+from dva_sim.cameras.painting import NICENESS, run
 from dva_sim.cameras.streaming import PictureStream
 from dva_sim.cameras.streams import MOST_VIEWERS, CameraStreams, headers_of
 from dva_sim.serving.connection import place_of
+from dva_sim.serving.pipes import PipeEnd, WatchedEnd
 from dva_sim.serving.port_listener import fitting_places
 from dva_sim.serving.server import Server, serve
 
@@ -85,36 +84,25 @@ async def _refused(_: Request, error: Exception) -> Response:
     return PlainTextResponse(f"{error.detail}\n", error.status_code, headers=headers)
 
 
-class _Watch:
-    """Says to the run, and to who draws, which robots are watched; neither is waited for."""
-
-    def __init__(self, *ends: socket.socket) -> None:
-        self._ends = ends
-
-    def __call__(self, robots: list[int], is_new: bool) -> None:
-        line = json.dumps({"watch": robots}).encode() + b"\n"
-        for end in self._ends:
-            with suppress(OSError):
-                end.send(line, socket.MSG_DONTWAIT)
-
-
 async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     painter, ours = socket.socketpair()
-    ours.setblocking(False)
-    to_world = socket.socket(fileno=os.dup(world))
-    streams = CameraStreams(_Watch(to_world, ours))
+
+    def watch(robots: list[int], _: bool) -> None:
+        """Say to the run, and to who draws, which robots are watched."""
+        for end in (to_world, pictures):
+            end.offer(json.dumps({"watch": robots}).encode() + b"\n")
+
+    streams = CameraStreams(watch)
+    to_world = PipeEnd(os.dup(world))
+    pictures = WatchedEnd(loop, ours.detach(), streams.take)
     streams.begin()
 
     def draw() -> None:
         try:
-            run(PaintersEnd(world), PaintersEnd(painter.detach()))
+            run(PipeEnd(world), PipeEnd(painter.detach()))
         finally:
             loop.call_soon_threadsafe(ended.set)
-
-    async def take() -> None:
-        while data := await loop.sock_recv(ours, MOST_PICTURE):
-            streams.take(data)
 
     async def say_again() -> None:
         while True:
@@ -122,7 +110,7 @@ async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> 
             await asyncio.sleep(REPEATED)
 
     threading.Thread(target=draw, daemon=True).start()
-    tasks = [asyncio.ensure_future(take()), asyncio.ensure_future(say_again())]
+    saying = asyncio.ensure_future(say_again())
     pages = CameraPages(streams, labels)
     routes = [
         Route("/camera/{label:path}.mjpg", pages.stream),
@@ -132,9 +120,9 @@ async def _serve(world: int, listener: socket.socket, labels: Sequence[str]) -> 
     closing = asyncio.ensure_future(_close_when(ended, streams))
     server = Server.of(_counted(app), MOST_REQUEST, ws="none")
     await serve(server, listener, fitting_places(1), ended)
-    for task in (*tasks, closing):
+    for task in (saying, closing):
         task.cancel()
-    ours.close()
+    pictures.close()
 
 
 def _counted(app: ASGIApp) -> ASGIApp:

@@ -10,12 +10,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from dva_sim.cameras.pipes import LinePipe
 from dva_sim.kernel.errors import ERROR, RunsFailed
+from dva_sim.serving.pipes import LineKinds, LinePipe
 
 SERVING_WITHIN = 30.0  # from the start of the web process to its first word [s]
 END_WITHIN = 0.8  # for a child to end by itself once it is asked to [s]
 MOST_SAID = 10_000  # of what a child says on standard error [B]
+# Lines for whoever draws pictures.
+PAINTED = LineKinds(newest=frozenset({"frame"}), kept=frozenset({"scene", "contain"}))
 
 
 class ChildFailed(RunsFailed):
@@ -32,16 +34,22 @@ class Child:
         module: What it runs.
         words: Its further arguments.
         others: Sockets that it gets beside its pipe.
+        kinds: Of the lines that it is told.
 
     Attributes:
         pipe: Our end.
     """
 
     def __init__(
-        self, name: str, module: str, words: Sequence[str], others: Sequence[socket.socket] = ()
+        self,
+        name: str,
+        module: str,
+        words: Sequence[str],
+        others: Sequence[socket.socket],
+        kinds: LineKinds,
     ) -> None:
         ours, theirs = socket.socketpair()
-        self.name, self.pipe = name, LinePipe(ours)
+        self.name, self.pipe = name, LinePipe(ours.detach(), kinds)
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, "--fd", str(theirs.fileno()), *words],
             stdin=subprocess.DEVNULL,

@@ -7,72 +7,21 @@ for nobody: a frame or a picture for which there is no time is dropped and count
 
 from __future__ import annotations
 
-import json
 import select
-import socket
 import time
 from typing import Any
 
 from dva_sim.cameras.drawing import Eyes
 from dva_sim.cameras.frames import ALIVE, Picture, pack
+from dva_sim.serving.pipes import PipeEnd
 
 NICENESS = 3  # the run goes first
 ALIVE_S = 1.0  # so often it says that it lives [s]
 IDLE_S = 0.25  # it looks up at least so often [s]
-AT_ONCE = 1 << 18  # bytes that are read
 RATE_ROOM = 1.25  # of real time: pictures of a robot in a second, of its frames in one of the run
 LEAST_RATE = 12.0  # pictures of a robot in a second that are drawn in any case [1/s]
-MOST_LINE = 1 << 20  # bytes
 
 Line = dict[str, Any]
-
-
-class PaintersEnd:
-    """One end of a socket pair, which never makes its reader or writer wait.
-
-    Attributes:
-        is_open: Whether the other process is there.
-    """
-
-    def __init__(self, number: int) -> None:
-        self._socket = socket.socket(fileno=number)
-        self._socket.setblocking(False)
-        self._rest, self._unsent, self.is_open = b"", b"", True
-
-    def fileno(self) -> int:
-        """Return the file descriptor of the socket."""
-        return self._socket.fileno()
-
-    def lines(self) -> list[Line]:
-        """Return the lines that have arrived since the last call."""
-        try:
-            data = self._socket.recv(AT_ONCE)
-        except BlockingIOError:
-            return []
-        except OSError:
-            data = b""
-        self.is_open = bool(data)
-        *whole, self._rest = (self._rest + data).split(b"\n")
-        return [json.loads(line) for line in whole]
-
-    def put(self, data: bytes) -> bool:
-        """Write all of it as there is room, or none of it: whether it was taken."""
-        if not self.flush():
-            return False
-        self._unsent = data
-        self.flush()
-        return True
-
-    def flush(self) -> bool:
-        """Write what was begun: True if nothing of it is left."""
-        try:
-            while self._unsent:
-                self._unsent = self._unsent[self._socket.send(self._unsent) :]
-        except BlockingIOError:
-            return False
-        except OSError:
-            self.is_open, self._unsent = False, b""
-        return True
 
 
 class Painter:
@@ -133,7 +82,7 @@ class Painter:
         return Picture(robot, frame["number"], captured, arrived, jpeg)
 
 
-def run(world: PaintersEnd, web: PaintersEnd) -> Painter:
+def run(world: PipeEnd, web: PipeEnd) -> Painter:
     """Draw until one of both has ended."""
     painter, alive = Painter(), 0.0
     while world.is_open and web.is_open:
@@ -146,10 +95,10 @@ def run(world: PaintersEnd, web: PaintersEnd) -> Painter:
         if (
             painter.is_ready
             and now - alive >= ALIVE_S
-            and web.put(pack(Picture(ALIVE, painter.drawn, 0, 0, b"")))
+            and web.offer(pack(Picture(ALIVE, painter.drawn, 0, 0, b"")))
         ):
             alive = now
         picture = painter.draw(now) if web.flush() else None
-        if picture is not None and not web.put(pack(picture)):
+        if picture is not None and not web.offer(pack(picture)):
             painter.dropped += 1
     return painter

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.cameras.children import END_WITHIN, Child
+from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
 from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
@@ -76,7 +76,7 @@ class CameraService:
         assert self._run is not None
         self._clock.unwatch(self._listener.fileno())
         words = ["--listen-fd", str(self._listener.fileno()), "--labels", json.dumps(self._labels)]
-        child = self._child = Child("camera process", MODULE, words, [self._listener])
+        child = self._child = Child("camera process", MODULE, words, [self._listener], PAINTED)
         self._clock.watch(child.pipe.fileno(), self._hear)
         scenario = self._run.scenario.model_dump(mode="json")
         child.pipe.put({"k": "scene", "t": 0, "scenario": scenario, "seed": self._seed})

@@ -16,9 +16,9 @@ from dva_sim.console.running.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.live.pipes import Outlet
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
+from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
 from dva_sim.simulation.scenario import Scenario
 
@@ -99,7 +99,7 @@ class ConsoleSupervisor:
         options, keeper, outlet = self._options, None, None
         if options.record is not None:
             keeper = Keeper(options.record, world.scenario, world.seed)
-            outlet = Outlet(keeper.inlet())
+            outlet = PipeEnd(keeper.inlet())
             world.recorder.kept = LiveRecorder(world.clock, outlet)
             world.recorder.kept.is_own = world.is_ours
             keep_run(world.run, world.recorder)

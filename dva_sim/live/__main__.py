@@ -8,8 +8,8 @@ from pathlib import Path
 
 from dva_sim.kernel.errors import DvaSimError, error_line
 from dva_sim.live.options import PATHS, LiveOptions
-from dva_sim.live.pipes import Outlet
 from dva_sim.live.process import run_part
+from dva_sim.serving.pipes import PipeEnd
 
 
 def main(argument: str) -> int:
@@ -19,12 +19,12 @@ def main(argument: str) -> int:
     options["changes"] = tuple(options["changes"])
     for key in PATHS:
         options[key] = None if options[key] is None else Path(options[key])
-    reports = Outlet(sys.stdout.fileno())  # a supervisor that does not read must not stop robots
+    reports = PipeEnd(sys.stdout.fileno())  # a supervisor that does not read must not stop robots
     try:
         run_part(
             told["part"],
             LiveOptions(**options),
-            lambda report: reports.put(json.dumps(vars(report)).encode()),
+            lambda report: reports.offer(json.dumps(vars(report)).encode() + b"\n"),
             told["number"],
             told["epoch"],
             supervised=True,

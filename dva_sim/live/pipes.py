@@ -1,4 +1,4 @@
-"""Pipes that carry the lines of a live run's parts; no part ever waits for its reader."""
+"""Pipes that carry the lines of a live run's parts, each read by a thread."""
 
 from __future__ import annotations
 
@@ -11,41 +11,6 @@ from contextlib import suppress
 from dva_sim.live.judging import LiveJudge
 
 PIPE_BYTES = 1024 * 1024  # that may wait to be taken
-
-
-class Outlet:
-    """Writes lines into a pipe, and never waits for its reader.
-
-    Args:
-        file: Number of the open file; it is closed by `close`.
-    """
-
-    def __init__(self, file: int) -> None:
-        self._file, self._rest, self._is_open = file, b"", True
-        os.set_blocking(file, False)
-
-    def put(self, line: bytes) -> bool:
-        """Write a whole line, or none of it: whether there was room, and it is not closed."""
-        if not self._is_open or not self._flush():
-            return False
-        self._rest = line + b"\n"
-        self._flush()
-        return True
-
-    def _flush(self) -> bool:
-        with suppress(BlockingIOError, BrokenPipeError):
-            while self._rest:
-                self._rest = self._rest[os.write(self._file, self._rest) :]
-        return not self._rest
-
-    def close(self) -> None:
-        """Write what was begun, if there is room; nothing can be written from now on.
-
-        The number of the file may soon be that of another one.
-        """
-        self._flush()
-        self._is_open = False
-        os.close(self._file)
 
 
 class Inlets:

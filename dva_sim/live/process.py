@@ -19,11 +19,11 @@ from dva_sim.cameras.service import CameraService
 from dva_sim.kernel.errors import DvaSimError, RunsFailed
 from dva_sim.live.options import CAMERA_PORT, LiveOptions
 from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
-from dva_sim.live.pipes import Outlet
 from dva_sim.live.recording import LiveRecorder, RunKeeping
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork, split_address
+from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
 
@@ -99,7 +99,7 @@ def run_part(
         NobodyThere: this part stayed alone.
     """
     alone = RunKeeping(options, options.read()) if outlet is None else None
-    out = Outlet(alone.inlet() if alone is not None else outlet or 0)
+    out = PipeEnd(alone.inlet() if alone is not None else outlet or 0)
     try:
         _run_part(
             name=name,
@@ -125,7 +125,7 @@ def _run_part(
     number: int,
     epoch: float | None,
     supervised: bool,
-    out: Outlet,
+    out: PipeEnd,
 ) -> None:
     scenario = options.read()
     ring = None if options.keys is None else KeyRing(options.keys)

@@ -26,7 +26,7 @@ from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.live.judging import FRAME, HERE, JUDGED, SAID, SEEN, LiveJudge
 from dva_sim.live.options import LiveOptions
-from dva_sim.live.pipes import Inlets, Outlet
+from dva_sim.live.pipes import Inlets
 from dva_sim.live.recorded_lines import FORMAT, MOST_BYTES, ToldRun, make_recording, told_in
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
@@ -35,6 +35,7 @@ from dva_sim.recordings.writing import (
     PART,
     SENT,
 )
+from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.observation_json import as_plain
 from dva_sim.simulation.full.observations import FactGap, FactLog, terms_of
 from dva_sim.simulation.full.verdicts import Verdict
@@ -65,7 +66,7 @@ class LiveRecorder(Recorder):
             sent, what others send where it arrives.
     """
 
-    def __init__(self, clock: Clock, outlet: Outlet, keeps: bool = True) -> None:
+    def __init__(self, clock: Clock, outlet: PipeEnd, keeps: bool = True) -> None:
         super().__init__()
         self._clock, self._outlet, self.keeps = clock, outlet, keeps
         self.log: FactLog | None = None
@@ -95,7 +96,7 @@ class LiveRecorder(Recorder):
             self._second, self._room = second, BYTES_PER_SECOND
         data = json.dumps(line).encode() if self._room > 0 else b""
         self._room -= len(data)
-        kept = bool(data) and self._outlet.put(data)
+        kept = bool(data) and self._outlet.offer(data + b"\n")
         self.counters[_NOT_KEPT] += not kept
         return kept
 

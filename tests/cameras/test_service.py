@@ -16,7 +16,6 @@ from PIL import Image
 
 from dva_sim.agents.observation import Cameras
 from dva_sim.cameras import service as cameras
-from dva_sim.cameras.pipes import MOST_WAITING
 from dva_sim.cameras.screens import topic_of
 from dva_sim.cameras.service import CameraService
 from dva_sim.cameras.streams import MOST_VIEWERS
@@ -26,6 +25,7 @@ from dva_sim.live.parts import WorldPart
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
+from dva_sim.serving.pipes import MOST_WAITING
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 from dva_sim.simulation.scenario import build, load
 

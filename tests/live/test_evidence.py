@@ -22,11 +22,11 @@ from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live import recorded_lines, recording
-from dva_sim.live.pipes import Outlet
 from dva_sim.live.recording import Keeper, LiveRecorder, TraceFile
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.recordings.reading import read_recording
+from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import dva_server
 from dva_sim.simulation.full.dva_trace import TracedDva, replay_dva, traced
@@ -163,7 +163,7 @@ def message(number: int, source: str = PHONE) -> bytes:
 
 def test_who_records_never_waits_and_counts_what_has_no_room():
     reads, writes = os.pipe()
-    recorder = LiveRecorder(Clock(), Outlet(writes))
+    recorder = LiveRecorder(Clock(), PipeEnd(writes))
     for number in range(1, 2001):
         recorder.message(PHONE, message(number), True)
     dropped = recorder.counters["not recorded"]
@@ -179,12 +179,12 @@ def test_who_records_never_waits_and_counts_what_has_no_room():
 
 def test_nothing_is_written_to_a_file_that_has_the_number_of_a_closed_outlet():
     reads, writes = os.pipe()
-    outlet = Outlet(writes)
-    assert outlet.put(b"a line")
+    outlet = PipeEnd(writes)
+    assert outlet.offer(b"a line\n")
     outlet.close()
     assert os.read(reads, 100) == b"a line\n"
     os.dup2(reads, writes)
-    assert not outlet.put(b"another")
+    assert not outlet.offer(b"another\n")
     os.close(reads)
     os.close(writes)
 
@@ -193,7 +193,7 @@ def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch):
     monkeypatch.setattr(recording, "BYTES_PER_SECOND", 1000)
     monkeypatch.setattr(recording.time, "monotonic", lambda: 5.0)
     with Path(os.devnull).open("wb") as nowhere:
-        recorder = LiveRecorder(Clock(), Outlet(nowhere.fileno()))
+        recorder = LiveRecorder(Clock(), PipeEnd(nowhere.fileno()))
         for number in range(1, 101):
             recorder.message(PHONE, message(number), True)
     assert 95 <= recorder.counters["not recorded"] < 100
@@ -201,7 +201,7 @@ def test_a_part_says_no_more_in_a_second_than_was_agreed(monkeypatch):
 
 def test_of_strangers_what_arrives_is_kept_of_others_what_they_send():
     reads, writes = os.pipe()
-    recorder = LiveRecorder(Clock(), Outlet(writes))
+    recorder = LiveRecorder(Clock(), PipeEnd(writes))
     recorder.is_own = {PHONE, ROBOT}.__contains__
     stranger = "AA:BB:CC:DD:EE:01"
     recorder.message(PHONE, message(1), True)
@@ -223,7 +223,7 @@ def test_after_a_gap_a_trace_goes_on_no_more():
             said.append(line)
             return line != "second"
 
-    take = recording.TraceLines(Full(Clock(), Outlet(os.open(os.devnull, os.O_WRONLY))), "dva")
+    take = recording.TraceLines(Full(Clock(), PipeEnd(os.open(os.devnull, os.O_WRONLY))), "dva")
     for line in ("first", "second", "third"):
         take(line)
     assert said == ["first", "second"]
@@ -236,7 +236,7 @@ def record(path: Path, lines: int = 20) -> Keeper:
     """A run of a few lines, whose part has ended."""
     keeper = Keeper(path, scenario_of(), 1)
     inlet = keeper.inlet()
-    recorder = LiveRecorder(Clock(), Outlet(inlet))
+    recorder = LiveRecorder(Clock(), PipeEnd(inlet))
     recorder.put("team", {ROBOT: "robot-1", PHONE: "operator-1"}, {ROBOT: 0.3})
     for number in range(1, lines + 1):
         recorder.put("sent", number / 10, PHONE, ROBOT, message(number).decode())

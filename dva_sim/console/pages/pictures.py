@@ -11,7 +11,8 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from dva_sim.cameras.painting import NICENESS, PaintersEnd, run
+from dva_sim.cameras.painting import NICENESS, run
+from dva_sim.serving.pipes import PipeEnd
 
 
 def main(given: Sequence[str] | None = None) -> int:
@@ -23,7 +24,7 @@ def main(given: Sequence[str] | None = None) -> int:
     # Ctrl-C reaches all processes of a terminal; the simulation says when it is over.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(NICENESS)
-    run(PaintersEnd(options.fd), PaintersEnd(options.web_fd))
+    run(PipeEnd(options.fd), PipeEnd(options.web_fd))
     return 0
 
 

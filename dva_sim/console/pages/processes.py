@@ -17,8 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from dva_sim.cameras.children import END_WITHIN, Child
+from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
 from dva_sim.console.pages.page_options import PageOptions
+from dva_sim.console.wire.lines import KINDS
 from dva_sim.network.realtime import PacedClock
 from dva_sim.serving.listening import listen
 
@@ -142,7 +143,7 @@ class ConsoleProcesses:
         if options.phones:
             words += ["--phones-host", options.phones_host]
             words += ["--phones-port", str(options.phones_port)]
-        web = Child("web process", WEB, words, [ours])
+        web = Child("web process", WEB, words, [ours], KINDS)
         self._children.append(web)
         ours.close()
         return web
@@ -151,7 +152,8 @@ class ConsoleProcesses:
         """Our copy of its end stays open, so that another one can take its place."""
         end = self._to_web
         assert end is not None
-        pictures = Child("pictures process", PICTURES, ["--web-fd", str(end.fileno())], [end])
+        words = ["--web-fd", str(end.fileno())]
+        pictures = Child("pictures process", PICTURES, words, [end], PAINTED)
         self._children.append(pictures)
         return pictures
 

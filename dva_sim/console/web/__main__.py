@@ -75,12 +75,12 @@ async def run(options: argparse.Namespace) -> None:
     hub.watching = cameras.tell
     ended = simulation.ended
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
-    await simulation.open(options.fd)
+    simulation.open(options.fd)
     door = phones.door if phones else None
     about = {"phone": door.address if door else None, "told": told}
     simulation.send(serving(access, options.host, port) | about)
     if options.pictures_fd is not None:
-        await cameras.open(options.pictures_fd)
+        cameras.open(options.pictures_fd)
     telling = asyncio.gather(
         cameras.keep_telling(), hub.keep_tidy(), asyncio.to_thread(prepare_checks)
     )

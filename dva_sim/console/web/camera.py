@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Callable, Iterable
 
 from dva_sim.cameras.streams import CameraStreams
-from dva_sim.console.web.pipes import PipeEnd
 from dva_sim.console.web.simulation import Simulation
+from dva_sim.serving.pipes import WatchedEnd
 
 REPEATED = 1.0  # so often is said again who is watched [s]
 
@@ -23,26 +24,24 @@ class ConsoleCameras(CameraStreams):
     def __init__(self, simulation: Simulation, said: Callable[[], Iterable[int]]) -> None:
         super().__init__(self._say_watched, said)
         self._simulation = simulation
-        self._pipe = PipeEnd(self.take, self._ended)
+        self._pipe: WatchedEnd | None = None
         self._ok = True
 
-    async def open(self, number: int) -> None:
-        """Use the pipe of that number."""
-        await self._pipe.open(number)
+    def open(self, number: int) -> None:
+        """Use the pipe of that number; the end of who draws shows by silence."""
+        self._pipe = WatchedEnd(asyncio.get_running_loop(), number, self.take)
         self.begin()
-
-    def _ended(self) -> None:
-        """Who draws is gone; the stream says so by its silence."""
 
     @property
     def draws(self) -> bool:
         """True while a painter reports."""
-        return self._pipe.is_open and super().draws
+        return self._pipe is not None and self._pipe.is_open and super().draws
 
     def _say_watched(self, robots: list[int], is_new: bool) -> None:
         if is_new:
             self._simulation.send({"do": "watch", "robots": robots})
-        self._pipe.send({"do": "watch", "watch": robots})
+        if self._pipe is not None:
+            self._pipe.offer(json.dumps({"watch": robots}).encode() + b"\n")
 
     async def keep_telling(self) -> None:
         """Say again and again who is watched: whoever draws may have begun anew."""
@@ -57,5 +56,6 @@ class ConsoleCameras(CameraStreams):
 
     def close(self) -> None:
         """Take no more pictures, and end all streams."""
-        self._pipe.close()
+        if self._pipe is not None:
+            self._pipe.close()
         super().close()

@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.console.web.outbox import Asked
-from dva_sim.console.web.pipes import Lines, PipeEnd
+from dva_sim.console.web.outbox import Asked, OutgoingLines
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.actions import ACTIONS, Queueing
 from dva_sim.console.wire.kinds import Labels
+from dva_sim.serving.pipes import Lines, WatchedEnd
 
 SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
@@ -50,20 +50,23 @@ class Simulation:
         self.labels: Labels = {}
         self.changed: Callable[[str, dict[str, Any]], None] = lambda kind, line: None
         self._lines = Lines()
-        self._pipe = PipeEnd(self._take, self._end)
+        self._asked = OutgoingLines()
+        self._pipe: WatchedEnd | None = None
         self._heard = clock()
         self._pending: dict[str, list[Told]] = {}
         self._complaints = 0
 
-    async def open(self, number: int) -> None:
+    def open(self, number: int) -> None:
         """Use the pipe of that number."""
-        await self._pipe.open(number)
+        loop = asyncio.get_running_loop()
+        self._pipe = WatchedEnd(loop, number, self._take, self._end, self._asked.next)
 
     @property
     def runs(self) -> bool:
         """Whether the simulation is there and, once it has begun, still speaks."""
         speaks = self.state.scene is None or self._clock() - self._heard < SILENCE
-        return self._pipe.is_open and not self.ended.is_set() and speaks
+        is_open = self._pipe is not None and self._pipe.is_open
+        return is_open and speaks and not self.ended.is_set()
 
     # --- what it says --------------------------------------------------------------------
 
@@ -113,7 +116,10 @@ class Simulation:
 
     def send(self, asked: Asked) -> bool:
         """Ask for something that has no answer: False if it cannot be said."""
-        return self._pipe.send(asked)
+        if self._pipe is None or not self._pipe.is_open or not self._asked.put(asked):
+            return False
+        self._pipe.flush()
+        return True
 
     def ask(self, asked: Asked, told: Told) -> None:
         """Ask for something; `told` takes the answer, which may be that there is no room.
@@ -138,7 +144,7 @@ class Simulation:
             waiting.append(answered)
             return
         full = waiting is not None or (len(self._pending) >= MOST_PENDING and not is_urgent)
-        if full or not self._pipe.send(asked | {"id": key}):
+        if full or not self.send(asked | {"id": key}):
             answered({"k": "done", "ok": False, "text": "too many requests at once; try again"})
             return
         self._pending[key] = [answered]
@@ -158,4 +164,5 @@ class Simulation:
 
     def close(self) -> None:
         """Ask for nothing more."""
-        self._pipe.close()
+        if self._pipe is not None:
+            self._pipe.close()

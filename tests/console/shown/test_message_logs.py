@@ -8,17 +8,18 @@ from helpers.console.served_console import HOSTILE, scene
 from helpers.paths import ROOT
 from lxml import etree
 
-from dva_sim.cameras.pipes import MOST_WAITING, LineOutbox
 from dva_sim.console.shown.logs import BATCH, BATCH_BYTES, CUT, Logs
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.log_entries import Entry
 from dva_sim.console.web.logs import AT_ONCE, KEPT, KEPT_BYTES, KeptLogs, Looks
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.lines import KINDS
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Request
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
+from dva_sim.serving.pipes import MOST_WAITING, LineOutbox
 
 SAMPLES = ROOT / "protocol" / "samples" / "valid"
 HEADER = {"DestinationID", "MessageID", "SourceID", "Timestamp", "SessionID"}
@@ -97,11 +98,11 @@ def test_who_listens_in_this_process_has_each_exchange():
 
 
 def test_logs_give_way_to_all_other_lines():
-    outbox = LineOutbox()
+    outbox = LineOutbox(KINDS)
     for n in range(MOST_WAITING):
         outbox.put({"k": "log", "n": n} if n % 2 else {"k": "story", "n": n})
     outbox.put({"k": "story", "n": MOST_WAITING})
-    kept = [json.loads(outbox.pop()) for _ in range(len(outbox))]
+    kept = [json.loads(outbox.next()) for _ in range(len(outbox))]
     assert [one["n"] for one in kept if one["k"] == "story"] == list(range(0, MOST_WAITING + 1, 2))
     assert [one["n"] for one in kept if one["k"] == "log"] == list(range(3, MOST_WAITING, 2))
 

@@ -8,9 +8,9 @@ from helpers.console.simulated_phone import CALIBRATION as CALIBRATE
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, read
 from dva_sim.console.web.outbox import MOST, MOST_BATCHES, OutgoingLines
-from dva_sim.console.web.pipes import Lines
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.serving.pipes import Lines
 
 LABELS = {"robot-1": 0, "robot-2": 3}
 

@@ -43,7 +43,7 @@ def play(story: Callable[[Simulation, Clock, socket.socket], Awaitable[None]]) -
     async def told() -> None:
         clock = Clock()
         simulation = Simulation(clock)
-        await simulation.open(number)
+        simulation.open(number)
         await story(simulation, clock, ours)
         simulation.close()
         await asyncio.sleep(0)

@@ -9,10 +9,10 @@ from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.agents.robot.controller import Decision, RobotController
 from dva_sim.console.running.recorder import keep_run
-from dva_sim.live.pipes import Outlet
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.reading import read_recording
+from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.full.verdicts import RULES, verdicts
 from dva_sim.testing.evidence import judged_recording
@@ -29,7 +29,7 @@ class Recorded:
         self.page = PhonePage(monkeypatch, client="a1", bystander__count=0)
         self.world, self._path = self.page.world, path
         self._keeper = Keeper(path, self.world.scenario, self.world.seed)
-        self._outlet = Outlet(os.dup(inlet := self._keeper.inlet()))
+        self._outlet = PipeEnd(os.dup(inlet := self._keeper.inlet()))
         os.close(inlet)
         self.world.recorder.kept = LiveRecorder(self.world.clock, self._outlet)
         self.world.recorder.kept.is_own = self.world.is_ours

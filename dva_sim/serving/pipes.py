@@ -1,0 +1,256 @@
+"""Pipes between processes, of which neither ever waits for the other.
+
+Lines of JSON that have no room wait in an outbox of a few, of some kinds only the newest; when it
+is full the oldest that may be lost is lost, and counted. Lines that must arrive, such as what an
+action came to, are never dropped: there are few of them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import asyncio
+
+MOST_WAITING = 64  # lines
+MOST_LINE = 32 << 20  # of one that is read [B]; a scene has a few hundred thousand
+AT_ONCE = 1 << 16  # that are read [B]
+
+Line = dict[str, Any]
+
+
+class Lines:
+    """Pieces of bytes as whole lines."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._size = 0
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Take some bytes; the lines that are complete with them, without their ends.
+
+        Raises:
+            ValueError: a line does not end.
+        """
+        first, *rest = data.split(b"\n")
+        self._pieces.append(first)
+        self._size += len(first)
+        if self._size > MOST_LINE:
+            raise ValueError(f"a line is longer than {MOST_LINE} bytes")
+        if not rest:
+            return []
+        lines = [b"".join(self._pieces), *rest[:-1]]
+        self._pieces, self._size = [rest[-1]], len(rest[-1])
+        return lines
+
+
+class PipeEnd:
+    """One end of a socket or a pipe; nothing here ever waits.
+
+    Args:
+        end: Number of the open file; it is closed by `close`.
+        following: Gives what is to be written next; None: nothing.
+
+    Attributes:
+        is_open: Whether the other end is still there.
+    """
+
+    def __init__(self, end: int, following: Callable[[], bytes | None] = lambda: None) -> None:
+        os.set_blocking(end, False)
+        self._end, self._following = end, following
+        self._rest, self._lines, self.is_open = b"", Lines(), True
+
+    def fileno(self) -> int:
+        """Return the number of the file; -1 once it is closed."""
+        return self._end
+
+    def offer(self, data: bytes) -> bool:
+        """Write all of it as there is room, or none of it: whether it was taken."""
+        if not self.flush() or not self.is_open:
+            return False
+        self._rest = data
+        self.flush()
+        return True
+
+    def flush(self) -> bool:
+        """Write what there is room for; True if nothing waits any more."""
+        try:
+            while self.is_open and (data := self._rest or self._following()):
+                self._rest = data
+                self._rest = data[os.write(self._end, data) :]
+        except BlockingIOError:
+            return False
+        except OSError:
+            self.is_open = False
+        return True
+
+    def read(self) -> bytes | None:
+        """Return what has come since; None: nothing yet; no bytes: there will be no more."""
+        try:
+            data = os.read(self._end, AT_ONCE)
+        except BlockingIOError:
+            return None
+        except OSError:
+            data = b""
+        self.is_open = self.is_open and bool(data)
+        return data
+
+    def lines(self) -> list[Line]:
+        """Return the lines that have come since; what is no line of JSON is left out."""
+        try:
+            whole = self._lines.feed(self.read() or b"")
+        except ValueError:
+            self.is_open = False
+            return []
+        return [line for text in whole if (line := _read(text)) is not None]
+
+    def close(self) -> None:
+        """Write what waits, if there is room, and nothing more; may be repeated.
+
+        The number of the file may soon be that of another one.
+        """
+        if self._end >= 0:
+            self.flush()
+            self.is_open = False
+            os.close(self._end)
+            self._end = -1
+
+
+def _read(text: bytes) -> Line | None:
+    try:
+        line = json.loads(text)
+    except ValueError:
+        return None
+    return line if isinstance(line, dict) else None
+
+
+class WatchedEnd(PipeEnd):
+    """A pipe in an event loop: what comes is taken at once, and what waits is written in time.
+
+    Args:
+        loop: Watches it.
+        end: See `PipeEnd`.
+        take: Gets what comes.
+        ended: Called once when no more will come.
+        following: See `PipeEnd`.
+    """
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        end: int,
+        take: Callable[[bytes], object],
+        ended: Callable[[], object] = lambda: None,
+        following: Callable[[], bytes | None] = lambda: None,
+    ) -> None:
+        super().__init__(end, following)
+        self._loop, self._take, self._ended, self._waits = loop, take, ended, False
+        loop.add_reader(end, self._hear)
+
+    def _hear(self) -> None:
+        data = self.read()
+        if data:
+            self._take(data)
+        elif data is not None:
+            self.close()
+            self._ended()
+
+    def flush(self) -> bool:
+        """Write what there is room for, and the rest later; True if nothing waits any more."""
+        done = super().flush()
+        if self._waits is done:
+            self._waits = not done
+            if self._waits:
+                self._loop.add_writer(self._end, self.flush)
+            else:
+                self._loop.remove_writer(self._end)
+        return done
+
+    def close(self) -> None:
+        """See `PipeEnd`."""
+        if self._end >= 0:
+            self._loop.remove_reader(self._end)
+            self._loop.remove_writer(self._end)
+            self._waits = False
+        super().close()
+
+
+@dataclass(frozen=True)
+class LineKinds:
+    """Kinds of lines, by their `k`, that do not wait as others do.
+
+    Attributes:
+        newest: Of these, of one key, only the newest waits.
+        kept: These are never dropped.
+        first_dropped: These before all others.
+    """
+
+    newest: frozenset[str]
+    kept: frozenset[str]
+    first_dropped: frozenset[str] = frozenset()
+
+
+class LineOutbox:
+    """Lines that wait to be written.
+
+    Attributes:
+        dropped: Lines that were lost, or replaced by newer ones.
+    """
+
+    def __init__(self, kinds: LineKinds) -> None:
+        self._kinds = kinds
+        self._waiting: OrderedDict[object, tuple[str, bytes]] = OrderedDict()
+        self._number = self.dropped = 0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def put(self, line: Line, key: object = None) -> None:
+        """Add a line; `key` tells lines of one kind apart of which only the newest counts."""
+        kind = str(line.get("k"))
+        self._number += 1
+        place = (kind, key) if kind in self._kinds.newest else self._number
+        if self._waiting.pop(place, None) is not None:
+            self.dropped += 1
+        elif len(self._waiting) >= MOST_WAITING:
+            self._drop_one()
+        data = json.dumps(line, separators=(",", ":"), ensure_ascii=False).encode() + b"\n"
+        self._waiting[place] = kind, data
+
+    def next(self) -> bytes | None:
+        """Take the oldest out."""
+        return self._waiting.popitem(last=False)[1][1] if self._waiting else None
+
+    def _drop_one(self) -> None:
+        lost = [p for p, (kind, _) in self._waiting.items() if kind not in self._kinds.kept]
+        first = [p for p in lost if self._waiting[p][0] in self._kinds.first_dropped]
+        for place in (first or lost)[:1]:
+            del self._waiting[place]
+            self.dropped += 1
+
+
+class LinePipe(PipeEnd):
+    """One end of a socket on which lines go both ways.
+
+    Args:
+        end: See `PipeEnd`.
+        kinds: Of the lines that are written.
+
+    Attributes:
+        outbox: What waits to be written.
+    """
+
+    def __init__(self, end: int, kinds: LineKinds) -> None:
+        self.outbox = LineOutbox(kinds)
+        super().__init__(end, self.outbox.next)
+
+    def put(self, line: Line, key: object = None) -> None:
+        """Write a line as soon as there is room; see `LineOutbox`."""
+        if self.is_open:
+            self.outbox.put(line, key)
+            self.flush()
