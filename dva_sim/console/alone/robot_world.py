@@ -23,8 +23,9 @@ from dva_sim.console.running.lag import LagRule
 from dva_sim.console.running.real_links import ConsoleSockets
 from dva_sim.console.running.recorder import ConsoleRecorder
 from dva_sim.console.shown.feed import Feed
-from dva_sim.console.shown.logs import PERIOD, Logs
+from dva_sim.console.shown.logs import Logs
 from dva_sim.console.shown.scene import scene_of
+from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link.link import Link
@@ -195,7 +196,7 @@ class RobotWorld:
         self.clock.pulse(WINDOWS, self._tell_windows)
         self.clock.pulse(ROWS, self.tell_now)
         self.clock.pulse(SOON, self._tell_news)
-        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(LOG_PERIOD, self._tell_logs)
         self.clock.pulse(TIDY, self.recorder.tidy)
 
     def show_scene(self) -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-SILENT_AFTER = 0.3  # without a word while something is held: it is let go [s]
+from dva_sim.console.wire.limits import SILENT_AFTER
+
 MOST_SEATS = 16
 
 

@@ -12,7 +12,7 @@ from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import Refused, Said
-from dva_sim.console.asking.seats import SILENT_AFTER, Seats
+from dva_sim.console.asking.seats import Seats
 from dva_sim.console.audit.audited import name_of_page
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.guards.guard_actions import GuardActions
@@ -23,6 +23,7 @@ from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.running.sliders import change_pattern
 from dva_sim.console.wire.actions import ActionPlace
 from dva_sim.console.wire.arguments import FASTEST
+from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.network.patterns import PATTERNS
 

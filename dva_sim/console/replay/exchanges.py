@@ -10,10 +10,10 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from typing import Any
 
+from dva_sim.console.wire.limits import LOG_BATCH
 from dva_sim.kernel.recorder import Sent
 
 Line = dict[str, Any]
-BATCH = 200  # exchanges told at once
 FIRST = 2000  # of those before the moment that is shown
 # What is published, to whom it may concern; nobody answers it.
 PUBLISHED = re.compile(
@@ -64,8 +64,8 @@ class ExchangeLog:
 
     def batches(self, name: str, told: int, end: int) -> list[Line]:
         """Lines for pages, of those after the first `told` up to the first `end`."""
-        starts = range(max(told, end - FIRST), end, BATCH)
+        starts = range(max(told, end - FIRST), end, LOG_BATCH)
         return [
-            {"k": "log", "log": name, "lines": self._lines[start : min(end, start + BATCH)]}
+            {"k": "log", "log": name, "lines": self._lines[start : min(end, start + LOG_BATCH)]}
             for start in starts
         ]

@@ -14,8 +14,8 @@ from typing import Any
 from dva_sim.agents.robot.controller import Decision
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
-from dva_sim.console.asking.seats import SILENT_AFTER
 from dva_sim.console.robots.robot_windows import RobotWindow, RobotWindows
+from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]

@@ -18,6 +18,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
+from dva_sim.console.wire.limits import LOG_BATCH, LOG_BYTES
 from dva_sim.network.messaging import Transport
 from dva_sim.network.tap import Exchange, Tap
 from dva_sim.protocol.schema import MAX_BYTES
@@ -25,9 +26,6 @@ from dva_sim.protocol.schema import MAX_BYTES
 Line = dict[str, Any]
 Take = Callable[[Exchange], object]
 
-BATCH: Final = 200  # exchanges told at once
-BATCH_BYTES: Final = 96_000  # of them, so that other lines do not wait for long
-PERIOD: Final = 0.2  # from one batch to the next, real time [s]
 CUT: Final = MAX_BYTES + 1  # enough of a message to show that it is too long [B]
 
 
@@ -50,7 +48,7 @@ class MessageLog:
         self.kept = self.wants_all = False
         self.listeners: list[Take] = []
         self._tap = Tap(transport.clock, self._take, publications=False)
-        self._waiting: deque[Exchange] = deque(maxlen=BATCH)
+        self._waiting: deque[Exchange] = deque(maxlen=LOG_BATCH)
         self._told = self._total = 0
 
     def look(self, looks: bool, publications: bool) -> None:
@@ -68,7 +66,7 @@ class MessageLog:
         if not self._waiting:
             return None
         lines: list[list[Any]] = []
-        room = BATCH_BYTES
+        room = LOG_BYTES
         while self._waiting and room > 0:
             line = _line_of(self._waiting.pop())
             room -= len(line[2]) + len(line[3] or "")

@@ -10,7 +10,6 @@ from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage, Labels
 from dva_sim.console.wire.roles import Role
 
-MOST_BYTES = 16 * 1024  # of a message or a body
 _ID = re.compile(r"[A-Za-z0-9._:-]{1,64}")
 
 

@@ -15,8 +15,9 @@ from typing import Any
 
 from starlette.websockets import WebSocket
 
-from dva_sim.console.web.feed import OWN_KEPT, PageFeed
+from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.state import RunState
+from dva_sim.console.wire.limits import OWN_KEPT
 from dva_sim.console.wire.roles import Role
 
 MOST_CLIENTS = 64

@@ -11,8 +11,7 @@ from collections import deque
 
 from dva_sim.console.web.logs import TABLES, Looks
 from dva_sim.console.web.state import LATEST, RunState, Versioned, body_of
-
-OWN_KEPT = 64  # lines for one page alone that may wait
+from dva_sim.console.wire.limits import OWN_KEPT
 
 Sources = tuple[str, ...]
 SOURCES: Sources = ("seat", "guard", "windows", "d", *LATEST, "story", "others", "log", *TABLES)

@@ -22,13 +22,12 @@ from dva_sim.console.web.state import body_of, encode
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.arguments import OfRobots
 from dva_sim.console.wire.kinds import BadMessage, read_arguments
+from dva_sim.console.wire.limits import DRIVES_BURST, DRIVES_RATE, LOOKS_BURST, LOOKS_RATE
 from dva_sim.console.wire.roles import Role
 from dva_sim.serving.connection import wire_of
 
 TIDY = 10.0  # from one look at silent programs to the next [s]
 WITHOUT_PAGE = ("emergency", "stop", "gone")  # what is done though a page sees nothing
-LOOKS_RATE, LOOKS_BURST = 20.0, 60  # messages of a page that looks [1/s]
-DRIVES_RATE, DRIVES_BURST = 150.0, 300  # of one that drives [1/s]
 REFUSED, STUCK, LEAVING = 1008, 1013, 1001  # why a socket is closed
 
 Next = Callable[[], str | None]

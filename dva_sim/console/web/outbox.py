@@ -7,10 +7,7 @@ from collections import deque
 from typing import Any
 
 from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, Queueing
-
-MOST = 64  # actions that may wait
-MOST_URGENT = 4096  # emergency stops and ends of drives that may wait, if the simulation hangs
-MOST_BATCHES = 8  # of samples that may wait, of a phone: at 40 ms each, as long as a drive lasts
+from dva_sim.console.wire.limits import MOST_ACTIONS, MOST_BATCHES, MOST_URGENT
 
 Asked = dict[str, Any]
 
@@ -50,7 +47,7 @@ class OutgoingLines:
             self._samples.pop(client, None)
         is_urgent = waits is Queueing.FIRST
         queue = self._urgent if is_urgent else self._actions
-        if len(queue) >= (MOST_URGENT if is_urgent else MOST):
+        if len(queue) >= (MOST_URGENT if is_urgent else MOST_ACTIONS):
             self.refused += 1
             return False
         queue.append(asked)

@@ -11,20 +11,13 @@ from typing import Any
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
-from dva_sim.console.web.actions import (
-    MOST_BYTES,
-    NotAllowed,
-    asked_of,
-    check_role,
-    id_of,
-    is_id,
-    read,
-)
+from dva_sim.console.web.actions import NotAllowed, asked_of, check_role, id_of, is_id, read
 from dva_sim.console.web.hub import Hub
 from dva_sim.console.web.simulation import Answer
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.limits import MOST_BYTES
 from dva_sim.console.wire.roles import Role
 from dva_sim.worlds.geo import GeoFrame
 

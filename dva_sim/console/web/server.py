@@ -6,8 +6,8 @@ from pathlib import Path
 
 from starlette.types import ASGIApp
 
-from dva_sim.console.web.actions import MOST_BYTES
 from dva_sim.console.web.sockets import WireProtocol
+from dva_sim.console.wire.limits import MOST_BYTES
 from dva_sim.serving.server import Server
 
 PING = 10.0  # [s]

@@ -17,12 +17,10 @@ from dva_sim.console.web.outbox import Asked, OutgoingLines
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.actions import ACTIONS, Queueing
 from dva_sim.console.wire.kinds import Labels
+from dva_sim.console.wire.limits import MOST_ASKING, MOST_PENDING, SILENCE
 from dva_sim.serving.pipes import Lines, WatchedEnd
 
-SILENCE = 10.0  # after which a simulation that has begun counts as hung [s]
 MOST_COMPLAINTS = 20
-MOST_PENDING = 256  # questions without an answer; an emergency stop is always asked for
-MOST_WAITING = 4  # for the same answer
 
 Answer = dict[str, Any]
 Told = Callable[[Answer], object]
@@ -138,9 +136,9 @@ class Simulation:
         action = ACTIONS[asked["do"]]
         is_urgent = action.waits is Queueing.FIRST
         waiting = self._pending.get(key)
-        if waiting is not None and is_urgent and len(waiting) >= MOST_WAITING:
+        if waiting is not None and is_urgent and len(waiting) >= MOST_ASKING:
             waiting.pop(0)  # repeated questions: the newest ones get the answer
-        if waiting is not None and len(waiting) < MOST_WAITING:
+        if waiting is not None and len(waiting) < MOST_ASKING:
             waiting.append(answered)
             return
         full = waiting is not None or (len(self._pending) >= MOST_PENDING and not is_urgent)

@@ -10,11 +10,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
 
+from dva_sim.console.wire.limits import FAREWELL, STALLED
 from dva_sim.serving.connection import PLACE, WIRE, extended, wire_of
 from dva_sim.serving.port_connections import PortConnection
-
-STALLED = 5.0  # without a byte taken, a page is dropped [s]
-FAREWELL = 10.0  # for what is on its way to a page that was dropped [s]
 
 
 class WireProtocol(WebSocketsSansIOProtocol):

@@ -11,10 +11,10 @@ from collections import deque
 from typing import Any, NamedTuple
 
 from dva_sim.console.web.logs import TABLES, KeptLogs
+from dva_sim.console.wire.limits import STORY_KEPT
 
 Line = dict[str, Any]
 
-STORY_KEPT = 1000  # lines
 STORY_SHOWN = 200  # of them in a snapshot
 # Kinds of which only the newest counts.
 LATEST = (

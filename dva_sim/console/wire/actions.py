@@ -56,10 +56,8 @@ from dva_sim.console.wire.arguments import (
     WithReason,
 )
 from dva_sim.console.wire.kinds import BadMessage, Labels, adapter_of, read_arguments
+from dva_sim.console.wire.limits import LONG, PATIENCE
 from dva_sim.console.wire.roles import Role
-
-PATIENCE: Final = 5.0  # for an answer [s]
-LONG: Final = 60.0  # for one that a robot or the DVA gives, or does not give after all attempts [s]
 
 
 class ActionPlace(Flag):

@@ -22,9 +22,10 @@ from dva_sim.console.running.recorder import ConsoleRecorder
 from dva_sim.console.running.sliders import LinkSliders
 from dva_sim.console.shown.feed import Feed
 from dva_sim.console.shown.fields import HazardFeed
-from dva_sim.console.shown.logs import PERIOD, Logs
+from dva_sim.console.shown.logs import Logs
 from dva_sim.console.shown.scene import scene_of
 from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.world.seat_lines import SeatLines
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run
@@ -85,7 +86,7 @@ class ToldWorld:
         self.clock.pulse(ROWS, self._tell_rows)
         self.clock.pulse(HAZARDS, self._tell_hazards)
         self.clock.pulse(SOON, self._tell_news)
-        self.clock.pulse(PERIOD, self._tell_logs)
+        self.clock.pulse(LOG_PERIOD, self._tell_logs)
         self.clock.pulse(DEVICES, self._tell_devices)
         self.clock.pulse(TIDY, self.recorder.tidy)
 

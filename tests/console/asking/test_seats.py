@@ -1,4 +1,5 @@
-from dva_sim.console.asking.seats import MOST_SEATS, SILENT_AFTER, Seats
+from dva_sim.console.asking.seats import MOST_SEATS, Seats
+from dva_sim.console.wire.limits import SILENT_AFTER
 
 
 def test_a_client_keeps_its_seat_and_the_lowest_free_one_is_given():

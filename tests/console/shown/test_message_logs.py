@@ -8,12 +8,13 @@ from helpers.console.served_console import HOSTILE, scene
 from helpers.paths import ROOT
 from lxml import etree
 
-from dva_sim.console.shown.logs import BATCH, BATCH_BYTES, CUT, Logs
+from dva_sim.console.shown.logs import CUT, Logs
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.log_entries import Entry
 from dva_sim.console.web.logs import AT_ONCE, KEPT, KEPT_BYTES, KeptLogs, Looks
 from dva_sim.console.web.state import RunState
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.limits import LOG_BATCH, LOG_BYTES
 from dva_sim.console.wire.lines import KINDS
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Request
@@ -71,7 +72,7 @@ def test_of_a_flood_the_newest_are_told_and_numbers_say_how_many_are_not(desk):
     for n in range(1, 1405):
         desk.ask(b"%d" % n)
     (told,) = desk.logs.batches()
-    assert [one[0] for one in told["lines"]] == list(range(1405 - BATCH, 1405))
+    assert [one[0] for one in told["lines"]] == list(range(1405 - LOG_BATCH, 1405))
     logs = KeptLogs()
     looks = looking(logs)
     logs.take(batch(*asks(1, 1)))
@@ -87,7 +88,7 @@ def test_large_messages_make_a_batch_short_and_are_cut(desk):
     (told,) = desk.logs.batches()
     sizes = [len(one[2]) for one in told["lines"]]
     assert set(sizes) == {CUT}
-    assert sum(sizes) < BATCH_BYTES + CUT
+    assert sum(sizes) < LOG_BYTES + CUT
 
 
 def test_who_listens_in_this_process_has_each_exchange():

@@ -6,8 +6,9 @@ from helpers.console.served_console import places, scene
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dva_sim.console.web.feed import OWN_KEPT, PageFeed
-from dva_sim.console.web.state import STORY_KEPT, RunState
+from dva_sim.console.web.feed import PageFeed
+from dva_sim.console.web.state import RunState
+from dva_sim.console.wire.limits import OWN_KEPT, STORY_KEPT
 
 
 def told(*lines):

@@ -7,9 +7,10 @@ from helpers.console.simulated_phone import CALIBRATION as CALIBRATE
 
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.actions import Bucket, asked_of, check_role, id_of, read
-from dva_sim.console.web.outbox import MOST, MOST_BATCHES, OutgoingLines
+from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.limits import MOST_ACTIONS, MOST_BATCHES
 from dva_sim.serving.pipes import Lines
 
 LABELS = {"robot-1": 0, "robot-2": 3}
@@ -92,7 +93,7 @@ def test_input_and_samples_of_a_page_that_is_gone_are_forgotten(what):
 
 def test_actions_that_find_no_room_are_refused_but_an_emergency_still_does():
     lines = OutgoingLines()
-    assert all(lines.put({"do": "link", "client": "c1", "n": n}) for n in range(MOST))
+    assert all(lines.put({"do": "link", "client": "c1", "n": n}) for n in range(MOST_ACTIONS))
     assert not lines.put({"do": "link", "client": "c1"})
     assert lines.put({"do": "emergency", "client": "c1"})
     assert lines.refused == 1

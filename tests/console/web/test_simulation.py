@@ -11,8 +11,9 @@ from starlette.responses import Response
 
 from dva_sim.console.web.access import Role
 from dva_sim.console.web.hub import Hub
-from dva_sim.console.web.simulation import MOST_PENDING, SILENCE, Simulation
+from dva_sim.console.web.simulation import Simulation
 from dva_sim.console.wire import actions as declared
+from dva_sim.console.wire.limits import MOST_PENDING, SILENCE
 
 
 class Clock:

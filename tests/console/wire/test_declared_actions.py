@@ -13,9 +13,10 @@ from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
 from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.wire import generated
-from dva_sim.console.wire.actions import ACTIONS, LONG, PATIENCE, Action, ActionPlace, Audit
+from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
 from dva_sim.console.wire.kinds import BadMessage, Kind, hints_of
+from dva_sim.console.wire.limits import LONG, PATIENCE
 from dva_sim.network import realtime
 from dva_sim.recordings.audit_log import read_rows
 
