@@ -18,11 +18,11 @@ from typing import Final
 
 from dva_sim.protocol import limits
 from dva_sim.protocol import messages as m
+from dva_sim.protocol.elements import DECLARATION, write
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.limits import bounds, choices
 from dva_sim.protocol.messages import BAD_MESSAGE, Message
 from dva_sim.protocol.schema import MAX_BYTES, read_validated
-from dva_sim.protocol.xml_writer import DECLARATION, write
 
 MAX_UINT32: Final = bounds("Natural")[1]
 MAX_SESSION: Final = bounds("SessionID")[1]

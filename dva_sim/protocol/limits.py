@@ -5,6 +5,7 @@ Writer, reader and checker all derive from it what they refuse.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -85,11 +86,37 @@ def bounds(name: str) -> tuple[float, float]:
     return kind(low), kind(high[0]) if high else WHOLE[known["base"][0]]
 
 
-def most(holder: str, child: str) -> int:
-    """How often `child` may stand in an element, or in a type, called `holder`."""
-    for node in tree().iter(f"{_XS}element", f"{_XS}complexType"):
-        if node.get("name") == holder:
-            for element in node.iter(f"{_XS}element"):
-                if element is not node and element.get("name") == child:
-                    return int(element.get("maxOccurs", "1"))
-    raise KeyError(f"{holder} holds no {child}")
+def children(element: etree._Element) -> list[etree._Element]:
+    """The elements that an element may hold, in their order; those of a choice one by one."""
+    return list(_below(element))
+
+
+def parts(name: str) -> list[etree._Element]:
+    """The elements of a named type or group; see `children`."""
+    return list(_below(_named()[name]))
+
+
+def _below(node: etree._Element) -> Iterator[etree._Element]:
+    known = node.get("type") or node.get("ref")
+    for child in node if known is None else [_named()[known]]:
+        if child.tag == f"{_XS}element":
+            yield child
+        elif isinstance(child.tag, str):
+            yield from _below(child)
+
+
+@cache
+def _named() -> dict[str, etree._Element]:
+    """Types that hold elements, and groups."""
+    found = tree().getroot().iterchildren(f"{_XS}complexType", f"{_XS}group")
+    return {str(node.get("name")): node for node in found}
+
+
+def is_simple(element: etree._Element) -> bool:
+    """Whether an element holds a value and no elements."""
+    return element.get("type") in _restrictions()
+
+
+def occurs(element: etree._Element) -> tuple[int, int]:
+    """How often an element may stand at its place: at least and at most."""
+    return int(element.get("minOccurs", "1")), int(element.get("maxOccurs", "1"))

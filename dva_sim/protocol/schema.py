@@ -13,10 +13,9 @@ from typing import Final
 from lxml import etree
 
 from dva_sim.protocol import limits
+from dva_sim.protocol.elements import DECLARATION, read
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.messages import BAD_MESSAGE, Message
-from dva_sim.protocol.xml_reader import read
-from dva_sim.protocol.xml_writer import DECLARATION
 
 MAX_BYTES: Final = 8192
 

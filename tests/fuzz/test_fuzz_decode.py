@@ -57,7 +57,7 @@ def test_bytes_that_take_new_branches_are_kept_in_the_folder_given(tmp_path):
     [
         ("codec.py", '_real("[0-9]{1,2}")', '_real("[0-9]{1,3}")'),
         ("schema.py", 'len(found) != rest.count(b"<")', "False"),
-        ("xml_reader.py", "_float(speed), _float(turn_rate)", "_float(turn_rate), _float(speed)"),
+        ("elements.py", "destination, number, source,", "source, number, destination,"),
     ],
     ids=["bound", "markup", "fields"],
 )
@@ -71,5 +71,5 @@ def test_the_search_finds_a_fault_put_into_the_decoder(tmp_path, file, right, wr
     path.write_text(path.read_text().replace(right, wrong))
     done = search(broken, tmp_path, "-runs=200000", "-seed=1")
     assert done.returncode != 0
-    assert "AssertionError" in done.stdout + done.stderr
+    assert "Uncaught Python exception" in done.stdout + done.stderr
     assert list(tmp_path.glob("crash-*"))

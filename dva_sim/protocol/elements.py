@@ -1,0 +1,256 @@
+"""Messages as elements: written and read as `protocol/dva.xsd` declares them.
+
+The fields of a class are the children of its element, in their order. Every value passes a check
+made from its type in the schema, so that what leaves here is valid by construction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from inspect import Parameter, signature
+from operator import attrgetter
+from typing import Any, Final, NamedTuple, get_args, get_type_hints
+
+from lxml import etree
+
+from dva_sim.protocol import limits
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.xml_values import Write, bad, writer
+
+DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8" standalone="yes"?>'
+
+_Element = etree._Element
+_Read = Callable[[_Element], Any]
+
+
+class _Field(NamedTuple):
+    name: str
+    read: _Read
+    is_list: bool
+
+
+class _Value(NamedTuple):
+    write: Write
+    read: _Read
+
+
+class Form:
+    """How messages of a class are written and read.
+
+    Args:
+        kind: Class of the messages.
+        declared: Children of its element, as the schema declares them.
+        around: Names of the elements around these, from the outermost in.
+    """
+
+    def __init__(self, kind: type, declared: list[_Element], *around: str) -> None:
+        self._kind = kind
+        self._fields: dict[str, _Field] = {}
+        self._absent: dict[str, Any] = {}
+        self._leaves: list[tuple[str, Write]] = []  # paths of attributes, and how each is written
+        self._text = ""
+        given = signature(kind).parameters
+        for (name, hint), node in zip(get_type_hints(kind).items(), declared, strict=True):
+            tag, (least, most) = node.get("name", ""), limits.occurs(node)
+            inner = _value_of(node, _inner(hint))
+            if most > 1:
+                self._add("%s", [(name, _several(tag, inner.write, least, most))])
+                self._absent[name] = ()
+            elif not least:
+                usual = given[name].default
+                self._absent[name] = None if usual is Parameter.empty else usual
+                self._add("%s", [(name, _optional(tag, inner.write, self._absent[name]))])
+            elif isinstance(inner, Form):
+                self._add(f"<{tag}>{inner._text}</{tag}>", inner._below(name))
+            else:
+                self._add(f"<{tag}>%s</{tag}>", [(name, inner.write)])
+            self._fields[tag] = _Field(name, inner.read, most > 1)
+        for tag in reversed(around):
+            self._text = f"<{tag}>{self._text}</{tag}>"
+        self._writers = [write for _, write in self._leaves]
+        self._values = _values_of([path for path, _ in self._leaves])
+
+    def _add(self, text: str, leaves: list[tuple[str, Write]]) -> None:
+        self._text += text
+        self._leaves += leaves
+
+    def _below(self, name: str) -> list[tuple[str, Write]]:
+        """Return the leaves as seen from a message of which this is an attribute."""
+        return [(f"{name}.{path}", write) for path, write in self._leaves]
+
+    def write(self, said: Any) -> str:
+        """Return a message as the elements around its fields, and these.
+
+        Raises:
+            ProtocolError: a value that the schema cannot hold.
+        """
+        values = zip(self._writers, self._values(said), strict=True)
+        return self._text % tuple([write(value) for write, value in values])
+
+    def read(self, element: _Element) -> Any:
+        """Return the message of a validated element."""
+        found = dict(self._absent)
+        for child in element:
+            name, read, is_list = self._fields[child.tag]
+            value = read(child)
+            found[name] = (*found.get(name, ()), value) if is_list else value
+        return self._kind(**found)
+
+
+def _values_of(names: list[str]) -> Callable[[Any], tuple[Any, ...]]:
+    """Return what takes the values of these attributes from a message."""
+    if len(names) > 1:
+        return attrgetter(*names)
+    return lambda said: tuple([attrgetter(name)(said) for name in names])
+
+
+def _inner(hint: Any) -> Any:
+    """Return the type of a value that may be absent, or be there several times."""
+    inner = [each for each in get_args(hint) if each not in (type(None), Ellipsis)]
+    return inner[0] if inner else hint
+
+
+def _value_of(node: _Element, kind: Any) -> Form | _Value:
+    """Return how the inside of an element is written and read."""
+    if not limits.is_simple(node):
+        return Form(kind, limits.children(node))
+    write = writer(node.get("name", ""), node.get("type", ""))
+    return _Value(write, _str if kind is str else lambda element: kind(element.text or ""))
+
+
+def _str(element: _Element) -> str:
+    return element.text or ""
+
+
+def _optional(tag: str, write: Write, absent: Any) -> Write:
+    # The usual value is left out, so that a receiver of an earlier version understands the rest.
+    def write_other(value: Any) -> str:
+        return "" if value == absent else f"<{tag}>{write(value)}</{tag}>"
+
+    return write_other
+
+
+def _several(tag: str, write: Write, least: int, most: int) -> Write:
+    def write_all(values: tuple[Any, ...]) -> str:
+        if not least <= len(values) <= most:
+            raise bad(f"{tag} must be there {least} to {most} times, not {len(values)}")
+        return "".join([f"<{tag}>{write(value)}</{tag}>" for value in values])
+
+    return write_all
+
+
+# --- whole messages ----------------------------------------------------------------------
+
+_CLASSES: Final = {kind.__name__: kind for kind in (*get_args(m.Body), *get_args(m.Content))}
+
+
+def _form(node: _Element, *around: str) -> Form:
+    """Return the form of an element that is called like its class."""
+    name = node.get("name", "")
+    return Form(_CLASSES[name], limits.children(node), *around, name)
+
+
+def _bodies() -> Iterator[tuple[str, Form]]:
+    """Yield all that a simple message may carry but replies, by name."""
+    for payload in limits.parts("SimpleMsg"):
+        name = payload.get("name", "")
+        if name in _CLASSES:
+            yield name, _form(payload)
+        elif name != "reply" and not limits.is_simple(payload):
+            yield from (
+                (each.get("name", ""), _form(each, name)) for each in limits.children(payload)
+            )
+
+
+def _writers(nodes: list[_Element]) -> list[Write]:
+    return [writer(node.get("name", ""), node.get("type", "")) for node in nodes]
+
+
+_BODIES: Final = dict(_bodies())
+_CONTENTS: Final = {node.get("name", ""): _form(node) for node in limits.parts("Reply")[3:]}
+_REGISTRATION: Final = Form(m.Registration, limits.parts("Description"))
+_DESTINATION, _NUMBER, _SOURCE, _CLOCK = _writers(limits.parts("Header"))
+_SESSION: Final = writer("SessionID", "SessionID")
+_ANSWERS, _CODE, _TEXT = _writers(limits.parts("Reply")[:3])
+_WRITERS: Final[dict[type, tuple[str, Write]]] = {
+    **{_CLASSES[name]: ("SimpleMsg", form.write) for name, form in _BODIES.items()},
+    m.Reply: ("SimpleMsg", lambda body: _write_reply(body)),
+    m.Registration: ("RegMsg", _REGISTRATION.write),
+    m.Heartbeat: ("HBMsg", lambda body: ""),
+    m.Emergency: ("EmergencyMsg", lambda body: ""),
+}
+
+
+def _write_reply(body: m.Reply) -> str:
+    said = body.content
+    content = "" if said is None else _CONTENTS[type(said).__name__].write(said)
+    return (
+        f"<reply><Answers>{_ANSWERS(body.answers)}</Answers><Code>{_CODE(body.code)}</Code>"
+        f"<Text>{_TEXT(body.text)}</Text>{content}</reply>"
+    )
+
+
+def _write_session(message: m.Message) -> str:
+    if type(message.body) is m.Heartbeat:
+        if message.session is not None:
+            raise bad("a heartbeat carries no session")
+        return ""
+    if message.session is None:
+        raise bad("only a heartbeat carries no session; before one is granted it is 0")
+    return f"<SessionID>{_SESSION(message.session)}</SessionID>"
+
+
+def write(message: m.Message) -> str:
+    """Return the message as XML.
+
+    Raises:
+        ProtocolError: a value that the schema cannot hold.
+    """
+    try:
+        kind, write_body = _WRITERS[type(message.body)]
+        return (
+            f"{DECLARATION}<msg><{kind}>"
+            f"<DestinationID>{_DESTINATION(message.destination)}</DestinationID>"
+            f"<MessageID>{_NUMBER(message.message_id)}</MessageID>"
+            f"<SourceID>{_SOURCE(message.source)}</SourceID>"
+            f"<Timestamp>{_CLOCK(message.timestamp)}</Timestamp>"
+            f"{_write_session(message)}{write_body(message.body)}</{kind}></msg>"
+        )
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise bad(f"a value of the wrong type: {error}") from error
+
+
+def _read_reply(element: _Element) -> m.Reply:
+    answers, code, text, *content = element
+    return m.Reply(
+        int(_str(answers)),
+        int(_str(code)),
+        _str(text),
+        _CONTENTS[content[0].tag].read(content[0]) if content else None,
+    )
+
+
+def _read_simple(payload: _Element) -> m.Body:
+    if payload.tag == "reply":
+        return _read_reply(payload)
+    said = payload if payload.tag in _BODIES else payload[0]
+    body: m.Body = _BODIES[said.tag].read(said)
+    return body
+
+
+def read(root: _Element) -> m.Message:
+    """Return the message in a validated tree: names, order, form and number were checked."""
+    kind = root[0]
+    destination, number, source, clock, *rest = kind
+    body: m.Body
+    match kind.tag:
+        case "SimpleMsg":
+            body = _read_simple(rest[1])
+        case "RegMsg":
+            body = m.Registration(*map(_str, rest[1:]))
+        case "HBMsg":
+            body = m.Heartbeat()
+        case _:
+            body = m.Emergency()
+    session = int(_str(rest[0])) if rest else None
+    return m.Message(_str(destination), int(_str(number)), _str(source), _str(clock), session, body)
