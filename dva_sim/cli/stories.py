@@ -30,7 +30,7 @@ from dva_sim.kernel.measure import Measure
 from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
-from dva_sim.simulation.full.measures import RUN_COLUMNS
+from dva_sim.simulation.full.episode_measures import RUN_COLUMNS
 from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.task import TaskScenario

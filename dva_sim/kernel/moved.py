@@ -23,7 +23,7 @@ MOVED = {
     "experiments.dispatch": "simulation.timed",
     "experiments.fan_out": "experiments.analysis.fan_out",
     "experiments.figures": "experiments.report.figures",
-    "experiments.metrics": "simulation.full.measures",
+    "experiments.metrics": "simulation.full.episode_measures",
     "experiments.pictures": "recordings.pictures",
     "experiments.runner": "experiments.execution.runner",
     "experiments.statistics": "statistics",

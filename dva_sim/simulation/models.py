@@ -23,17 +23,17 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document
 from dva_sim.simulation import full, task, timed, transports
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import measures as of_full
+from dva_sim.simulation.full import episode_measures as of_full
 from dva_sim.simulation.full import workload
 from dva_sim.simulation.full.drive_tables import COMMAND_COLUMNS, DRIVE_COLUMNS
 from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
 from dva_sim.simulation.task import TaskScenario
-from dva_sim.simulation.task import measures as of_task
+from dva_sim.simulation.task import trial_measures as of_task
 from dva_sim.simulation.timed import TimedScenario
-from dva_sim.simulation.timed import measures as of_timed
+from dva_sim.simulation.timed import shift_measures as of_timed
 from dva_sim.simulation.transports import TransportScenario
-from dva_sim.simulation.transports import measures as of_transports
+from dva_sim.simulation.transports import session_measures as of_transports
 
 Tables = dict[str, list[dict[str, Any]]]
 

@@ -18,7 +18,6 @@ MODULES = {
     ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__"): path
     for path in sorted(PACKAGE.rglob("*.py"))
 }
-MOST_LINES = 600
 
 # One meaning for each public class, but for these.
 SHARED_NAMES = {
@@ -122,13 +121,6 @@ def test_the_web_process_serves_without_what_simulates():
 
 
 SIMULATES = tuple(f"dva_sim.{room}." for room in ("agents", "core", "network", "simulation"))
-
-
-def test_no_module_is_longer_than_600_lines():
-    long = {
-        name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in MODULES.items()
-    }
-    assert {name: lines for name, lines in long.items() if lines > MOST_LINES} == {}
 
 
 def test_a_public_class_name_means_one_thing():

@@ -18,7 +18,7 @@ from dva_sim.experiments.report.figures.palette import HAZARD, look_of
 from dva_sim.experiments.report.figures.style import styled
 from dva_sim.experiments.report.figures.time_lapse import TypicalRun, WorstRun, kind_of
 from dva_sim.recordings.writing import write_recording
-from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.full.episode_measures import tables_of
 
 pytestmark = pytest.mark.system
 

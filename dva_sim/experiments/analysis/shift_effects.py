@@ -15,7 +15,7 @@ from dva_sim.experiments.analysis.run_grid import Table, codes_of, nan_mean, per
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.simulation.labels import setting
 from dva_sim.simulation.timed.bounds import Floats, share_of_the_way
-from dva_sim.simulation.timed.measures import FOLLOW_S
+from dva_sim.simulation.timed.shift_measures import FOLLOW_S
 from dva_sim.statistics import LEVEL, Band, band
 
 POLICY, INTENSITY = "dispatch.policy", "intensity"

@@ -27,7 +27,7 @@ from dva_sim.experiments.study.cell_grid import runs_in
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.simulation.full.drive_tables import drive_tables
 from dva_sim.simulation.full.dva_trace import OWN_CODE
-from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.full.episode_measures import tables_of
 from dva_sim.simulation.full.run_journal import JournalLine, recording_of
 from dva_sim.simulation.models import Tables
 from dva_sim.simulation.scenario import Scenario

@@ -22,11 +22,11 @@ from dva_sim.network.transports import Contest, ContestConfig, Fates, play
 from dva_sim.simulation import task
 from dva_sim.simulation.scenario.parts import OperatorConfig
 from dva_sim.simulation.task import TaskScenario
-from dva_sim.simulation.task.measures import DRIVEN_COLUMNS
 from dva_sim.simulation.task.recorded_delays import FrameStream, RecordedDelays
 from dva_sim.simulation.task.scenario import PlantConfig
 from dva_sim.simulation.task.tasks import Corner, Course, Slalom
-from dva_sim.simulation.transports.measures import Row, contest_row, flow_rows
+from dva_sim.simulation.task.trial_measures import DRIVEN_COLUMNS
+from dva_sim.simulation.transports.session_measures import Row, contest_row, flow_rows
 
 
 class DriveConfig(Config):

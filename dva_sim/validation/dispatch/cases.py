@@ -22,8 +22,8 @@ from dva_sim.kernel.yaml_files import Document, load_yaml
 from dva_sim.simulation.timed import distributions
 from dva_sim.simulation.timed import scenario as timed
 from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.validation.dispatch.batch_measures import check_name
 from dva_sim.validation.dispatch.exact import FORMULAS
-from dva_sim.validation.dispatch.measures import check_name
 from dva_sim.validation.dispatch.queues import Measures
 
 A = TypeVar("A")

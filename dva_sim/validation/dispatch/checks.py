@@ -14,6 +14,14 @@ from dva_sim.kernel.streams import derive_seed
 from dva_sim.simulation.models import Tables
 from dva_sim.simulation.timed import simulate_timed
 from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.validation.dispatch.batch_measures import (
+    Batches,
+    Floats,
+    Sample,
+    occupied,
+    sample_of,
+    sums,
+)
 from dva_sim.validation.dispatch.cases import Case
 from dva_sim.validation.dispatch.estimation import (
     PRECISION,
@@ -26,7 +34,6 @@ from dva_sim.validation.dispatch.estimation import (
     verdict,
 )
 from dva_sim.validation.dispatch.identities import IDENTITIES, check_identity
-from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, occupied, sample_of, sums
 from dva_sim.validation.frame import Key, Progress, Row, job_of, play_jobs
 
 Columns = dict[str, Floats]

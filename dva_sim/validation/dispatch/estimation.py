@@ -42,8 +42,8 @@ from numpy.typing import NDArray
 
 from dva_sim.simulation.timed.distributions import Exponential, Law
 from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.validation.dispatch.batch_measures import Batches, Floats, Sample, one_server
 from dva_sim.validation.dispatch.exact import cobham
-from dva_sim.validation.dispatch.measures import Batches, Floats, Sample, one_server
 from dva_sim.validation.dispatch.queues import LawMoments, gm1
 from dva_sim.validation.dispatch.transforms import laplace
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dva_sim.core.dispatch import Assignment, Responder, Situation, Task, load_policy
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.simulation.timed import TimedRecording, build, simulate_timed
-from dva_sim.validation.dispatch.measures import Floats, Ints, many_servers, sample_of
+from dva_sim.validation.dispatch.batch_measures import Floats, Ints, many_servers, sample_of
 
 POLICIES = (
     "nearest_idle",

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full.measures import measures_of, run_row
+from dva_sim.simulation.full.episode_measures import measures_of, run_row
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.workload import operator_rows
 

@@ -7,7 +7,7 @@ import pytest
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.simulation.full.drive_tables import drive_tables
-from dva_sim.simulation.full.measures import tables_of
+from dva_sim.simulation.full.episode_measures import tables_of
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.run_journal import RunJournal, recording_of
 from dva_sim.simulation.scenario import build, load

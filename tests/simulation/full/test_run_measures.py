@@ -8,7 +8,7 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.simulation import scenario as scenarios
-from dva_sim.simulation.full import Recording, measures, simulate
+from dva_sim.simulation.full import Recording, episode_measures, simulate
 
 
 def run(seed: int = 2, **parts: Any) -> Recording:
@@ -18,7 +18,7 @@ def run(seed: int = 2, **parts: Any) -> Recording:
 
 def test_request_to_reply_is_service_and_link_and_its_longest_is_the_longest():
     recording = run(pattern="req-rep", robot={"processing_s": 0.4}, link={"delay_s": 0.1})
-    row, drive = measures.run_row(recording), recording.recorder.drives[0]
+    row, drive = episode_measures.run_row(recording), recording.recorder.drives[0]
     assert row["round_trip_p50_s"] == pytest.approx(0.2 + 0.4, abs=0.01)
     assert row["round_trip_max_s"] == max(drive.round_trips)
     assert row["round_trip_p95_s"] == pytest.approx(np.percentile(drive.round_trips, 95))
@@ -27,22 +27,22 @@ def test_request_to_reply_is_service_and_link_and_its_longest_is_the_longest():
 def test_request_to_reply_is_known_of_a_drive_that_the_horizon_cuts_off():
     recording = run(pattern="req-rep", horizon_s=20)
     assert recording.recorder.drives[0].ended is None
-    assert measures.run_row(recording)["round_trip_max_s"] == pytest.approx(0.05, abs=0.02)
+    assert episode_measures.run_row(recording)["round_trip_max_s"] == pytest.approx(0.05, abs=0.02)
 
 
 def test_what_is_published_has_no_reply():
-    assert math.isnan(measures.run_row(run())["round_trip_max_s"])
+    assert math.isnan(episode_measures.run_row(run())["round_trip_max_s"])
 
 
 @pytest.mark.parametrize(("longest_s", "samples"), [(0.5, 17.0), (0.6, 20.0)])
 def test_the_dissertations_phone_has_17_samples_in_half_a_second_and_20_at_most(longest_s, samples):
     phone = {"profile": "dissertation", "max_delay_s": longest_s}
-    row = measures.run_row(run(phone=phone))
+    row = episode_measures.run_row(run(phone=phone))
     assert row["samples_per_value"] == pytest.approx(samples, abs=0.5)
 
 
 def test_a_filter_without_batches_has_no_samples_per_value():
-    assert math.isnan(measures.run_row(run())["samples_per_value"])
+    assert math.isnan(episode_measures.run_row(run())["samples_per_value"])
 
 
 def test_what_is_never_reached_counts_the_whole_horizon():
@@ -53,7 +53,7 @@ def test_what_is_never_reached_counts_the_whole_horizon():
             ]
         }
     )
-    row = measures.run_row(recording)
+    row = episode_measures.run_row(recording)
     assert row["response_mean_s"] == row["confirmation_mean_s"] == 200.0
     assert row["settled_per_min"] == 0.0
 
@@ -62,7 +62,7 @@ def test_a_false_alarm_is_responded_to_and_settled_but_not_confirmed():
     room = {"room": "Chemistry lab", "reported": True}
     events = [{"kind": "fire", **room, "false_alarm": True}]
     recording = run(events=events, guard={"count": 1}, robot={"count": 0}, operator={"count": 0})
-    row, event = measures.run_row(recording), measures.event_rows(recording)[0]
+    row, event = episode_measures.run_row(recording), episode_measures.event_rows(recording)[0]
     assert row["response_mean_s"] == event["response_s"] < 200.0
     assert math.isnan(row["confirmation_mean_s"])
     assert not event["is_true"]
@@ -80,7 +80,7 @@ def test_a_policy_that_raises_is_counted_and_told(tmp_path):
     )
     policy = {"dispatch.policy": f"{tmp_path / 'mine.py'}:Mine"}
     recording = simulate(scenarios.build(scenarios.load("fire-drill"), policy), 3)
-    assert measures.run_row(recording)["plugin_failures"] > 0
+    assert episode_measures.run_row(recording)["plugin_failures"] > 0
     told = [line.what for line in recording.recorder.timeline if "policy failed" in line.what]
     assert len(told) == 1
     assert not unnamed(told[0], "min_eta", "RuntimeError: no idea")

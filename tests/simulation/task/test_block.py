@@ -7,8 +7,8 @@ import pytest
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task import block, build, play, trace_of
 from dva_sim.simulation.task.block import seat_of
-from dva_sim.simulation.task.measures import run_row
 from dva_sim.simulation.task.movement_laws import fit_line
+from dva_sim.simulation.task.trial_measures import run_row
 from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
 EXACT = {

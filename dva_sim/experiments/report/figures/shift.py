@@ -19,7 +19,8 @@ from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
-from dva_sim.simulation.timed import measures
+from dva_sim.simulation.timed.shift_measures import FATES as ENDS
+from dva_sim.simulation.timed.shift_measures import FEWEST_IN_ZONE, fates
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -171,7 +172,7 @@ class FatesOfEvents(ShiftFigure):
             for policy, ax in zip(chosen, row, strict=True):
                 events = dict(shifts.events_of(policy, stop))
                 if len(events["event_id"]):
-                    shares = shares_of(measures.fates(events), measures.FATES, "open", times)
+                    shares = shares_of(fates(events), ENDS, "open", times)
                     stack_in_time(ax, {fate: shares[fate] for fate in _FATES}, times, FILLS)
                     where = {"at": shifts.titles[stop], "dispatch.policy": policy}
                     numbers.add(where, {"t_s": times} | shares)
@@ -305,7 +306,7 @@ class Burden(ShiftFigure):
             _policy_axis(ax, names, text)
             if column.startswith("use"):
                 ax.set_xlim(0, 1.02)
-        fewest = measures.FEWEST_IN_ZONE
+        fewest = FEWEST_IN_ZONE
         words = caption("burden", loads=shifts.titles, fewest=fewest)
         return self.finish(figure, words, numbers)
 

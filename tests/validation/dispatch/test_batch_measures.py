@@ -8,8 +8,7 @@ import pytest
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.timed import build, simulate_timed
-from dva_sim.validation.dispatch.estimation import controls, inputs
-from dva_sim.validation.dispatch.measures import (
+from dva_sim.validation.dispatch.batch_measures import (
     Batches,
     Sample,
     check_name,
@@ -19,6 +18,7 @@ from dva_sim.validation.dispatch.measures import (
     sample_of,
     sums,
 )
+from dva_sim.validation.dispatch.estimation import controls, inputs
 
 NAN = math.nan
 

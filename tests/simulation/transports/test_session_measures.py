@@ -7,7 +7,7 @@ import pytest
 
 from dva_sim.kernel.config import validate
 from dva_sim.network.transports import Contest, ContestConfig, Fates
-from dva_sim.simulation.transports.measures import (
+from dva_sim.simulation.transports.session_measures import (
     age_in_force,
     applied,
     contest_row,

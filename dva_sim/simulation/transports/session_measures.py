@@ -31,7 +31,7 @@ from dva_sim.kernel.measure import Measure, text
 from dva_sim.network.link import Direction
 from dva_sim.network.transports import Contest, ContestConfig, Fates
 from dva_sim.network.transports.competition import WAYS
-from dva_sim.simulation.task.measures import DRIVEN_COLUMNS
+from dva_sim.simulation.task.trial_measures import DRIVEN_COLUMNS
 
 Row = dict[str, Any]
 Floats = NDArray[np.float64]
