@@ -52,7 +52,7 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
     Raises:
         EmulatorError: there is none here: why, and what there is instead.
     """
-    from dva_sim.validation.network.emulator import cell, self_check  # late: start-up
+    from dva_sim.validation.network.real_side import cell, self_check  # late: start-up
 
     if names or options:
         raise ConfigError("check link: there is one link, without names and options")

@@ -26,9 +26,9 @@ from dva_sim.validation.dispatch import result_page as dispatch_page
 from dva_sim.validation.frame import ResultSheet, ValidationResult
 from dva_sim.validation.network import comparison, reference
 from dva_sim.validation.network import result_page as network_page
-from dva_sim.validation.network.emulator import measuring
-from dva_sim.validation.network.emulator.cell import PACKETS, PROXY, why_no_packets
-from dva_sim.validation.network.emulator.measuring import Progress
+from dva_sim.validation.network.real_side import measuring
+from dva_sim.validation.network.real_side.cell import PACKETS, PROXY, why_no_packets
+from dva_sim.validation.network.real_side.measuring import Progress
 from dva_sim.validation.network.verdicts import ConditionGroup, grouped
 from dva_sim.validation.operators import experiments as operators
 from dva_sim.validation.operators import result_page as operators_page

@@ -21,7 +21,10 @@ from numpy.typing import NDArray
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
+from dva_sim.network.link import LinkConfig
+from dva_sim.network.link.losses import Bursts
 
+UNLIMITED_BPS = 1e12
 COMMAND_BYTES = 400
 REPLY_BYTES = 200
 STALE_STEP_S = 0.005  # the command in force is looked at this often
@@ -147,6 +150,19 @@ class Condition:
         """Eight digits that differ when anything that is set differs."""
         text = ";".join(f"{name}={value}" for name, value in self.to_row().items())
         return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+    def link(self, late_s: float = 0.0) -> LinkConfig:
+        """The link of the condition, alike in both directions, with some delay added [s]."""
+        bursts = self.burst_pkts
+        return LinkConfig(
+            delay_s=self.delay_ms / 1000.0 + late_s,
+            jitter_s=self.delay_ms * self.jitter_frac / 1000.0,
+            loss=self.loss,
+            bursts=None if bursts is None else Bursts(mean_packets=bursts),
+            rate_bps=min(1000.0 * self.rate_kbit, UNLIMITED_BPS),
+            queue_packets=self.queue_pkts,
+            reorder=self.reorder,
+        )
 
     def to_row(self) -> dict[str, str]:
         """The columns of the condition as a table holds them."""

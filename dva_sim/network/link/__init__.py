@@ -5,6 +5,7 @@ from dva_sim.network.link.link import (
     Link,
     PartedLink,
     check_partitions,
+    make_link,
     make_serialiser,
     part_links,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "Way",
     "Weather",
     "check_partitions",
+    "make_link",
     "make_serialiser",
     "part_links",
     "read_delay_log",

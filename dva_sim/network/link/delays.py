@@ -17,7 +17,12 @@ from pydantic import BeforeValidator, Field, model_validator
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link.recorded import read_delays
-from dva_sim.network.link.time_noise import SlowWeather, UniformNumbers, Weather, normal_quantile
+from dva_sim.network.link.time_noise import (
+    MakeNumbers,
+    SlowWeather,
+    UniformNumbers,
+    normal_quantile,
+)
 
 Quantile = Callable[[float], float]
 Seconds = Annotated[float, Field(ge=0, le=30)]
@@ -46,7 +51,7 @@ class ConstantDelay(Config):
         """See `_Law`."""
         return delay, 0.0
 
-    def play(self, delay: float, streams: Streams, name: str) -> None:
+    def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> None:
         """See `_Law`: there is no deviation."""
 
 
@@ -77,12 +82,19 @@ class _Law(Config):
     def quantile(self, delay: float) -> Quantile:
         """Deviations from `delay_s` [s] by probability."""
 
-    def play(self, delay: float, streams: Streams, name: str) -> Wobble:
-        """Deviations from `delay_s` [s], with luck of that name."""
-        luck: UniformNumbers = Weather(streams, name)
+    def play(self, delay: float, streams: Streams, name: str, make: MakeNumbers) -> Wobble:
+        """Deviations from `delay_s` [s], with luck of that name.
+
+        Args:
+            delay: The link's `delay_s` [s].
+            streams: The run's random streams.
+            name: Name of this source.
+            make: Makes the numbers of packets that are independent of one another.
+        """
         if self.correlation_s:
-            luck = SlowWeather(streams, name, self.correlation_s)
-        return by_quantile(self.quantile(delay), luck)
+            slow = SlowWeather(streams, name, self.correlation_s)
+            return by_quantile(self.quantile(delay), slow)
+        return by_quantile(self.quantile(delay), make(streams, name))
 
 
 class Normal(_Law):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from fnmatch import fnmatchcase
+from functools import partial
 from typing import Any, Protocol
 
 from dva_sim.kernel.errors import ConfigError
@@ -22,7 +23,7 @@ from dva_sim.network.link.outages import Gap, Partition, gaps_of
 from dva_sim.network.link.rates import ConstantRate, PacketQueue, Serialiser, TraceRate
 from dva_sim.network.link.recorded import read_delay_log, read_trace
 from dva_sim.network.link.replay import Replay, period_of
-from dva_sim.network.link.time_noise import Weather
+from dva_sim.network.link.time_noise import MakeNumbers, PacketNumbers, Weather
 
 SMALLEST_PACKET = 40  # IPv4 and TCP headers alone [B]
 
@@ -36,8 +37,15 @@ class Link:
         streams: The run's luck.
         name: Name of this direction, for its luck; `x/up` and `x/down` are one link's.
         direction: Which it is; `up` is towards the robot.
+        by_packet: Loss and jitter depend on the number of a packet, not on the time: for real
+            packets, which never leave at the same moment twice.
 
     Attributes:
+        offered: Packets so far.
+        lost: Those lost by chance, or because there was no link then.
+        cut: Those of them that met an outage or a partition.
+        dropped: Those that found the queue full.
+        bytes: Those that entered the line [B].
         delay: Mean one-way delay without waiting [s].
         rate_bps: Of the line [bit/s]; None where it varies.
         room: Of the queue [B]; where packets are counted, what it holds of the smallest.
@@ -50,8 +58,13 @@ class Link:
         streams: Streams,
         name: str,
         direction: Direction = "up",
+        by_packet: bool = False,
     ) -> None:
         way = config.toward(direction)
+        self.offered = self.lost = self.cut = self.dropped = self.bytes = 0
+        self._make_numbers: MakeNumbers = Weather
+        if by_packet:
+            self._make_numbers = partial(PacketNumbers, number=lambda: self.offered)
         self.name, self.rate_bps, self.room = name, serialiser.rate_bps, way.queue_bytes
         self._line, self._streams, self._direction = serialiser, streams, direction
         if way.queue_packets is not None:
@@ -60,16 +73,17 @@ class Link:
         self._serialiser, self._offer = serialiser, serialiser.offer
         self._counts_packets, self._last_arrival = way.queue_packets is not None, 0.0
         self._take(way)
-        self.offered = self.lost = self.dropped = self.bytes = 0
 
     def _take(self, way: LinkConfig) -> None:
         """Be like this from now on, but for the queue."""
         replay = _make_replay(way, self._direction, self._streams, self.name)
         self.delay, self._base = way.moments()[0], way.delay_s
-        self._fates = _make_fates(way, self._streams, self.name, replay)
-        self._wobble = replay.deviation if replay else _make_wobble(way, self._streams, self.name)
+        drawing = self._streams, self.name, self._make_numbers
+        self._fates = _make_fates(way, replay, *drawing)
+        self._outage = gaps_of(way.outages) if way.outages else None
+        self._wobble = replay.deviation if replay else _make_wobble(way, *drawing)
         self._may_overtake = way.reorder
-        self._is_steady = not self._fates and self._wobble is None
+        self._is_steady = not self._fates and self._outage is None and self._wobble is None
         self._takes_trains = self._is_steady and not self._counts_packets
 
     def change(self, now: float, config: LinkConfig) -> None:
@@ -115,10 +129,16 @@ class Link:
             self.dropped += 1
             return None
         self.bytes += size
+        is_out = self._outage is not None and self._outage(now, left_at)
         for fate in self._fates:
             if fate(now, left_at):
                 self.lost += 1
+                self.cut += is_out
                 return None
+        if is_out:
+            self.lost += 1
+            self.cut += 1
+            return None
         arrival = left_at + self._base
         if self._wobble is None:
             return arrival
@@ -153,6 +173,10 @@ class Link:
         """Bytes that wait before the link at `now` [B]."""
         return self._serialiser.backlog_bytes(now)
 
+    def has_room(self, now: float, size: int) -> bool:
+        """Whether the queue takes a packet of so many bytes [B] at `now` [s]."""
+        return self._serialiser.has_room(now, size, self.room)
+
 
 def _no_deviation(now: float) -> float:
     """Of a constant delay, where the order of packets has to be looked at all the same."""
@@ -178,26 +202,24 @@ def make_serialiser(
 
 
 def _make_fates(
-    way: LinkConfig, streams: Streams, name: str, replay: Replay | None
+    way: LinkConfig, replay: Replay | None, streams: Streams, name: str, make: MakeNumbers
 ) -> tuple[Fate, ...]:
-    """All that may take a packet of one direction."""
+    """All chances that may take a packet of one direction."""
     fates: list[Fate] = [replay.takes] if replay else []
     if way.loss:
-        luck = Weather(streams, f"{name}/loss")
+        luck = make(streams, f"{name}/loss")
         bursts = way.bursts and way.bursts.play(way.loss, streams, f"{name}/bursts", luck)
         fates.append(bursts or chance(way.loss, luck))
-    if way.outages:
-        fates.append(gaps_of(way.outages))
     return tuple(fates)
 
 
-def _make_wobble(way: LinkConfig, streams: Streams, name: str) -> Wobble | None:
+def _make_wobble(way: LinkConfig, streams: Streams, name: str, make: MakeNumbers) -> Wobble | None:
     """What spreads the delay of one direction by chance, if anything does."""
     if way.jitter_s:
         width = way.jitter_s
-        return by_quantile(lambda u: width * (2.0 * u - 1.0), Weather(streams, f"{name}/jitter"))
+        return by_quantile(lambda u: width * (2.0 * u - 1.0), make(streams, f"{name}/jitter"))
     if way.law is not None:
-        return way.law.play(way.delay_s, streams, f"{name}/delay")
+        return way.law.play(way.delay_s, streams, f"{name}/delay", make)
     return None
 
 
@@ -244,6 +266,7 @@ class PartedLink(Link):
         if any(gap.covers(now) for gap in self._gaps):
             self._whole.offered += 1
             self._whole.lost += 1
+            self._whole.cut += 1
             return None
         return self._whole.carry(now, size)
 
@@ -256,6 +279,10 @@ class PartedLink(Link):
     def backlog_bytes(self, now: float) -> float:
         """See `Link`."""
         return self._whole.backlog_bytes(now)
+
+    def has_room(self, now: float, size: int) -> bool:
+        """See `Link`."""
+        return self._whole.has_room(now, size)
 
 
 def check_partitions(partitions: Sequence[Partition], names: Collection[str]) -> None:
@@ -404,6 +431,7 @@ def make_link(
     streams: Streams,
     name: str,
     reception: Callable[[], Reception | None] | None = None,
+    by_packet: bool = False,
 ) -> Link:
     """The `up` or `down` direction of a configured link.
 
@@ -413,11 +441,12 @@ def make_link(
         streams: The run's luck.
         name: Of the link, for its luck.
         reception: The quality of its radio hop now, if it has one.
+        by_packet: See `Link`; not for radio links.
 
     Raises:
         ConfigError: a file that it names cannot be read.
     """
     serialiser, own_name = make_serialiser(config, direction, streams, name), f"{name}/{direction}"
     if reception is None:
-        return Link(config, serialiser, streams, own_name, direction)
+        return Link(config, serialiser, streams, own_name, direction, by_packet)
     return RadioLink(config, serialiser, streams, own_name, direction, reception)

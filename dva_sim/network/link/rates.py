@@ -32,11 +32,13 @@ class Serialiser(ABC):
     def last_departure(self) -> float:
         """When the last byte that was taken has left, or will have [s]."""
 
+    def has_room(self, now: float, size: int, room: int) -> bool:
+        """Whether a queue with `room` for so many bytes [B] takes a packet at `now`."""
+        return self.backlog_bytes(now) + size <= room
+
     def offer(self, now: float, size: int, room: int) -> float | None:
-        """The same where there is `room` for so many bytes [B]; None if the packet is too many."""
-        if self.backlog_bytes(now) + size > room:
-            return None
-        return self.depart(now, size)
+        """Like `depart`, or None if the queue does not take the packet."""
+        return self.depart(now, size) if self.has_room(now, size, room) else None
 
 
 class ConstantRate(Serialiser):
@@ -168,11 +170,9 @@ class PacketQueue(Serialiser):
         self._leaving.append(left_at)
         return left_at
 
-    def offer(self, now: float, size: int, room: int) -> float | None:
+    def has_room(self, now: float, size: int, room: int) -> bool:
         """See `Serialiser`: packets are counted instead of bytes."""
         leaving = self._leaving
         while leaving and leaving[0] <= now:
             leaving.popleft()
-        if len(leaving) >= self._room:
-            return None
-        return self.depart(now, size)
+        return len(leaving) < self._room

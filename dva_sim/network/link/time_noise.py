@@ -6,7 +6,7 @@ Time only goes forward here: what was drawn for long ago is forgotten.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import accumulate
 from statistics import NormalDist
 from typing import Protocol
@@ -28,6 +28,10 @@ class UniformNumbers(Protocol):
 
     def draw(self, now: float) -> float:
         """A number in [0, 1) for a packet sent at `now` [s]."""
+
+
+MakeNumbers = Callable[[Streams, str], UniformNumbers]
+"""Makes the source of a name from the run's random streams."""
 
 
 class Weather:
@@ -58,6 +62,31 @@ class Weather:
             block = self._blocks[number] = luck.random(_BLOCK)
         first = float(block[inside])
         return _scrambled(first, self._count) if self._count else first
+
+
+class PacketNumbers:
+    """Uniform numbers by the number of the packet: the same ones, whenever it is sent.
+
+    Real packets never leave at the same moment twice, so a function of time would give each run
+    losses of its own.
+
+    Args:
+        streams: The run's random streams.
+        name: Name of this source.
+        number: Returns the number of the packet that is being sent.
+    """
+
+    def __init__(self, streams: Streams, name: str, number: Callable[[], int]) -> None:
+        self._streams, self._name, self._number = streams, name, number
+        self._place, self._block = -1, np.empty(0)
+
+    def draw(self, now: float) -> float:
+        """See `UniformNumbers`."""
+        place, inside = divmod(self._number(), _BLOCK)
+        if place != self._place:
+            self._place = place
+            self._block = self._streams.fresh(f"{self._name}/{place}").random(_BLOCK)
+        return float(self._block[inside])
 
 
 def _scrambled(seed: float, count: int) -> float:

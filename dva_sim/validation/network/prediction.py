@@ -18,9 +18,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.connections import AnyConnection, Connection, DatagramConnection, Load, is_calm
-from dva_sim.network.link import Link, LinkConfig
-from dva_sim.network.link.link import make_link
-from dva_sim.network.link.losses import Bursts
+from dva_sim.network.link import Link, make_link
 from dva_sim.network.pattern_runs import (
     COMMAND_BYTES,
     REPLY_BYTES,
@@ -206,7 +204,6 @@ Depth = Literal["auto", "message", "segment", "datagram"]
 Played = Literal["message", "segment", "datagram"]
 
 _PATIENCE_S = 120.0  # for a handshake; then nothing is ever sent
-_UNLIMITED_BPS = 1e12
 LATE_S = 0.0001
 """How late the emulated link lets a packet go, by its own account; half of them are later.
 
@@ -280,16 +277,7 @@ def options(without: Sequence[str]) -> dict[str, Any]:
 
 def make_links(condition: Condition, streams: Streams) -> tuple[Link, Link]:
     """The emulated link from the operator to the robot, and the one back."""
-    bursts = condition.burst_pkts
-    config = LinkConfig(
-        delay_s=condition.delay_ms / 1000.0 + LATE_S,
-        jitter_s=condition.delay_ms * condition.jitter_frac / 1000.0,
-        loss=condition.loss,
-        bursts=None if bursts is None else Bursts(mean_packets=bursts),
-        rate_bps=min(1000.0 * condition.rate_kbit, _UNLIMITED_BPS),
-        queue_packets=condition.queue_pkts,
-        reorder=condition.reorder,
-    )
+    config = condition.link(LATE_S)
     up = make_link(config, "up", streams, "link/up")
     return up, make_link(config, "down", streams, "link/down")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from helpers.processes.patience import PATIENCE_S, becomes
 
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatorError, run_job
+from dva_sim.validation.network.real_side.cell import EmulatedJob, EmulatorError, run_job
 
 
 @cache

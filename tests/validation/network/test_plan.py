@@ -6,7 +6,7 @@ from importlib import resources as packages
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.validation.network.emulator.measuring import shortened
+from dva_sim.validation.network.real_side.measuring import shortened
 from dva_sim.validation.network.reference import (
     NUMBERS,
     BlockConfig,

@@ -26,11 +26,19 @@ from dataclasses import asdict, dataclass, field
 from typing import IO, Any
 
 from dva_sim.kernel.errors import DvaSimError
-from dva_sim.kernel.streams import Streams
+from dva_sim.network.emulator import linux_calls
+from dva_sim.network.emulator.forwarder import (
+    FORWARDER_PRIORITY,
+    EmulatedLink,
+    Forwarder,
+    links_of,
+)
+from dva_sim.network.emulator.linux_calls import FAR_END, NEAR_END, End, open_tun
+from dva_sim.network.emulator.relay import Proxy
+from dva_sim.network.emulator.report import LinkReport
+from dva_sim.network.link import LinkConfig
 from dva_sim.network.pattern_runs import Condition
-from dva_sim.validation.network.emulator import linux_calls
-from dva_sim.validation.network.emulator.linux_calls import OPERATOR_END, ROBOT_END, End, open_tun
-from dva_sim.validation.network.emulator.programs import (
+from dva_sim.validation.network.real_side.programs import (
     Note,
     Notes,
     await_nothing,
@@ -39,15 +47,6 @@ from dva_sim.validation.network.emulator.programs import (
     run_operator,
     run_robot,
     run_sender,
-)
-from dva_sim.validation.network.emulator.wire import (
-    FORWARDER_PRIORITY,
-    EmulatedLink,
-    EmulatedWire,
-    Forwarder,
-    Proxy,
-    Told,
-    WireConfig,
 )
 
 PROGRAM_PRIORITY = 10  # real-time, below the forwarder's
@@ -134,6 +133,7 @@ def _live(parent: int, program: Program, channel: socket.socket, notes: Notes) -
 
 PORT = 5555
 _STDIN = 0
+Told = dict[str, float | int]
 PACKETS, PROXY = "packets", "proxy"
 """Kinds of link: whole packets between namespaces, or a relay of TCP over the loopback."""
 
@@ -145,7 +145,7 @@ class EmulatedJob:
     Attributes:
         program: `commands` for operator and robot, `probe` for the link's own check, `nothing`
             to see whether it can be set up.
-        wire: Both directions.
+        wire: The link.
         seed: Of the link's luck.
         bound_s: The run ends after so much time, whatever happens [s].
         arguments: Of the program.
@@ -156,7 +156,7 @@ class EmulatedJob:
     """
 
     program: str
-    wire: WireConfig = field(default_factory=WireConfig)
+    wire: LinkConfig = field(default_factory=LinkConfig)
     seed: int = 1
     bound_s: float = 10.0
     arguments: dict[str, Any] = field(default_factory=dict)
@@ -167,13 +167,13 @@ class EmulatedJob:
 
     def to_json(self) -> str:
         """One line."""
-        return json.dumps(asdict(self))
+        return json.dumps(vars(self) | {"wire": self.wire.model_dump(mode="json")})
 
     @classmethod
     def from_json(cls, text: str) -> EmulatedJob:
         """The job of such a line."""
         data = json.loads(text)
-        return cls(**data | {"wire": WireConfig(**data["wire"])})
+        return cls(**data | {"wire": LinkConfig.model_validate(data["wire"])})
 
 
 @dataclass(frozen=True)
@@ -221,8 +221,7 @@ class EmulatedCell:
         self._job = job
         self._way = way
         self._nodes: list[Node] = []
-        streams = Streams(job.seed)
-        self._wires = (EmulatedWire(job.wire, streams, "ab"), EmulatedWire(job.wire, streams, "ba"))
+        self._links = links_of(job.wire, job.seed)
 
     def play(self) -> EmulatedOutcome:
         """Set up, run, and end everything; problems become part of the outcome."""
@@ -234,7 +233,7 @@ class EmulatedCell:
             gc.disable()  # a pause would look like delay
             self._nodes[0].channel.send(word)
             problem = self._run(link)
-            told = link.told()
+            told = columns_of(link.report())
             link.close()
         except OSError as error:
             problem = error.strerror or str(error)
@@ -251,12 +250,12 @@ class EmulatedCell:
         if self._job.link == PROXY:
             self._start("operator", operator)
             address, _ = self._start("robot", robot).hear()
-            proxy = Proxy(self._wires, address.decode())
+            proxy = Proxy(self._links, address.decode())
             return proxy, proxy.address.encode()
-        a = self._start("operator", _networked(operator, OPERATOR_END, self._job.congestion))
-        b = self._start("robot", _networked(robot, ROBOT_END, self._job.congestion))
+        a = self._start("operator", _networked(operator, NEAR_END, self._job.congestion))
+        b = self._start("robot", _networked(robot, FAR_END, self._job.congestion))
         tuns = (a.hear()[1][0], b.hear()[1][0])
-        return Forwarder(tuns, self._wires), b.hear()[0]
+        return Forwarder(tuns, self._links), b.hear()[0]
 
     def _start(self, name: str, program: Program) -> Node:
         self._nodes.append(start_node(name, program, self._job.room))
@@ -272,6 +271,18 @@ class EmulatedCell:
         if end == _STDIN:
             return "nobody waits for the answer any more"
         return "the robot failed" if end == robot.ended else ""
+
+
+def columns_of(report: LinkReport) -> Told:
+    """The columns of the emulator, by the letters of both ends: a is the operator."""
+    told: Told = {}
+    for way, flow in (("ab", report.up), ("ba", report.down)):
+        told[f"emu_pkts_{way}"] = flow.offered_packets
+        told[f"emu_lost_{way}"] = flow.lost_by_chance
+        told[f"emu_tail_{way}"] = flow.lost_in_queue
+    for name in ("p50", "p99", "max"):
+        told[f"emu_late_{name}_ms"] = 1e3 * float(getattr(report, f"late_{name}_s"))
+    return told
 
 
 def _networked(program: Program, end: End, congestion: str) -> Program:
@@ -292,15 +303,15 @@ def _programs(job: EmulatedJob) -> tuple[Program, Program]:
     arguments = job.arguments
     if job.program == "commands":
         condition = Condition(**arguments)
-        where = "127.0.0.1:*" if job.link == PROXY else f"{ROBOT_END.address}:{PORT}"
+        where = "127.0.0.1:*" if job.link == PROXY else f"{FAR_END.address}:{PORT}"
         return (
             lambda channel, notes: run_operator(condition, channel, notes),
             lambda channel, notes: run_robot(condition, f"tcp://{where}", channel, notes),
         )
     if job.program == "probe":
         return (
-            lambda channel, notes: run_sender(channel, notes, ROBOT_END.address, **arguments),
-            lambda channel, notes: run_counter(channel, notes, ROBOT_END.address),
+            lambda channel, notes: run_sender(channel, notes, FAR_END.address, **arguments),
+            lambda channel, notes: run_counter(channel, notes, FAR_END.address),
         )
     return begin_nothing, await_nothing
 
@@ -351,7 +362,7 @@ def start_job(job: EmulatedJob, out: IO[bytes], err: IO[bytes]) -> subprocess.Po
         err: Gets complaints.
     """
     process = subprocess.Popen(
-        [sys.executable, "-m", "dva_sim.validation.network.emulator.start", str(os.getpid())],
+        [sys.executable, "-m", "dva_sim.validation.network.real_side.start", str(os.getpid())],
         stdin=subprocess.PIPE,
         stdout=out,
         stderr=err,

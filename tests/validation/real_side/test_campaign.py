@@ -4,9 +4,9 @@ import pytest
 from helpers.wording import unnamed
 
 from dva_sim.network.pattern_runs import Condition
-from dva_sim.validation.network.emulator import measuring
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome, EmulatorError
-from dva_sim.validation.network.emulator.measuring import (
+from dva_sim.validation.network.real_side import measuring
+from dva_sim.validation.network.real_side.cell import EmulatedJob, EmulatedOutcome, EmulatorError
+from dva_sim.validation.network.real_side.measuring import (
     COLUMNS,
     Progress,
     Row,

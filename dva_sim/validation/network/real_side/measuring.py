@@ -29,7 +29,7 @@ import zmq
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
 from dva_sim.network.pattern_runs import EMULATOR_RESULTS, RESULTS, Condition, RunLog, measure_log
-from dva_sim.validation.network.emulator.cell import (
+from dva_sim.validation.network.real_side.cell import (
     PACKETS,
     EmulatedJob,
     EmulatedOutcome,
@@ -37,8 +37,7 @@ from dva_sim.validation.network.emulator.cell import (
     refuse_for_proxy,
     run_job,
 )
-from dva_sim.validation.network.emulator.programs import HANDSHAKE_LIMIT_S, Note, NoteKind
-from dva_sim.validation.network.emulator.wire import WireConfig
+from dva_sim.validation.network.real_side.programs import HANDSHAKE_LIMIT_S, Note, NoteKind
 from dva_sim.validation.network.reference import (
     BlockConfig,
     SocketRun,
@@ -133,7 +132,7 @@ def job_of(condition: Condition, seed: int, link: str = PACKETS) -> EmulatedJob:
     patience_ms = condition.timeout_ms or math.inf
     return EmulatedJob(
         "commands",
-        WireConfig.of(condition),
+        condition.link(),
         derive_seed(condition.hash, seed),
         bound_s=HANDSHAKE_LIMIT_S + condition.subscription_wait_s + played_s + 10.0,
         arguments=dataclasses.asdict(condition),

@@ -4,11 +4,11 @@ import sys
 import pytest
 from helpers.processes import patience
 
-from dva_sim.validation.network.emulator.programs import NoteKind, Notes
+from dva_sim.validation.network.real_side.programs import NoteKind, Notes
 
 A_PROCESS_NOTES_AND_ENDS = """
 import json, os
-from dva_sim.validation.network.emulator.programs import NoteKind, Notes
+from dva_sim.validation.network.real_side.programs import NoteKind, Notes
 notes = Notes(10)
 if os.fork() == 0:
     notes.add(NoteKind.ISSUED, 0, 1.5)

@@ -10,7 +10,7 @@ import json
 import os
 import sys
 
-from dva_sim.validation.network.emulator.linux_calls import become_owner, die_with_parent
+from dva_sim.network.emulator.linux_calls import become_owner, die_with_parent
 
 
 def main() -> None:
@@ -29,7 +29,7 @@ def main() -> None:
             problem = error.strerror or str(error)
     die_with_parent(int(sys.argv[1]))
 
-    from dva_sim.validation.network.emulator.cell import (  # late: start-up
+    from dva_sim.validation.network.real_side.cell import (  # late: start-up
         EmulatedCell,
         EmulatedJob,
         EmulatedOutcome,

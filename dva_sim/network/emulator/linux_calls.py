@@ -125,8 +125,8 @@ class End:
     peer: str
 
 
-OPERATOR_END = End("10.77.0.1", "10.77.0.2")
-ROBOT_END = End("10.77.0.2", "10.77.0.1")
+NEAR_END = End("10.77.0.1", "10.77.0.2")
+FAR_END = End("10.77.0.2", "10.77.0.1")
 
 
 def open_tun(end: End, congestion: str) -> int:

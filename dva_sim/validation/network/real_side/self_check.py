@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.validation.network.emulator.cell import EmulatedJob, EmulatedOutcome, run_job
-from dva_sim.validation.network.emulator.wire import WireConfig
+from dva_sim.network.link import LinkConfig
+from dva_sim.network.link.losses import Bursts
+from dva_sim.network.pattern_runs import UNLIMITED_BPS
+from dva_sim.validation.network.real_side.cell import EmulatedJob, EmulatedOutcome, run_job
 
 Floats = NDArray[np.float64]
 _DELAY_BAND_S = 1e-3
@@ -63,7 +66,7 @@ class Probe:
         find: Findings from the wire, the times of sending and arrival [s] and their numbers.
     """
 
-    wire: WireConfig
+    wire: LinkConfig
     count: int
     interval_s: float
     size: int
@@ -94,7 +97,7 @@ class Crossing:
         arrived: When [s], shape `(m,)`.
     """
 
-    wire: WireConfig
+    wire: LinkConfig
     size: int
     sent: Floats
     numbers: NDArray[np.int_]
@@ -173,7 +176,8 @@ def find_loss(crossing: Crossing) -> list[LinkFinding]:
 def find_bursts(crossing: Crossing) -> list[LinkFinding]:
     """The mean length of runs of losses, whose law is geometric."""
     runs = [sum(1 for _ in run) for lost, run in groupby(crossing.lost) if lost]
-    mean = crossing.wire.burst_pkts or 1.0
+    bursts = crossing.wire.bursts
+    mean = (bursts and bursts.mean_packets) or 1.0
     sigma = np.sqrt(mean * (mean - 1) / len(runs))
     return [
         LinkFinding("run of losses, mean", "packets", mean, float(np.mean(runs)), _SIGMAS * sigma)
@@ -188,11 +192,12 @@ def find_rate(crossing: Crossing) -> list[LinkFinding]:
     return [LinkFinding("rate", "kbit/s", wanted, found, _RATE_BAND * wanted)]
 
 
+_fast = partial(LinkConfig, rate_bps=UNLIMITED_BPS)
 PROBES = (
-    Probe(WireConfig(delay_s=0.05), 300, 0.004, 100, find_delay),
-    Probe(WireConfig(delay_s=0.05, jitter_s=0.02, reorder=True), 1500, 1e-3, 100, find_jitter),
-    Probe(WireConfig(loss=0.1), 4000, 5e-4, 100, find_loss),
-    Probe(WireConfig(loss=0.1, burst_pkts=4.0), 4000, 5e-4, 100, find_bursts),
-    Probe(WireConfig(rate_bps=1e6, queue_pkts=400), 250, 4e-3, 1000, find_rate),
+    Probe(_fast(delay_s=0.05), 300, 0.004, 100, find_delay),
+    Probe(_fast(delay_s=0.05, jitter_s=0.02, reorder=True), 1500, 1e-3, 100, find_jitter),
+    Probe(_fast(loss=0.1), 4000, 5e-4, 100, find_loss),
+    Probe(_fast(loss=0.1, bursts=Bursts(mean_packets=4.0)), 4000, 5e-4, 100, find_bursts),
+    Probe(LinkConfig(rate_bps=1e6, queue_packets=400), 250, 4e-3, 1000, find_rate),
 )
 """What the link is asked; light enough for a slow machine."""

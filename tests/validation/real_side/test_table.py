@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.validation.network.emulator.measuring import Table
+from dva_sim.validation.network.real_side.measuring import Table
 
 COLUMNS = ("cell", "age")
 

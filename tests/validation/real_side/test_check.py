@@ -1,11 +1,16 @@
+from functools import partial
+
 import numpy as np
 import pytest
 
 from dva_sim.cli.checks import check
-from dva_sim.kernel.streams import Streams
-from dva_sim.validation.network.emulator import cell, self_check
-from dva_sim.validation.network.emulator.cell import EmulatorError
-from dva_sim.validation.network.emulator.self_check import (
+from dva_sim.network.emulator.forwarder import links_of
+from dva_sim.network.link import LinkConfig
+from dva_sim.network.link.losses import Bursts
+from dva_sim.network.pattern_runs import UNLIMITED_BPS
+from dva_sim.validation.network.real_side import cell, self_check
+from dva_sim.validation.network.real_side.cell import EmulatorError
+from dva_sim.validation.network.real_side.self_check import (
     PROBES,
     Crossing,
     LinkFinding,
@@ -15,14 +20,15 @@ from dva_sim.validation.network.emulator.self_check import (
     find_loss,
     find_rate,
 )
-from dva_sim.validation.network.emulator.wire import EmulatedWire, WireConfig
+
+fast = partial(LinkConfig, rate_bps=UNLIMITED_BPS)
 
 
-def crossing(config: WireConfig, count: int, interval_s: float, size: int = 100) -> Crossing:
+def crossing(config: LinkConfig, count: int, interval_s: float, size: int = 100) -> Crossing:
     """Datagrams over a wire without devices: never late."""
-    wire = EmulatedWire(config, Streams(3), "ab")
+    wire, _ = links_of(config, seed=3)
     sent = interval_s * np.arange(count)
-    out = [(wire.offer(float(at), size), number) for number, at in enumerate(sent)]
+    out = [(wire.carry(float(at), size), number) for number, at in enumerate(sent)]
     arrived = sorted((at, number) for at, number in out if at is not None)
     numbers = np.array([number for _, number in arrived])
     return Crossing(config, size, sent, numbers, np.array([at for at, _ in arrived]))
@@ -39,35 +45,35 @@ def test_a_link_that_keeps_its_laws_passes_every_probe():
 
 
 def test_a_link_that_is_two_milliseconds_late_is_found_out():
-    right = crossing(WireConfig(delay_s=0.05), 100, 0.01)
+    right = crossing(fast(delay_s=0.05), 100, 0.01)
     assert all(finding.passed for finding in find_delay(late(right, 0.0005)))
     assert not any(finding.passed for finding in find_delay(late(right, 0.002)))
 
 
-def told(other: WireConfig, by: Crossing) -> Crossing:
+def told(other: LinkConfig, by: Crossing) -> Crossing:
     """The same datagrams, had the link been told something else."""
     return Crossing(other, by.size, by.sent, by.numbers, by.arrived)
 
 
 def test_a_link_that_loses_too_few_is_found_out():
-    few = crossing(WireConfig(loss=0.07), 4000, 5e-4)
+    few = crossing(fast(loss=0.07), 4000, 5e-4)
     assert find_loss(few)[0].passed
-    assert not find_loss(told(WireConfig(loss=0.1), few))[0].passed
+    assert not find_loss(told(fast(loss=0.1), few))[0].passed
 
 
 def test_single_losses_are_not_taken_for_bursts():
-    single = crossing(WireConfig(loss=0.1), 4000, 5e-4)
-    assert not find_bursts(told(WireConfig(loss=0.1, burst_pkts=4), single))[0].passed
+    single = crossing(fast(loss=0.1), 4000, 5e-4)
+    assert not find_bursts(told(fast(loss=0.1, bursts=Bursts(mean_packets=4)), single))[0].passed
 
 
 def test_a_line_that_is_three_percent_slow_is_found_out():
-    slow = crossing(WireConfig(rate_bps=0.97e6, queue_pkts=400), 250, 4e-3, 1000)
+    slow = crossing(LinkConfig(rate_bps=0.97e6, queue_packets=400), 250, 4e-3, 1000)
     assert find_rate(slow)[0].passed
-    assert not find_rate(told(WireConfig(rate_bps=1e6), slow))[0].passed
+    assert not find_rate(told(LinkConfig(rate_bps=1e6), slow))[0].passed
 
 
 def test_jitter_that_keeps_the_order_is_not_taken_for_free_jitter():
-    ordered = crossing(WireConfig(delay_s=0.05, jitter_s=0.02), 1500, 1e-3)
+    ordered = crossing(fast(delay_s=0.05, jitter_s=0.02), 1500, 1e-3)
     assert not find_jitter(ordered)[1].passed
 
 

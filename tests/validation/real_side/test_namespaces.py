@@ -16,7 +16,7 @@ from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 
 from dva_sim.network.pattern_runs import Condition
-from dva_sim.validation.network.emulator.cell import (
+from dva_sim.validation.network.real_side.cell import (
     EmulatedJob,
     EmulatedOutcome,
     EmulatorError,
@@ -24,14 +24,14 @@ from dva_sim.validation.network.emulator.cell import (
     start_job,
     why_no_packets,
 )
-from dva_sim.validation.network.emulator.measuring import COLUMNS, job_of, measure
-from dva_sim.validation.network.emulator.self_check import PROBES, Crossing, find_bursts, find_loss
+from dva_sim.validation.network.real_side.measuring import COLUMNS, job_of, measure
+from dva_sim.validation.network.real_side.self_check import PROBES, Crossing, find_bursts, find_loss
 
 pytestmark = pytest.mark.system
 
 LONG = Condition("pub", 10, dur_s=600)
 WAITING = """
-from dva_sim.validation.network.emulator.measuring import measure
+from dva_sim.validation.network.real_side.measuring import measure
 from dva_sim.network.pattern_runs import Condition
 measure(Condition("pub", 10, dur_s=600), 1)
 """
@@ -190,6 +190,6 @@ def test_where_devices_are_forbidden_one_line_says_what_is_needed(monkeypatch):
     def refuse(job: EmulatedJob) -> None:
         raise EmulatorError("a user namespace is refused: Operation not permitted")
 
-    monkeypatch.setattr("dva_sim.validation.network.emulator.cell.run_job", refuse)
+    monkeypatch.setattr("dva_sim.validation.network.real_side.cell.run_job", refuse)
     told = why_no_packets()
     assert not unnamed(told, "Linux", "/dev/net/tun", "Operation not permitted")
