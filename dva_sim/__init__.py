@@ -12,8 +12,6 @@ What is here is loaded when it is first used; `dva_sim.api` explains it.
 from importlib import import_module
 from typing import Any
 
-from dva_sim.kernel.moved import tell_moved_names
-
 __version__ = "0.8.0"
 __all__ = [
     "Comparison",
@@ -32,8 +30,6 @@ __all__ = [
     "show",
     "tune",
 ]
-
-tell_moved_names()
 
 
 def __getattr__(name: str) -> Any:

@@ -1,12 +1,4 @@
-"""Modules that files of users may import by an earlier name: told in one line where they are."""
-
-import sys
-from collections.abc import Sequence
-from types import ModuleType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
+"""Modules that plug-ins may import by an earlier name: told in one line where they are."""
 
 # What pages and examples have named, and whole rooms; names are relative to `dva_sim`.
 MOVED = {
@@ -51,22 +43,7 @@ MOVED = {
 }
 
 
-class MovedFinder:
-    """Asked last: a module that no other finder knows may have an earlier name."""
-
-    def find_spec(
-        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> None:
-        """Never finds anything.
-
-        Raises:
-            ModuleNotFoundError: the module has another name now, which is told.
-        """
-        package, _, rest = name.partition(".")
-        if package == "dva_sim" and rest in MOVED:
-            raise ModuleNotFoundError(f"{name} is now dva_sim.{MOVED[rest]}", name=name)
-
-
-def tell_moved_names() -> None:
-    """From now on an import of an earlier name says the new one."""
-    sys.meta_path.append(MovedFinder())
+def name_now(module: str | None) -> str:
+    """Return the present name of a module that is imported by an earlier one; else nothing."""
+    package, _, rest = (module or "").partition(".")
+    return f"; it is now dva_sim.{MOVED[rest]}" if package == "dva_sim" and rest in MOVED else ""

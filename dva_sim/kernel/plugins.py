@@ -17,6 +17,7 @@ from typing import Any, Final, Generic, TypeVar
 
 from dva_sim.kernel import resources
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.moved import name_now
 from dva_sim.kernel.suggestions import hint, unknown
 
 T = TypeVar("T")
@@ -265,7 +266,8 @@ def stamp_of(name: str) -> int:
 def said(error: BaseException) -> str:
     """An error in one line."""
     text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+    now = name_now(error.name) if isinstance(error, ModuleNotFoundError) else ""
+    return f"{type(error).__name__}: {text}{now}" if text else type(error).__name__
 
 
 def _run(path: Path, kind: str) -> ModuleType:

@@ -164,6 +164,8 @@ def faults_of(node: ast.AST, room: str) -> Iterator[str]:
     elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
         if node.value.id == "ast" and node.attr != "literal_eval":
             yield f"reads source: ast.{node.attr}"
+        if node.value.id == "sys" and node.attr in ("meta_path", "path_hooks"):
+            yield f"takes part in imports of others: sys.{node.attr}"
     elif isinstance(node, ast.Call):
         yield from _faults_of_call(node)
     elif isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -246,6 +248,7 @@ def test_a_private_name_that_none_of_ours_has_is_found_where_it_is_read(read):
         ("sys.modules['scipy'] = stand_in", "stands in"),
         ("from sys import modules\nmodules[package] = module", "stands in"),
         ("del sys.modules['numpy']", "stands in"),
+        ("sys.meta_path.append(finder)", "imports of others"),
         ("import ast\nast.parse(text)", "reads source"),
         ("from ast import parse", "reads source"),
         ("class A:\n    teller = 'dva_sim.cli.stories:tell_any'", "above"),
