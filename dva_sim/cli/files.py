@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 from typer import Argument, Option
 
-from dva_sim.cli.options import Jobs, Json, Quiet, Verbose, count, file, one_of
+from dva_sim.cli.options import (
+    REQUIRED,
+    Jobs,
+    Json,
+    Quiet,
+    Verbose,
+    asks,
+    count,
+    file,
+    flag,
+    folder,
+    one_of,
+    text,
+)
 from dva_sim.cli.verbosity import loudness, print_json
 from dva_sim.kernel.suggestions import either
 from dva_sim.testing.promises import TRIALS
 
 _TRIED = either(TRIALS)
+_RATE = "Of these commands."
+_UNIT = "Of the log of another app whose head does not say it."
 
 
 def _listed(incomplete: str) -> list[str]:
@@ -102,22 +117,19 @@ def check(
     raise typer.Exit(checks.check(files, set_ or []))
 
 
+@asks(
+    file=(Annotated[Path, Argument(metavar="FILE", help="Of a phone's motion.")], REQUIRED),
+    commands=(flag("--commands", "Print the commands that its app made of it."), False),
+    rate=(Annotated[float, Option(metavar="HZ", min=0.1, max=100.0, help=_RATE)], 10.0),
+    part=(file("Write an accelerometer part that measures so.", "--part", metavar="OUT"), None),
+    unit=(Annotated[Literal["m/s2", "g"] | None, Option(help=_UNIT)], None),
+)
 def phone_log(
-    file: Annotated[Path, Argument(metavar="FILE", help="Of a phone's motion.")],
-    commands: Annotated[
-        bool, Option("--commands", help="Print the commands that its app made of it.")
-    ] = False,
-    rate: Annotated[
-        float, Option("--rate", metavar="HZ", min=0.1, max=100.0, help="Of these commands.")
-    ] = 10.0,
-    part: Annotated[
-        Path | None,
-        Option("--part", metavar="OUT", help="Write an accelerometer part that measures so."),
-    ] = None,
-    unit: Annotated[
-        Literal["m/s2", "g"] | None,
-        Option("--unit", help="Of the log of another app whose head does not say it."),
-    ] = None,
+    file: Path,
+    commands: bool,
+    rate: float,
+    part: Path | None,
+    unit: Literal["m/s2", "g"] | None,
     as_json: Json = False,
 ) -> None:
     """Say how even and how noisy a phone's samples are, or replay them.
@@ -162,38 +174,30 @@ def schema(
     checks.print_schema(kind)
 
 
+@asks(
+    what=(
+        Annotated[
+            str,
+            Argument(
+                metavar="WHAT",
+                autocompletion=one_of("dispatch", "operators", "network"),
+                help="dispatch, operators or network.",
+            ),
+        ],
+        "dispatch",
+    ),
+    out=(folder("Write tables, figures and a page there.", "-o", "--out"), None),
+    cases=(file("A file of cases, by name or path; not for operators.", of=str | None), None),
+    strategy=(text("How operators drive; operators only."), None),
+    quick=(flag("--quick", "Fewer runs, wider errors."), False),
+    jobs=(Jobs, None),
+    seed=(count("Random seed.", "--seed"), 1),
+    ablate=(flag("--ablate", "Leave mechanisms out one by one; network only."), False),
+    live=(flag("--live", "Measure real sockets now; network only."), False),
+    measure=(file("Measure the whole design, or go on with it; network only."), None),
+)
 def validate(
-    what: Annotated[
-        str,
-        Argument(
-            metavar="WHAT",
-            autocompletion=one_of("dispatch", "operators", "network"),
-            help="dispatch, operators or network.",
-        ),
-    ] = "dispatch",
-    out: Annotated[
-        Path | None,
-        Option("-o", "--out", metavar="FOLDER", help="Write tables, figures and a page there."),
-    ] = None,
-    cases: Annotated[
-        str | None, file("A file of cases, by name or path; not for operators.")
-    ] = None,
-    strategy: Annotated[
-        str | None,
-        Option(metavar="NAME", help="How operators drive; operators only."),
-    ] = None,
-    quick: Annotated[bool, Option("--quick", help="Fewer runs, wider errors.")] = False,
-    jobs: Jobs = None,
-    seed: Annotated[int, count("Random seed.", "--seed")] = 1,
-    ablate: Annotated[
-        bool, Option("--ablate", help="Leave mechanisms out one by one; network only.")
-    ] = False,
-    live: Annotated[bool, Option("--live", help="Measure real sockets now; network only.")] = False,
-    measure: Annotated[
-        Path | None, file("Measure the whole design, or go on with it; network only.")
-    ] = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    what: str, cases: str | None, quiet: Quiet = False, verbose: Verbose = False, **asked: Any
 ) -> None:
     """Compare the models with theory, people and sockets.
 
@@ -207,16 +211,5 @@ def validate(
     from dva_sim.cli import validation  # late: start-up
 
     with loudness(quiet, verbose):
-        code = validation.validate(
-            what,
-            out,
-            case_file=cases,
-            strategy=strategy,
-            quick=quick,
-            jobs=jobs,
-            seed=seed,
-            ablate=ablate,
-            live=live,
-            measure=measure,
-        )
+        code = validation.validate(what, case_file=cases, **asked)
     raise typer.Exit(code)

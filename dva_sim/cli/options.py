@@ -11,8 +11,9 @@ from __future__ import annotations
 import inspect
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
@@ -89,14 +90,14 @@ def argument(help: str, metavar: str, completer: Completer | None = None) -> Any
     return Annotated[str, Argument(metavar=metavar, autocompletion=completer, help=help)]
 
 
-def text(help: str, *names: str, metavar: str = "NAME") -> Any:
+def text(help: str, *names: str, metavar: str = "NAME", of: Any = str | None) -> Any:
     """An option that takes some text, such as the path of a file."""
-    return Annotated[str | None, Option(*names, metavar=metavar, help=help)]
+    return Annotated[of, Option(*names, metavar=metavar, help=help)]
 
 
-def several(help: str, metavar: str = "NAME") -> Any:
+def several(help: str, metavar: str = "NAME", *names: str) -> Any:
     """An option that takes some text, and may be given again."""
-    return Annotated[list[str], Option(metavar=metavar, help=help)]
+    return Annotated[list[str], Option(*names, metavar=metavar, help=help)]
 
 
 def flag(name: str, help: str) -> Any:
@@ -104,33 +105,36 @@ def flag(name: str, help: str) -> Any:
     return Annotated[bool, Option(name, help=help)]
 
 
-def count(help: str, *names: str, metavar: str = "N", least: int = 0, most: int = MOST_SEED) -> Any:
-    """An option that takes a whole number."""
-    return Option(*names, metavar=metavar, parser=whole(least, most), help=help)
+def count(
+    help: str, *names: str, metavar: str = "N", least: int = 0, most: int = MOST_SEED, of: Any = int
+) -> Any:
+    """An option that takes a whole number; `of` says so where it may be left out."""
+    return Annotated[of, Option(*names, metavar=metavar, parser=whole(least, most), help=help)]
 
 
-def choice(*words: str, help: str) -> Any:
-    """An option that takes one of some words."""
-    return Option(metavar="|".join(words), autocompletion=one_of(*words), help=help)
+def seconds(help: str, *names: str, of: Any = float | None) -> Any:
+    """An option that takes a time above zero."""
+    return Annotated[of, Option(*names, metavar="SECONDS", parser=number(), help=help)]
 
 
-def file(help: str) -> Any:
+def choice(*words: str, help: str, of: Any = str) -> Any:
+    """An option that takes one of some words; `of` says so where it may be left out."""
+    return Annotated[of, Option(metavar="|".join(words), autocompletion=one_of(*words), help=help)]
+
+
+def file(help: str, *names: str, metavar: str = "FILE", of: Any = Path | None) -> Any:
     """An option that takes a file."""
-    return Option(metavar="FILE", help=help)
+    return Annotated[of, Option(*names, metavar=metavar, help=help)]
 
 
-def folder(help: str) -> Any:
+def folder(help: str, *names: str) -> Any:
     """An option that takes a folder."""
-    return Option(metavar="FOLDER", help=help)
+    return file(help, *names, metavar="FOLDER")
 
 
-Jobs = Annotated[
-    int | None,
-    count(
-        "How many processes; default: one for each core.", "-j", "--jobs", least=1, most=MOST_JOBS
-    ),
-]
-RunSeed = Annotated[int, count("The run's random seed.")]
+_JOBS = "How many processes; default: one for each core."
+Jobs = count(_JOBS, "-j", "--jobs", least=1, most=MOST_JOBS, of=int | None)
+RunSeed = count("The run's random seed.")
 ScenarioName = Annotated[
     str,
     Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path."),
@@ -144,11 +148,18 @@ Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
 Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
 Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
 
-Host = Annotated[str, Option(metavar="HOST", help="Address of this machine to listen on.")]
-Port = Annotated[int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)]
-NoOpen = Annotated[bool, Option("--no-open", help="Open no browser.")]
-NoToken = Annotated[bool, Option("--no-token", help="Let everybody in who reaches the page.")]
+REQUIRED: Any = Parameter.empty
+PAGE: dict[str, tuple[Any, Any]] = {
+    "host": (text("Address of this machine to listen on.", metavar="HOST", of=str), "127.0.0.1"),
+    "port": (count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535), 8765),
+    "no_open": (flag("--no-open", "Open no browser."), False),
+    "no_token": (flag("--no-token", "Let everybody in who reaches the page."), False),
+}
+"""Options of commands that serve a page, with their defaults."""
+RUN: dict[str, tuple[Any, Any]] = {"seed": (RunSeed, 1), "set_": (Sets, None)}
+"""Options of commands that run a scenario in real time."""
 
+_PILOT = "Only so many persons, with a random seed of their own."
 OPTIONS: dict[str, Any] = {
     "again": flag("--again", "In place of an earlier registration; the report will say so."),
     "at": text("Moment of the still, or moments of the strip: 10,20,30.", metavar="SECONDS"),
@@ -162,28 +173,17 @@ OPTIONS: dict[str, Any] = {
     "full": flag("--full", "The study's larger version."),
     "inset": flag("--inset", "Show in the film what a robot's camera sees."),
     "jobs": Jobs,
-    "limit_s": Annotated[
-        float,
-        Option(
-            "--limit",
-            metavar="SECONDS",
-            parser=number(),
-            help="A run that takes longer has failed.",
-        ),
-    ],
+    "limit_s": seconds("A run that takes longer has failed.", "--limit", of=float),
     "mcap": text("Write a whole recording of an .mcap.part; the file is new.", metavar="FILE"),
     "name": argument("Name or path of the new study.", "NAME"),
     "overwrite": Overwrite,
-    "panels": Annotated[int, count("How many moments a strip has.", least=1, most=24)],
+    "panels": count("How many moments a strip has.", least=1, most=24),
     "pdf": flag("--pdf", "Print it as PDF too, by Chromium."),
-    "pilot": Annotated[
-        int | None,
-        count("Only so many persons, with a random seed of their own.", metavar="PERSONS", least=1),
-    ],
+    "pilot": count(_PILOT, metavar="PERSONS", least=1, of=int | None),
     "quick": flag("--quick", "The study's small version."),
     "record": text("Keep the run as a file: .mcap, for replay and viewers.", metavar="FILE"),
     "ros2": text("Write a ROS 2 bag; the folder is new.", metavar="FOLDER"),
-    "rows": Annotated[int, count("How many of them.", least=1)],
+    "rows": count("How many of them.", least=1),
     "scenario": ScenarioName,
     "scheduler": text("Use a dask.distributed cluster instead.", metavar="tcp://HOST:PORT"),
     "second": argument("What is compared with it.", "B"),
@@ -204,7 +204,7 @@ OPTIONS: dict[str, Any] = {
     ],
     "export.table": several("Only this one; may be given again."),
     "run.out": text("Results folder; default: results/STUDY.", "-o", "--out", metavar="FOLDER"),
-    "run.seed": Annotated[int | None, count("Random seed of the whole study.")],
+    "run.seed": count("Random seed of the whole study.", of=int | None),
     "tune.out": text(
         "Folder of the trials; default: results/STUDY-tuning.", "-o", "--out", metavar="FOLDER"
     ),
@@ -229,14 +229,31 @@ def takes(function: Callable[..., Any], but: Sequence[str] = ()) -> Callable[[Co
             for name, parameter in there
             if name not in but
         }
-        own = inspect.signature(command, eval_str=True).parameters.values()
-        added = [p for p in own if p.name not in taken and p.kind is not Parameter.VAR_KEYWORD]
-        every = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*taken.values(), *added)]
-        declared: Any = command
-        declared.__signature__ = inspect.Signature(every)
-        return command
+        return _declared(command, taken)
 
     return declare
+
+
+def asks(**options: tuple[Any, Any]) -> Callable[[Command], Command]:
+    """A command that asks for these options, each with its form and its default.
+
+    It has parameters for what it looks at, and hands over all else that it is given.
+    """
+    asked = {
+        name: Parameter(name, Parameter.KEYWORD_ONLY, annotation=form, default=default)
+        for name, (form, default) in options.items()
+    }
+    return lambda command: _declared(command, asked)
+
+
+def _declared(command: Command, asked: Mapping[str, Parameter]) -> Command:
+    """The command with these parameters, and then those that it adds itself."""
+    own = inspect.signature(command, eval_str=True).parameters.values()
+    added = [p for p in own if p.name not in asked and p.kind is not Parameter.VAR_KEYWORD]
+    every = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*asked.values(), *added)]
+    declared: Any = command
+    declared.__signature__ = inspect.Signature(every)
+    return command
 
 
 def _form(function: str, name: str) -> Any:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
-from typer import Option
 
 from dva_sim import api
-from dva_sim.cli.options import Json, Quiet, Verbose, takes
+from dva_sim.cli.options import Json, Quiet, Verbose, asks, several, takes
 from dva_sim.cli.verbosity import WRITTEN, loudness, print_json, tell_files
 
 
@@ -78,25 +77,16 @@ def export(**asked: Any) -> None:
 
 
 @takes(api.compare)
+@asks(
+    measure=(
+        several("NAME or TABLE.NAME; default: the answer's. May be given again.", "MEASURE"),
+        (),
+    ),
+    by=(several("Its levels in place of cells; may be given again.", "FACTOR"), ()),
+    fail_if=(several("Exit with 4 if it holds; may be given again.", "CONDITION"), ()),
+)
 def compare(
-    first: str,
-    second: str,
-    measure: Annotated[
-        list[str] | None,
-        Option(
-            metavar="MEASURE",
-            help="NAME or TABLE.NAME; default: the answer's. May be given again.",
-        ),
-    ] = None,
-    by: Annotated[
-        list[str] | None,
-        Option(metavar="FACTOR", help="Its levels in place of cells; may be given again."),
-    ] = None,
-    fail_if: Annotated[
-        list[str] | None,
-        Option(metavar="CONDITION", help="Exit with 4 if it holds; may be given again."),
-    ] = None,
-    as_json: Json = False,
+    first: str, second: str, measure: list[str], as_json: Json = False, **asked: Any
 ) -> None:
     """Compare two results folders, run by run.
 
@@ -110,12 +100,5 @@ def compare(
     """
     from dva_sim.cli import comparison  # late: start-up
 
-    code = comparison.compare(
-        Path(first),
-        Path(second),
-        measures=measure or [],
-        by=by or [],
-        fail_if=fail_if or [],
-        as_json=as_json,
-    )
+    code = comparison.compare(Path(first), Path(second), measures=measure, as_json=as_json, **asked)
     raise typer.Exit(code)

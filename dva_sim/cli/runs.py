@@ -7,34 +7,40 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer import Argument, Option
+from typer import Argument
 
 from dva_sim import api
 from dva_sim.cli.options import (
+    PAGE,
+    REQUIRED,
     ROBOTS,
+    RUN,
     SCENARIOS,
-    Host,
-    NoOpen,
-    NoToken,
     Overwrite,
-    Port,
     Quiet,
-    RunSeed,
     ScenarioName,
-    Sets,
     Verbose,
+    asks,
     choice,
     count,
     file,
+    flag,
     folder,
-    number,
+    seconds,
     takes,
+    text,
 )
 from dva_sim.cli.verbosity import loudness
 from dva_sim.kernel.errors import ConfigError
 
-_MOST_PORT = 64_999
+_PORT: Any = {"metavar": "PORT", "most": 64_999}  # of the first of two
 LINKS = "modelled", "real"
+_ADDRESS = "HOST:PORT"
+_LISTEN = "Address of this machine to listen on."
+_FOR = "How long; default: to the scenario's horizon, or until stopped with --only dva."
+_PICTURES = "Port of the robots' pictures (HTTP); default: 8764, with --keys none. 0: any."
+_SCENARIO = "A scenario by name or path; hands-on if none is named."
+_CLOSED = "--keys FOLDER closes it"
 
 
 @takes(api.episode)
@@ -57,15 +63,16 @@ def episode(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> Non
 
 
 @takes(api.replay)
+@asks(console=(flag("--console", "Play it on a page in the browser."), False), **PAGE)
 def replay(
     file: str,
     ros2: str | None,
     mcap: str | None,
-    console: Annotated[bool, Option("--console", help="Play it on a page in the browser.")] = False,
-    host: Host = "127.0.0.1",
-    port: Port = 8765,
-    no_open: NoOpen = False,
-    no_token: NoToken = False,
+    console: bool,
+    host: str,
+    port: int,
+    no_open: bool,
+    no_token: bool,
     quiet: Quiet = False,
     verbose: Verbose = False,
     **pictures: Any,
@@ -101,54 +108,29 @@ def _show_replay(**asked: Any) -> None:
     show_replay(ReplayOptions(**asked), _say_at_once)
 
 
+@asks(
+    scenario=(ScenarioName, REQUIRED),
+    only=(choice("dva", "world", "operator", help="Run one part alone.", of=str | None), None),
+    number=(count("Which operator, with --only operator.", "--number", least=1), 1),
+    operators=(choice("simulated", "scripted", help="Who drives."), "simulated"),
+    dva=(text("Where the DVA listens; 127.0.0.1:5600 with --only.", metavar=_ADDRESS), None),
+    host=(PAGE["host"][0], "127.0.0.1"),
+    port=(count("First port, two for each device; default: free ones.", **_PORT), 0),
+    keys=(folder("Folder of keys: CURVE is on."), None),
+    camera_port=(count(_PICTURES, metavar="PORT", most=65_535, of=int | None), None),
+    record=(file("A recording (.mcap); or a folder of traces.", metavar="FILE|FOLDER"), None),
+    overwrite=(Overwrite, False),
+    state=(file("File that lets a killed DVA go on where it was."), None),
+    duration=(seconds(_FOR, "--for"), None),
+    **RUN,
+)
 def live(
-    scenario: ScenarioName,
-    only: Annotated[
-        str | None, choice("dva", "world", "operator", help="Run one part alone.")
-    ] = None,
-    which: Annotated[int, count("Which operator, with --only operator.", "--number", least=1)] = 1,
-    operators: Annotated[str, choice("simulated", "scripted", help="Who drives.")] = "simulated",
-    dva: Annotated[
-        str | None,
-        Option(metavar="HOST:PORT", help="Where the DVA listens; 127.0.0.1:5600 with --only."),
-    ] = None,
-    host: Annotated[
-        str, Option(metavar="HOST", help="Address of this machine to listen on.")
-    ] = "127.0.0.1",
-    port: Annotated[
-        int,
-        count(
-            "First port, two for each device; default: free ones.", metavar="PORT", most=_MOST_PORT
-        ),
-    ] = 0,
-    keys: Annotated[Path | None, folder("Folder of keys: CURVE is on.")] = None,
-    camera_port: Annotated[
-        int | None,
-        count(
-            "Port of the robots' pictures (HTTP); default: 8764, with --keys none. 0: any.",
-            metavar="PORT",
-            most=65_535,
-        ),
-    ] = None,
-    record: Annotated[
-        Path | None,
-        Option(metavar="FILE|FOLDER", help="A recording (.mcap); or a folder of traces."),
-    ] = None,
-    overwrite: Overwrite = False,
-    state: Annotated[Path | None, file("File that lets a killed DVA go on where it was.")] = None,
-    seconds: Annotated[
-        float | None,
-        Option(
-            "--for",
-            metavar="SECONDS",
-            parser=number(),
-            help="How long; default: to the scenario's horizon, or until stopped with --only dva.",
-        ),
-    ] = None,
-    seed: RunSeed = 1,
-    set_: Sets = None,
+    only: str | None,
+    number: int,
+    set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    **asked: Any,
 ) -> None:
     """Run a scenario in real time, over sockets.
 
@@ -164,90 +146,69 @@ def live(
     from dva_sim.live.options import LiveOptions  # late: start-up
     from dva_sim.network.addresses import problem_of  # late: start-up
 
-    changes = tuple(set_ or ())
-    options = LiveOptions(
-        scenario=scenario,
-        changes=changes,
-        seed=seed,
-        operators=operators,
-        host=host,
-        dva=dva,
-        port=port,
-        keys=keys,
-        record=record,
-        state=state,
-        duration=seconds,
-        overwrite=overwrite,
-        camera_port=camera_port,
-    )
+    options = LiveOptions(changes=tuple(set_ or ()), **asked)
+    dva, has_keys = options.dva, options.keys is not None
     at = dva if dva is not None and not problem_of(dva) and only in (None, "dva") else None
     listens = [] if at is None else [at.rpartition(":")[0]]
-    if only != "dva" or (dva is None and port):
-        listens.append(host)
-    exposure.warn_of_devices(listens, has_keys=keys is not None, close_by="--keys FOLDER closes it")
-    if keys is not None and camera_port is not None and only in (None, "world"):
-        exposure.warn_of_pictures([host])
+    if only != "dva" or (dva is None and options.port):
+        listens.append(options.host)
+    exposure.warn_of_devices(listens, has_keys=has_keys, close_by=_CLOSED)
+    if has_keys and options.camera_port is not None and only in (None, "world"):
+        exposure.warn_of_pictures([options.host])
     with loudness(quiet, verbose):
         if only is None:
             live_screen.run_all(options)
         else:
-            live_screen.run_one(only, options, which)
+            live_screen.run_one(only, options, number)
 
 
+@asks(
+    scenario=(
+        Annotated[
+            str | None, Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help=_SCENARIO)
+        ],
+        None,
+    ),
+    port=PAGE["port"],
+    host=PAGE["host"],
+    links=(
+        choice(*LINKS, help="As the scenario models them, or sockets that others join."),
+        "modelled",
+    ),
+    dva_port=(count("With real links: port of the DVA; 0: any.", **_PORT), 0),
+    dva=(text("Show what runs at this DVA; SCENARIO gives the plan.", metavar=_ADDRESS), None),
+    keys=(folder("With --dva: keys, one of a control room, from `dva-sim keys`."), None),
+    phones=(flag("--phones", "An address for phones, by https, with a QR code."), False),
+    phones_host=(
+        text("Address of this machine to listen on for phones.", metavar="HOST", of=str),
+        "0.0.0.0",
+    ),
+    phones_port=(
+        count("Port for phones; 0: any that is free.", metavar="PORT", most=65_535),
+        8766,
+    ),
+    no_open=PAGE["no_open"],
+    no_token=PAGE["no_token"],
+    results=(folder("Show the recordings of a study, worst first, and its report."), None),
+    record=(file("Keep the run as a file: .mcap, for replay."), None),
+    audit=(file("Keep who did what: .sqlite; an existing log is appended to."), None),
+    out=(folder("Keep tables of what people did there.", "-o", "--out"), None),
+    keep_motion=(folder("Keep the motion of phones there whose person agrees."), None),
+    overwrite=(Overwrite, False),
+    **RUN,
+)
 def console(
-    scenario: Annotated[
-        str | None,
-        Argument(
-            metavar="SCENARIO",
-            autocompletion=SCENARIOS,
-            help="A scenario by name or path; hands-on if none is named.",
-        ),
-    ] = None,
-    port: Port = 8765,
-    host: Host = "127.0.0.1",
-    links: Annotated[
-        str, choice(*LINKS, help="As the scenario models them, or sockets that others join.")
-    ] = "modelled",
-    dva_port: Annotated[
-        int, count("With real links: port of the DVA; 0: any.", metavar="PORT", most=_MOST_PORT)
-    ] = 0,
-    dva: Annotated[
-        str | None,
-        Option(metavar="HOST:PORT", help="Show what runs at this DVA; SCENARIO gives the plan."),
-    ] = None,
-    keys: Annotated[
-        Path | None, folder("With --dva: keys, one of a control room, from `dva-sim keys`.")
-    ] = None,
-    phones: Annotated[
-        bool, Option("--phones", help="An address for phones, by https, with a QR code.")
-    ] = False,
-    phones_host: Annotated[
-        str, Option(metavar="HOST", help="Address of this machine to listen on for phones.")
-    ] = "0.0.0.0",
-    phones_port: Annotated[
-        int, count("Port for phones; 0: any that is free.", metavar="PORT", most=65_535)
-    ] = 8766,
-    no_open: NoOpen = False,
-    no_token: NoToken = False,
-    results: Annotated[
-        Path | None, folder("Show the recordings of a study, worst first, and its report.")
-    ] = None,
-    record: Annotated[Path | None, file("Keep the run as a file: .mcap, for replay.")] = None,
-    audit: Annotated[
-        Path | None, file("Keep who did what: .sqlite; an existing log is appended to.")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        Option("-o", "--out", metavar="FOLDER", help="Keep tables of what people did there."),
-    ] = None,
-    keep_motion: Annotated[
-        Path | None, folder("Keep the motion of phones there whose person agrees.")
-    ] = None,
-    overwrite: Overwrite = False,
-    seed: RunSeed = 1,
-    set_: Sets = None,
+    scenario: str | None,
+    dva: str | None,
+    keys: Path | None,
+    no_open: bool,
+    no_token: bool,
+    results: Path | None,
+    out: Path | None,
+    set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    **asked: Any,
 ) -> None:
     """Drive a scenario's robots in real time, on a page in the browser.
 
@@ -262,8 +223,9 @@ def console(
         dva-sim console --phones  # prints an address to be scanned by a phone
         dva-sim console --results results/mine  # recordings of a study, the worst first
     """
+    host, changes = asked["host"], tuple(set_ or ())
+    page = {"host": host, "port": asked["port"], "open": not no_open, "token": not no_token}
     if results is not None:
-        page = {"host": host, "port": port, "open": not no_open, "token": not no_token}
         with loudness(quiet, verbose):
             _show_replay(results=results, **page)
         return
@@ -274,87 +236,61 @@ def console(
     from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
     from dva_sim.experiments.study.scenario_mistakes import mistakes_of  # late: start-up
 
-    changes = tuple(set_ or ())
     if dva is not None:
-        own = {"--links": links != "modelled", "--phones": phones, "--record": record, "-o": out}
+        own = {"--links": asked["links"] != "modelled", "--phones": asked["phones"]}
+        own |= {"--record": asked["record"], "-o": out}
         refuse_with_dva([name for name, given in own.items() if given])
         where = AttachOptions(
-            dva=dva,
-            keys=keys,
-            scenario=scenario,
-            changes=changes,
-            audit=audit,
-            host=host,
-            port=port,
-            token=not no_token,
-            open=not no_open,
+            dva=dva, keys=keys, scenario=scenario, changes=changes, audit=asked["audit"], **page
         )
         where.check()
         exposure.warn_of_pages([host], has_token=where.token)
-        exposure.warn_of_devices(
-            [where.listen], has_keys=keys is not None, close_by="--keys FOLDER closes it"
-        )
+        exposure.warn_of_devices([where.listen], has_keys=keys is not None, close_by=_CLOSED)
         attach(where, _say_at_once)
         return
     if keys is not None:
         raise ConfigError("--keys is for --dva: devices of a console encrypt nothing")
     options = ConsoleOptions(
-        scenario=scenario or DEFAULT,
-        seed=seed,
-        changes=changes,
-        host=host,
-        port=port,
-        token=not no_token,
-        phones=phones,
-        phones_host=phones_host,
-        phones_port=phones_port,
-        links=links,
-        dva_port=dva_port,
-        open=not no_open,
-        record=record,
-        audit=audit,
-        results=out,
-        keep_motion=keep_motion,
-        overwrite=overwrite,
+        scenario=scenario or DEFAULT, changes=changes, results=out, **asked | page
     )
-    pages = [host, *([phones_host] if phones else [])]
+    pages = [host, *([options.phones_host] if options.phones else [])]
     exposure.warn_of_pages(pages, has_token=options.token)
     exposure.warn_of_devices(
-        [host] if links == "real" else [], has_keys=False, close_by="--host 127.0.0.1 closes it"
+        [host] if options.links == "real" else [],
+        has_keys=False,
+        close_by="--host 127.0.0.1 closes it",
     )
-    with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), seed):
+    with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), options.seed):
         ConsoleSupervisor(options, _say_at_once).run()
 
 
+@asks(
+    profile=(
+        Annotated[
+            str, Argument(metavar="PROFILE", autocompletion=ROBOTS, help="A robot by name or path.")
+        ],
+        "servrobot",
+    ),
+    dva=(
+        text("Register there at once, and listen; else from the page.", metavar=_ADDRESS),
+        None,
+    ),
+    number=(count("Which robot it is, which says its id and label.", least=1, most=1000), 1),
+    listen=(count("Port at which it takes requests; 0: any.", **_PORT), 0),
+    port=PAGE["port"],
+    host=PAGE["host"],
+    keys=(folder("Keys of the devices, as by `dva-sim keys`."), None),
+    no_open=PAGE["no_open"],
+    no_token=PAGE["no_token"],
+    **RUN,
+)
 def robot(
-    profile: Annotated[
-        str, Argument(metavar="PROFILE", autocompletion=ROBOTS, help="A robot by name or path.")
-    ] = "servrobot",
-    dva: Annotated[
-        str | None,
-        Option(metavar="HOST:PORT", help="Register there at once, and listen; else from the page."),
-    ] = None,
-    number: Annotated[
-        int, count("Which robot it is, which says its id and label.", least=1, most=1000)
-    ] = 1,
-    listen: Annotated[
-        int, count("Port at which it takes requests; 0: any.", metavar="PORT", most=_MOST_PORT)
-    ] = 0,
-    port: Annotated[
-        int, count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535)
-    ] = 8765,
-    host: Annotated[
-        str, Option(metavar="HOST", help="Address of this machine to listen on.")
-    ] = "127.0.0.1",
-    keys: Annotated[Path | None, folder("Keys of the devices, as by `dva-sim keys`.")] = None,
-    no_open: Annotated[bool, Option("--no-open", help="Open no browser.")] = False,
-    no_token: Annotated[
-        bool, Option("--no-token", help="Let everybody in who reaches the page.")
-    ] = False,
-    seed: RunSeed = 1,
-    set_: Sets = None,
+    no_open: bool,
+    no_token: bool,
+    set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    **asked: Any,
 ) -> None:
     """Run one simulated robot over sockets, with its windows.
 
@@ -368,21 +304,9 @@ def robot(
     from dva_sim.cli import exposure  # late: start-up
     from dva_sim.console.alone.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
 
-    options = RobotOptions(
-        profile=profile,
-        number=number,
-        dva=dva,
-        listen=listen,
-        port=port,
-        host=host,
-        keys=keys,
-        open=not no_open,
-        token=not no_token,
-        seed=seed,
-        changes=tuple(set_ or ()),
-    )
-    exposure.warn_of_pages([host], has_token=options.token)
-    exposure.warn_of_devices([host], has_keys=keys is not None, close_by="--keys FOLDER closes it")
+    options = RobotOptions(open=not no_open, token=not no_token, changes=tuple(set_ or ()), **asked)
+    exposure.warn_of_pages([options.host], has_token=options.token)
+    exposure.warn_of_devices([options.host], has_keys=options.keys is not None, close_by=_CLOSED)
     with loudness(quiet, verbose):
         RobotSimulator(options, _say_at_once).run()
 

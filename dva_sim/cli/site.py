@@ -6,37 +6,29 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Argument, Option
+from typer import Argument
 
-from dva_sim.cli.options import SITES, count
+from dva_sim.cli.options import REQUIRED, SITES, asks, count, file, flag, several
 from dva_sim.kernel.errors import ConfigError
 
 if TYPE_CHECKING:
     from dva_sim.worlds.site import Site
 
-SiteName = Annotated[
-    str,
-    Argument(
-        metavar="SITE",
-        autocompletion=SITES,
-        help="A site by name or path, or a ROS map by path.",
-    ),
-]
-SiteSets = Annotated[
-    list[str] | None,
-    Option("--set", metavar="KEY=VALUE", help="An option of a generated site."),
-]
+_NAMED = Argument(
+    metavar="SITE", autocompletion=SITES, help="A site by name or path, or a ROS map by path."
+)
+_NAME = Annotated[str, _NAMED], REQUIRED
+_CHANGES = several("An option of a generated site.", "KEY=VALUE", "--set"), ()
 
 
-def show(
-    name: SiteName,
-    out: Annotated[
-        Path | None, Option("-o", "--out", metavar="FILE", help="Picture; default: NAME.png.")
-    ] = None,
-    set_: SiteSets = None,
-    coverage: Annotated[bool, Option("--coverage", help="Show where Wi-Fi is not good.")] = False,
-    width: Annotated[int, count("Of the picture.", metavar="PIXELS", least=200, most=8000)] = 1650,
-) -> None:
+@asks(
+    name=_NAME,
+    out=(file("Picture; default: NAME.png.", "-o", "--out"), None),
+    set_=_CHANGES,
+    coverage=(flag("--coverage", "Show where Wi-Fi is not good."), False),
+    width=(count("Of the picture.", metavar="PIXELS", least=200, most=8000), 1650),
+)
+def show(name: str, out: Path | None, set_: list[str], coverage: bool, width: int) -> None:
     """Draw a site and say in a line what it is.
 
     Examples:
@@ -45,17 +37,18 @@ def show(
     """
     from dva_sim.worlds.view import write_poster  # late: start-up
 
-    site = _open(name, set_ or [])
+    site = _open(name, set_)
     file = out or Path(f"{Path(name).stem}.png")
     write_poster(site, file, coverage, width)
     print(f"{describe(site)}\n{file}")
 
 
-def export(
-    name: SiteName,
-    out: Annotated[Path, Option("-o", "--out", metavar="FOLDER", help="Where to.")] = Path(),
-    set_: SiteSets = None,
-) -> None:
+@asks(
+    name=_NAME,
+    out=(file("Where to.", "-o", "--out", metavar="FOLDER", of=Path), Path()),
+    set_=_CHANGES,
+)
+def export(name: str, out: Path, set_: list[str]) -> None:
     """Write a site as YAML and GeoJSON, to go on drawing.
 
     Examples:
@@ -63,7 +56,7 @@ def export(
     """
     from dva_sim.worlds.site_export import write_site  # late: start-up
 
-    site = _open(name, set_ or [])
+    site = _open(name, set_)
     print(f"{describe(site)}\n{write_site(site, out)}")
 
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
-from typer import Option
 
 from dva_sim import api
-from dva_sim.cli.options import Jobs, Quiet, Verbose, takes
+from dva_sim.cli.options import Jobs, Quiet, Verbose, asks, file, flag, takes
 from dva_sim.cli.verbosity import loudness
 
 
-def demo(
-    out: Annotated[
-        Path,
-        Option("-o", "--out", metavar="FOLDER", help="Where pictures, film and report go."),
-    ] = Path("results/demo"),
-    jobs: Jobs = None,
-) -> None:
+@asks(
+    out=(
+        file("Where pictures, film and report go.", "-o", "--out", metavar="FOLDER", of=Path),
+        Path("results/demo"),
+    ),
+    jobs=(Jobs, None),
+)
+def demo(out: Path, jobs: int | None) -> None:
     """See in about a minute what delay and a messaging pattern do.
 
     It shows one drive under two patterns, as a picture, a story and a film, then runs the small
@@ -35,12 +35,8 @@ def demo(
 
 
 @takes(api.run, but=("progress", "report"))
-def run(
-    dry_run: Annotated[bool, Option("--dry-run", help="Only say what would run.")] = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    **asked: Any,
-) -> None:
+@asks(dry_run=(flag("--dry-run", "Only say what would run."), False))
+def run(dry_run: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
     """Run a study, or go on with it, and write its report.
 
     A study that was interrupted goes on where it stopped: finished runs are kept in its folder.
