@@ -1,11 +1,10 @@
 """Figures of a validation: what is simulated beside what was published, with its bands.
 
-First what is exact (delayed loops, the dissertation's median), then the experiments, then all.
+First all published lines at once, then each experiment; what is exact stands in the tables.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +15,7 @@ from dva_sim.experiments.report.figures.palette import FAINT, INK, SOFT
 from dva_sim.experiments.report.figures.style import Drawn, panels, styled
 from dva_sim.simulation.task.movement_laws import FittedLine, fit_line
 from dva_sim.validation.frame import captioned
-from dva_sim.validation.operators import app_filters, control_loops
 from dva_sim.validation.operators import experiments as of
-from dva_sim.validation.operators.exact import SMITH
 from dva_sim.validation.operators.trials import Cells, Floats, Trials, mean, person_means
 from dva_sim.validation.operators.verdicts import LineVerdict
 
@@ -29,73 +26,6 @@ if TYPE_CHECKING:
 TIME = "movement_time_s"
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
 _RING: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": ORANGE, "ms": 9, "mew": 1.5, "ls": ""}
-_SHARES = {0.85: GREEN, 1.0: INK, 1.15: ORANGE}  # of the critical value
-_SHOWN = 24  # delays
-
-
-def _loops() -> Drawn:
-    figure, [axes] = panels(1, 3, 2.7)
-    _around(axes[0], control_loops.integrator, math.pi / 2, "Cursor: gain x delay")
-    _around(axes[1], control_loops.pure_pursuit, 0.5205, "Pursuit: speed x delay / look-ahead")
-    axes[0].set_ylabel("error, first one = 1")
-    _smith(axes[2])
-    return captioned(figure, "loops")
-
-
-def _around(axes: Axes, loop: control_loops.Loop, critical: float, title: str) -> None:
-    """Errors over time for values around the critical one."""
-    times = np.arange(1, _SHOWN * control_loops.STEPS + 1) / control_loops.STEPS
-    for share, colour in reversed(_SHARES.items()):
-        errors = np.array(loop(share * critical))[: len(times)]
-        axes.plot(times, errors / abs(errors[0]), color=colour, lw=1.3, label=f"{share:g}")
-    axes.set(ylim=(-4.2, 4.2), title=title, xlabel="time [delays]")
-    below = (0.5, -0.22)  # where it hides no curve
-    title = "share of the critical value"
-    axes.legend(loc="upper center", bbox_to_anchor=below, ncols=3, fontsize=8, title=title)
-
-
-def _smith(axes: Axes) -> None:
-    gain, delay, at = SMITH
-    places = np.array(control_loops.smith_response(gain, delay, 2.0))
-    times = np.arange(1, len(places) + 1) * delay / control_loops.SMITH_STEPS
-    theory = np.where(times > delay, 1.0 - np.exp(-gain * (times - delay)), 0.0)
-    axes.plot(times, theory, color=SOFT, lw=4, alpha=0.35, label="theory")
-    axes.plot(times, places, color=BLUE, lw=1.3, label="simulated")
-    axes.plot([at], [0.982], **_RING, label="published")
-    axes.set(title="Smith predictor: step", xlabel="time [s]")
-    axes.legend(loc="lower right", fontsize=8)
-
-
-def _median() -> Drawn:
-    figure, [axes] = panels(1, 2, 2.7, width_ratios=[2.2, 1])
-    steps, ages = axes
-    levels, look = np.array(app_filters.STEP_LEVELS), app_filters.STEP_LOOK
-    steps.plot(
-        np.arange(len(levels)) / app_filters.RATE, levels, color=SOFT, lw=1.2, label="asked for"
-    )
-    for name, colour in ((app_filters.COPY, BLUE), (app_filters.IN_PLACE, ORANGE)):
-        outputs = app_filters.step_outputs(name)
-        times = look * np.arange(1, len(outputs) + 1)
-        steps.step(times, outputs, where="post", color=colour, lw=1.8, label=name)
-    steps.set(
-        xlabel="time [s]", ylabel="speed level", title="Longest delay 0.2 s: frozen, and ratcheting"
-    )
-    steps.legend(loc="center right", fontsize=8)
-    _ages(ages)
-    return captioned(figure, "median")
-
-
-def _ages(axes: Axes) -> None:
-    bands = {"clean": (0.44, 0.50), "stale": (0.485, 0.545)}
-    for place, (name, age) in enumerate(app_filters.ages().items()):
-        low, high = bands[name]
-        axes.bar([place], [high - low], 0.7, bottom=low, color=SOFT, alpha=0.25, lw=0)
-        axes.plot([place], [age], "o", color=BLUE, ms=7)
-        axes.text(place + 0.12, age, f"{age:.3f}", va="center", fontsize=8)
-    axes.set_xticks([0, 1], ["fresh slots\nonly", "3 stale\nslots"])
-    axes.set(
-        xlim=(-0.6, 1.8), ylim=(0.40, 0.58), ylabel="mean age [s]", title="Age, longest delay 0.5 s"
-    )
 
 
 def by(trials: Trials, key: str) -> tuple[Floats, Floats]:
@@ -359,7 +289,7 @@ _LIMIT = 1.6  # half widths of the band shown; what is further off stands at the
 def draw_all(verdicts: Sequence[LineVerdict], played: Mapping[str, Cells]) -> list[Drawn]:
     """Every figure."""
     with styled():
-        return [_overview(verdicts), *draw_people(verdicts, played), _loops(), _median()]
+        return [_overview(verdicts), *draw_people(verdicts, played)]
 
 
 def _overview(verdicts: Sequence[LineVerdict]) -> Drawn:

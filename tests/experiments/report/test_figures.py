@@ -17,7 +17,7 @@ from dva_sim.experiments.report.figures.commands import CommandAge, CommandRate
 from dva_sim.experiments.report.figures.cut_bars import fit_to
 from dva_sim.experiments.report.figures.delay_budget import DelayBudget, stages_of
 from dva_sim.experiments.report.figures.distribution import Distributions
-from dva_sim.experiments.report.figures.effect import Differences, Levels, _band, _possible
+from dva_sim.experiments.report.figures.effect import Differences, _band, _possible
 from dva_sim.experiments.report.figures.factorial import FactorialEffects
 from dva_sim.experiments.report.figures.heat_map import HeatMap
 from dva_sim.experiments.report.figures.legend import apart, columns_of
@@ -330,13 +330,12 @@ def joined(axes):
 @blank
 def test_lines_lead_over_equal_steps_and_never_where_their_slope_would_mean_nothing(view):
     uneven = replace(view, contrast=("req-rep", "latest-wins"))
-    for kind in (Differences, Levels):
-        with styled():
-            axes = [
-                kind().draw(v, NOTHING_ELSE).figure.axes[0]
-                for v in (of_steps(view), uneven, of_links(view, 6))
-            ]
-        assert [len(joined(ax)) > 0 for ax in axes] == [True, False, False]
+    with styled():
+        axes = [
+            Differences().draw(v, NOTHING_ELSE).figure.axes[0]
+            for v in (of_steps(view), uneven, of_links(view, 6))
+        ]
+    assert [len(joined(ax)) > 0 for ax in axes] == [True, False, False]
     means = (0.0, 1.0, 2.0)
     for delays, leads in (((0.0, 0.5, 1.0), True), ((0.0, 0.1, 1.0), False)):
         ax = drawn_answer(answered(means, levels=delays)).figure.axes[0]
@@ -407,11 +406,10 @@ def test_a_bar_that_is_cut_has_an_arrow_head_and_its_true_bound_at_the_edge():
 
 
 @blank
-@pytest.mark.parametrize("figure", [Differences, Levels])
-def test_bands_of_two_persons_are_cut_with_their_bounds(view, figure):
+def test_bands_of_two_persons_are_cut_with_their_bounds(view):
     asked = replace(view, contrast=("req-rep", "latest-wins"), possible=(0.0, 300.0))
     with styled():
-        drawn = figure().draw(asked, NOTHING_ELSE)
+        drawn = Differences().draw(asked, NOTHING_ELSE)
     (ax, *_), rows = drawn.figure.axes, drawn.csv.decode().splitlines()
     heads = [h for h in ax.lines if len(h.get_xdata()) == 1 and h.get_label() == ASIDE]
     bounds = [rows[0].split(",").index(f"band_{end}_s") for end in ("low", "high")]

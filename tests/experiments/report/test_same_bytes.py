@@ -100,7 +100,7 @@ def contest(folder):
 
 
 KINDS = {
-    *("distributions", "differences", "levels", "heat_map", "factorial_effects", "robustness"),
+    *("distributions", "differences", "heat_map", "factorial_effects", "robustness"),
     *("delay_budget", "command_age", "command_rate", "tradeoff", "trajectories", "story_times"),
     *("time_lapse_typical", "time_lapse_worst", "story_outcomes", "endings", "scatter", "sobol"),
     *("answer", "trade", "stages", "fates", "way", "percentiles", "burden", "brought", "taken"),

@@ -1,16 +1,15 @@
-"""What the factor does to the measure: paired differences, and the measure itself."""
+"""What the factor does to the measure: paired differences of its levels."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dva_sim.experiments.analysis.answer import too_few
-from dva_sim.experiments.analysis.run_grid import Floats, Setting, person_means, present
+from dva_sim.experiments.analysis.run_grid import Floats, present
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import style
 from dva_sim.experiments.report.figures.cadence_line import boundary, cadences, mark_boundary
@@ -21,7 +20,7 @@ from dva_sim.experiments.report.figures.palette import FAINT, INK, PAPER, Look, 
 from dva_sim.experiments.report.prose import caption
 from dva_sim.experiments.study.parts import Level
 from dva_sim.kernel.wording import capital
-from dva_sim.simulation.labels import factor_name, level_name, measure_name
+from dva_sim.simulation.labels import level_name, measure_name
 from dva_sim.statistics import Band, band
 
 if TYPE_CHECKING:
@@ -50,16 +49,9 @@ class Differences(style.ReportFigure):
         there = cadences(view, reading.scenario_of(view.part.name))
         baseline = view.contrast[1]
         others = tuple(level for level in view.lines if level != baseline)
-
-        def curve(panel: Setting, level: Level) -> Floats:
-            return view.difference(panel, level, baseline)
-
         name = level_name(view.line.name, baseline)
         label = style.axis_label(view.measure, f"Difference against\n{name}")
-        limit = view.widest
-        figure, axes, ends, bars, cut, numbers = _curves(
-            view, others, curve, label, (-limit, limit), home=0.0
-        )
+        figure, axes, ends, bars, cut, numbers = _curves(view, others, baseline, label)
         for ax, found in zip(axes, there, strict=True):
             ax.axhline(0, color=INK, lw=0.8, zorder=1)
             mark_boundary(ax, view.over, found, text=True)
@@ -78,37 +70,6 @@ class Differences(style.ReportFigure):
         return self.finish(figure, words, numbers, title=title, reads=reads)
 
 
-class Levels(style.ReportFigure):
-    """The measure itself along x, a line for each level."""
-
-    name = "levels"
-    title = "The measure under each level"
-    pages = ("driving",)
-    has_panels = True
-
-    def applies(self, view: StudyView, reading: Reading) -> bool:
-        """Also, something must vary."""
-        return super().applies(view, reading) and bool(view.line or view.over)
-
-    def draw(self, view: StudyView, reading: Reading) -> style.Drawn | None:
-        """Draw it."""
-        grid = view.values
-
-        def curve(panel: Setting, level: Level) -> Floats:
-            return person_means(view.curve(grid, panel, level))
-
-        what = capital(_what(view))
-        label = style.axis_label(view.measure, style.wrapped(what))
-        limits = (-view.widest, view.widest) if _in_excess(view) else view.possible
-        figure, axes, ends, bars, cut, numbers = _curves(view, view.lines, curve, label, limits)
-        mark_cuts(bars)
-        _name(view, view.lines, figure, axes, ends)
-        words = caption("levels", in_excess=_in_excess(view))
-        reads = (_intervals_words(view), style.hatch_words(view), cut, _few_words(reading))
-        title = f"{what} under each {factor_name(view.line.name)}" if view.line else what
-        return self.finish(figure, words, numbers, title=title, reads=reads)
-
-
 def _few_words(reading: Reading) -> str:
     """That what cannot be told is no evidence, where nothing else was found."""
     found = getattr(reading, "told", None)
@@ -119,36 +80,29 @@ def _few_words(reading: Reading) -> str:
 
 
 def _curves(
-    view: StudyView,
-    lines: tuple[Level, ...],
-    curve: Callable[[Setting, Level], Floats],
-    ylabel: str,
-    limits: tuple[float, float],
-    home: float = math.nan,
+    view: StudyView, lines: tuple[Level, ...], baseline: Level, ylabel: str
 ) -> tuple[Figure, list[Axes], list[Ends], list[Bars], str, Numbers]:
     """A panel for each setting, in it a line with its band for each level, and where it ends.
 
     Args:
         view: How the part is looked at.
         lines: Levels drawn.
-        curve: Means of persons `(persons, stops)` for each panel and level.
+        baseline: The level that they are compared with.
         ylabel: Of what.
-        limits: Least and greatest value that are possible; bands end there.
-        home: A value that must be seen, such as zero.
 
     Returns:
         The figure, its axes, the end of each line, the bars, what a caption must say of those
         that are cut, and the numbers drawn.
     """
     figure, axes = style.panel_grid(view, 3.4)
-    look, every, seen, numbers = looks(view.line), [], [np.array([home])], Numbers()
+    look, every, seen, numbers = looks(view.line), [], [np.zeros(1)], Numbers()
     bars: list[Bars] = []
     draw = _band if style.has_lines(view) else _points
     for ax, panel in zip(axes, view.shown, strict=True):
         ends: Ends = {}
         for level, shift in _side_by_side(view, lines):
-            matrix = curve(panel, level)
-            bands = _possible(band(matrix), *limits)
+            matrix = view.difference(panel, level, baseline)
+            bands = _possible(band(matrix), -view.widest, view.widest)
             seen.append(matrix.ravel())
             ends[level] = draw(ax, bands, look[level], shift)
             at = _places(bands, shift)
@@ -251,9 +205,6 @@ def _band(ax: Axes, bands: Band, look: Look, shift: float) -> float:
     return float(seen[-1]) if len(seen) else float("nan")
 
 
-def _in_excess(view: StudyView) -> bool:
-    return view.part.has_reference(view.measure)
-
-
 def _what(view: StudyView) -> str:
-    return f"{'excess ' if _in_excess(view) else ''}{measure_name(view.measure)}"
+    in_excess = view.part.has_reference(view.measure)
+    return f"{'excess ' if in_excess else ''}{measure_name(view.measure)}"

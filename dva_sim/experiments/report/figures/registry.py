@@ -40,7 +40,6 @@ SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
     answer_figure.AnswerFigure,
     distribution.Distributions,
     effect.Differences,
-    effect.Levels,
     heat_map.HeatMap,
     factorial.FactorialEffects,
     scatter.Scatter,
