@@ -52,12 +52,13 @@ def _check_link(names: Sequence[str], options: Sequence[str]) -> ExitCode:
     Raises:
         EmulatorError: there is none here: why, and what there is instead.
     """
+    from dva_sim.network.emulator.needs import EmulatorError  # late: start-up
     from dva_sim.validation.network.real_side import cell, self_check  # late: start-up
 
     if names or options:
         raise ConfigError("check link: there is one link, without names and options")
     if why := cell.why_no_packets():
-        raise cell.EmulatorError(f"{why}; {OFFER}")
+        raise EmulatorError(f"{why}; {OFFER}")
     findings = self_check.check_link()
     for finding in findings:
         print(finding)

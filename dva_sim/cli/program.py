@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn
 import typer
 
 from dva_sim import __version__
-from dva_sim.cli import files, results, runs, site, studies
+from dva_sim.cli import files, link, results, runs, site, studies
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
@@ -98,9 +98,10 @@ class DvaSimProgram(PanelGroup):
     panels: ClassVar[Panels] = {
         "Studies": _named(studies.demo, studies.run, studies.new, studies.register, studies.tune),
         "Results": _named(results.report, results.show, results.export, results.compare),
-        "Single runs": _named(
-            runs.episode, runs.replay, runs.live, runs.console, runs.robot, runs.keys
-        ),
+        "Single runs": {
+            **_named(runs.episode, runs.replay, runs.live, runs.console),
+            **_named(runs.robot, link.link, runs.keys),
+        },
         "Names, files and evidence": {
             **_named(files.list_, files.plugins, files.check, files.phone_log),
             **_named(files.schema, files.validate),

@@ -38,6 +38,7 @@ COMMANDS = {
     "phone-log": f"phone-log {NOBODY}",
     **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate")},
     "robot": f"robot {NOBODY}",
+    "link": f"link {NOBODY} --near true --far true",
 }
 PREFIX = "start-up: "
 REPEATS = 3

@@ -209,7 +209,7 @@ def test_runs_that_failed_are_told_on_standard_error_however_quiet(tmp_path, mon
 @pytest.mark.parametrize(
     ("line", "found"),
     [
-        ("dva-sim li", {"list", "live"}),
+        ("dva-sim li", {"link", "list", "live"}),
         ("dva-sim run req", {"req-rep-vs-pub-sub"}),
         ("dva-sim episode fire", {"fire-drill"}),
         ("dva-sim episode tasks/fitts", {"tasks/fitts-lag", "tasks/fitts-tilt"}),

@@ -21,8 +21,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+CLONE_NEWNS = 0x00020000
 CLONE_NEWUSER = 0x10000000
+CLONE_NEWPID = 0x20000000
 CLONE_NEWNET = 0x40000000
+_MS_NOSUID, _MS_NODEV, _MS_NOEXEC, _MS_REC, _MS_SLAVE = 0x2, 0x4, 0x8, 0x4000, 0x80000
 _PR_SET_PDEATHSIG = 1
 _PR_SET_TIMERSLACK = 29
 
@@ -62,11 +65,71 @@ def become_root_of_a_user_namespace() -> None:
     Raises:
         OSError: forbidden here.
     """
-    user, group = os.getuid(), os.getgid()
-    _check(_libc().unshare(CLONE_NEWUSER | CLONE_NEWNET), "a user namespace")
-    Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
-    Path("/proc/self/uid_map").write_text(f"0 {user} 1", encoding="ascii")
-    Path("/proc/self/gid_map").write_text(f"0 {group} 1", encoding="ascii")
+    _enter_user_namespace(0, 0, CLONE_NEWNET)
+
+
+def become_user(user: int, group: int) -> None:
+    """Be called by these numbers again, after having become root of a user namespace.
+
+    Raises:
+        OSError: forbidden here.
+    """
+    if (user, group) != (os.getuid(), os.getgid()):
+        _enter_user_namespace(user, group)
+
+
+def _enter_user_namespace(user: int, group: int, more: int = 0) -> None:
+    """Be called by these numbers in a new user namespace, and have what more is named."""
+    before = os.getuid(), os.getgid()
+    _check(_libc().unshare(CLONE_NEWUSER | more), "a user namespace")
+    try:
+        Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
+        Path("/proc/self/uid_map").write_text(f"{user} {before[0]} 1", encoding="ascii")
+        Path("/proc/self/gid_map").write_text(f"{group} {before[1]} 1", encoding="ascii")
+    except OSError as error:
+        raise OSError(error.errno, f"a user's number is refused: {error.strerror}") from None
+
+
+def join_namespace(file: int, kind: int) -> None:
+    """Enter the namespace behind an open file of `/proc/PID/ns`.
+
+    Raises:
+        OSError: forbidden here.
+    """
+    _check(_libc().setns(file, kind), "entering a namespace")
+
+
+def separate_children() -> None:
+    """Let the next child be the first of new process and mount namespaces.
+
+    All processes of such a namespace are killed when its first one ends.
+
+    Raises:
+        OSError: forbidden here.
+    """
+    _check(_libc().unshare(CLONE_NEWPID | CLONE_NEWNS), "a process namespace")
+
+
+def show_own_processes() -> None:
+    """Let `/proc` show the processes of this namespace, where that is allowed; some containers
+    forbid it, and their `/proc` stays.
+    """
+    flags = _MS_NOSUID | _MS_NODEV | _MS_NOEXEC
+    if _libc().mount(None, b"/", None, _MS_REC | _MS_SLAVE, None) == 0:
+        _libc().mount(b"proc", b"/proc", b"proc", flags, None)
+
+
+def die_with_maker(alive: int) -> None:
+    """Like `die_with_parent`, in a process namespace that the parent is not part of.
+
+    Args:
+        alive: Reading end of a pipe that the parent alone can write to.
+    """
+    _check(_libc().prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0), "to die with the parent")
+    os.set_blocking(alive, False)
+    with suppress(BlockingIOError):
+        if os.read(alive, 1) == b"":
+            os._exit(1)
 
 
 def die_with_parent(parent: int) -> None:
@@ -99,7 +162,8 @@ def _check(result: int, what: str) -> None:
 
 
 MTU = 1500
-_NAME = b"link"
+_TUN, _NAME = "/dev/net/tun", b"link"
+_TX_DROP = 11  # column of /proc/net/dev
 _TUNSETIFF = 0x400454CA
 _IFF_TUN, _IFF_NO_PI = 0x0001, 0x1000
 _IFF_UP, _IFF_RUNNING = 0x1, 0x40
@@ -142,8 +206,11 @@ def open_tun(end: End, congestion: str) -> int:
     Raises:
         OSError: there is no such device, it is forbidden, or the kernel has no such control.
     """
-    tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
-    fcntl.ioctl(tun, _TUNSETIFF, struct.pack("16sH22x", _NAME, _IFF_TUN | _IFF_NO_PI))
+    try:
+        tun = os.open(_TUN, os.O_RDWR | os.O_NONBLOCK)
+        fcntl.ioctl(tun, _TUNSETIFF, struct.pack("16sH22x", _NAME, _IFF_TUN | _IFF_NO_PI))
+    except OSError as error:
+        raise OSError(error.errno, f"{_TUN} is refused: {error.strerror}") from None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
         fcntl.ioctl(control, _SIOCSIFADDR, _address(end.address))
         fcntl.ioctl(control, _SIOCSIFNETMASK, _address("255.255.255.255"))
@@ -151,6 +218,32 @@ def open_tun(end: End, congestion: str) -> int:
         index = fcntl.ioctl(control, _SIOCGIFINDEX, struct.pack("16s24x", _NAME))
     _add_route(end.peer, struct.unpack_from("i", index, 16)[0], congestion)
     return tun
+
+
+def raise_loopback() -> None:
+    """Let the loopback device of this namespace carry packets.
+
+    Raises:
+        OSError: forbidden here.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        fcntl.ioctl(control, _SIOCSIFFLAGS, struct.pack("16sH22x", b"lo", _IFF_UP | _IFF_RUNNING))
+
+
+class DroppedPackets:
+    """Packets that the kernel dropped because nobody read them from the device in time.
+
+    It belongs to the namespace in which it was made.
+    """
+
+    def __init__(self) -> None:
+        self._file = os.open("/proc/thread-self/net/dev", os.O_RDONLY)
+
+    def count(self) -> int:
+        """Return how many there were so far."""
+        lines = os.pread(self._file, 65_536, 0).splitlines()
+        counts = next(line for line in lines if line.strip().startswith(_NAME + b":"))
+        return int(counts.partition(b":")[2].split()[_TX_DROP])
 
 
 def _address(text: str) -> bytes:

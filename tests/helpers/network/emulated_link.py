@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from helpers.processes.patience import PATIENCE_S, becomes
 
-from dva_sim.validation.network.real_side.cell import EmulatedJob, EmulatorError, run_job
+from dva_sim.network.emulator.needs import EmulatorError
+from dva_sim.validation.network.real_side.cell import EmulatedJob, run_job
 
 
 @cache

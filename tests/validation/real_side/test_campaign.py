@@ -3,9 +3,10 @@ from collections.abc import Callable
 import pytest
 from helpers.wording import unnamed
 
+from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.real_side import measuring
-from dva_sim.validation.network.real_side.cell import EmulatedJob, EmulatedOutcome, EmulatorError
+from dva_sim.validation.network.real_side.cell import EmulatedJob, EmulatedOutcome
 from dva_sim.validation.network.real_side.measuring import (
     COLUMNS,
     Progress,

@@ -5,11 +5,11 @@ import pytest
 
 from dva_sim.cli.checks import check
 from dva_sim.network.emulator.forwarder import links_of
+from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.losses import Bursts
 from dva_sim.network.pattern_runs import UNLIMITED_BPS
 from dva_sim.validation.network.real_side import cell, self_check
-from dva_sim.validation.network.real_side.cell import EmulatorError
 from dva_sim.validation.network.real_side.self_check import (
     PROBES,
     Crossing,

@@ -15,11 +15,11 @@ from helpers.network.emulated_link import all_end, need_link, networks, wait_for
 from helpers.processes.patience import becomes
 from helpers.wording import unnamed
 
+from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.pattern_runs import Condition
 from dva_sim.validation.network.real_side.cell import (
     EmulatedJob,
     EmulatedOutcome,
-    EmulatorError,
     run_job,
     start_job,
     why_no_packets,

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
+from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.pattern_runs import Condition
-from dva_sim.validation.network.real_side.cell import EmulatorError
 from dva_sim.validation.network.real_side.measuring import measure
 
 CONDITION = Condition("req", 20, timeout_ms=2500, attempts=3, delay_ms=50, dur_s=1, warm_s=0)

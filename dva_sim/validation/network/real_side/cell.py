@@ -25,7 +25,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import IO, Any
 
-from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.emulator import linux_calls
 from dva_sim.network.emulator.forwarder import (
     FORWARDER_PRIORITY,
@@ -34,6 +33,7 @@ from dva_sim.network.emulator.forwarder import (
     links_of,
 )
 from dva_sim.network.emulator.linux_calls import FAR_END, NEAR_END, End, open_tun
+from dva_sim.network.emulator.needs import NEEDS, EmulatorError
 from dva_sim.network.emulator.relay import Proxy
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
@@ -317,14 +317,6 @@ def _programs(job: EmulatedJob) -> tuple[Program, Program]:
 
 
 _SLACK_S = 30.0  # for starting and ending the processes
-NEEDS = (
-    "needs Linux, /dev/net/tun open for reading and writing, and network namespaces "
-    "(as root, or where unprivileged user namespaces are allowed)"
-)
-
-
-class EmulatorError(DvaSimError):
-    """A run on the emulated link came to nothing; another one may succeed."""
 
 
 def run_job(job: EmulatedJob) -> EmulatedOutcome:

@@ -28,12 +28,12 @@ import zmq
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import derive_seed
+from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.pattern_runs import EMULATOR_RESULTS, RESULTS, Condition, RunLog, measure_log
 from dva_sim.validation.network.real_side.cell import (
     PACKETS,
     EmulatedJob,
     EmulatedOutcome,
-    EmulatorError,
     refuse_for_proxy,
     run_job,
 )

@@ -1,0 +1,85 @@
+"""The command that runs any two programs over an emulated link."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Argument, Option
+
+from dva_sim.cli.options import SCENARIOS, Overwrite, Quiet, RunSeed, Sets
+from dva_sim.kernel.errors import ConfigError
+
+
+def link(
+    file: Annotated[
+        str | None,
+        Argument(
+            metavar="LINK.yaml",
+            autocompletion=SCENARIOS,
+            help="Keys of a link, or a scenario, whose link is taken; default: a fast one.",
+        ),
+    ] = None,
+    near: Annotated[
+        str, Option(metavar="CMD", help="Command at one end; when it ends, all ends.")
+    ] = "",
+    far: Annotated[str, Option(metavar="CMD", help="Command at the other end.")] = "",
+    set_: Sets = None,
+    seed: RunSeed = 1,
+    out: Annotated[
+        Path | None,
+        Option(
+            "-o", "--out", metavar="PATH", help="Keep the counts: X.csv, or a folder for link.csv."
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run any two programs over a link you choose.
+
+    Each command runs in the shell, in a network of its own. The two networks are joined by an
+    emulated link, and by nothing else: no internet, no name server, and not this machine. Both
+    commands find the addresses of the two ends in DVA_LINK_NEAR and DVA_LINK_FAR. What they print
+    passes through.
+
+    The link has the keys of a scenario's link: delay_s, jitter_s, loss, bursts, rate_bps,
+    queue_packets, outages, trace_up and others. `up` holds what is different from near to far,
+    `down` from far to near. The same seed loses and delays the same packets, counted from the
+    first; bursts, outages and recordings go by the time since the start.
+
+    The exit code is that of the near command. At its end, or with Ctrl-C, everything that either
+    command has started is ended. Then standard error tells how many packets passed, were lost and
+    waited, and how late the emulator itself was: a run that it disturbed is marked.
+
+    It needs Linux, /dev/net/tun, and root or user namespaces.
+
+    Examples:
+        dva-sim link --set delay_s=0.1 --near 'ping $DVA_LINK_FAR' --far 'sleep 9'  # a slow link
+        dva-sim link bad.yaml --near ./client.py --far ./server.py -o run.csv  # keep the counts
+        dva-sim link --set up.loss=0.1 --near ./client.py --far ./server.py  # losses one way
+    """
+    from dva_sim.cli import link_counts  # late: start-up
+    from dva_sim.kernel.config_overrides import parse_changes, set_by  # late: start-up
+    from dva_sim.network.emulator.forwarder import FAR, NEAR, links_of  # late: start-up
+    from dva_sim.network.emulator.pair import run_pair  # late: start-up
+    from dva_sim.network.emulator.process import LinkProcess  # late: start-up
+    from dva_sim.network.link.files import read_link  # late: start-up
+
+    for name, command in (("--near", near), ("--far", far)):
+        if not command.strip():
+            raise ConfigError(f"{name} needs a command, such as {name} 'ping $DVA_LINK_NEAR'")
+    pairs = tuple(set_ or ())
+    try:
+        config = read_link(file, parse_changes(pairs), (NEAR, FAR))
+    except ConfigError as error:
+        raise set_by(pairs, error) from None
+    links_of(config, seed)  # files that the link names are read before anything starts
+    files = link_counts.files_of(out, overwrite)
+    with LinkProcess(config, seed) as joined:
+        outcome = run_pair(joined, near, far, link_counts.tell)
+    if not quiet:
+        link_counts.tell_report(outcome.report)
+    for path, text in files.items():
+        link_counts.keep(path, text(outcome.report, seed))
+    raise typer.Exit(outcome.code)

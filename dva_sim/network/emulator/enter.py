@@ -1,0 +1,114 @@
+"""Runs a program at one end of an emulated link, and ends with all that the program has started.
+
+The program gets a process namespace of its own, whose first process waits for it here. When that
+one ends, the kernel kills all others in it, those that have left their session or ignore signals
+among them; and it ends with the program, with this process, or with the parent of this process,
+whichever is first. Signals for this process go to all processes of the program. Little is imported,
+since each program waits for it.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+from typing import NoReturn
+
+from dva_sim.network.emulator import linux_calls
+
+KILL_ALL = signal.SIGUSR1
+"""Asks for an end of all processes of the program, at once."""
+
+_PASSED_ON = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+_NONE = "-"
+_BY_SIGNAL = 128  # exit codes of programs that a signal has ended, as shells give them
+
+
+def words_of(user_space: int | None, network: int, program: list[str]) -> list[str]:
+    """The command line that runs a program in namespaces, given by their open files."""
+    user = _NONE if user_space is None else str(user_space)
+    parent, numbers = str(os.getpid()), [str(os.getuid()), str(os.getgid())]
+    # -P: a file of the user that is called like a module of Python is not imported.
+    words = [sys.executable, "-P", "-m", __name__, parent, *numbers, user, str(network)]
+    return [*words, *program]
+
+
+def main(parent: int, user: int, group: int, spaces: tuple[str, str], program: list[str]) -> int:
+    """Enter the namespaces and run the program; its exit code.
+
+    Args:
+        parent: Process that started this one.
+        user: Number that the user is called by.
+        group: Number that the user's group is called by.
+        spaces: Open files of the user namespace, or `-`, and of the network namespace.
+        program: Words of the command.
+    """
+    kinds = (linux_calls.CLONE_NEWUSER, linux_calls.CLONE_NEWNET)
+    for space, kind in zip(spaces, kinds, strict=True):
+        if space != _NONE:
+            linux_calls.join_namespace(int(space), kind)
+            os.close(int(space))
+    linux_calls.die_with_parent(parent)
+    linux_calls.separate_children()
+    alive, writing = os.pipe()
+    signal.pthread_sigmask(signal.SIG_BLOCK, (*_PASSED_ON, KILL_ALL))
+    first = os.fork()
+    if first == 0:
+        os.close(writing)
+        _wait_for_program(alive, user, group, program)
+    for number in _PASSED_ON:
+        signal.signal(number, lambda number, _: os.kill(first, number))
+    signal.signal(KILL_ALL, lambda *_: os.kill(first, signal.SIGKILL))
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (*_PASSED_ON, KILL_ALL))
+    return _code_of(os.waitpid(first, 0)[1])
+
+
+def _wait_for_program(alive: int, user: int, group: int, program: list[str]) -> NoReturn:
+    """Be the first process of the namespace until the program has ended."""
+    code = 1
+    try:
+        linux_calls.die_with_maker(alive)
+        linux_calls.show_own_processes()
+        started = os.fork()
+        if started == 0:
+            _become(program, user, group)
+        for number in _PASSED_ON:
+            signal.signal(number, _pass_on)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, (*_PASSED_ON, KILL_ALL))
+        while (ended := os.wait())[0] != started:
+            pass
+        code = _code_of(ended[1])
+    finally:
+        os._exit(code)
+
+
+def _pass_on(number: int, frame: FrameType | None) -> None:
+    """Send a signal to every process of this namespace but this one."""
+    try:
+        os.kill(-1, number)
+    except ProcessLookupError:
+        return
+
+
+def _become(program: list[str], user: int, group: int) -> NoReturn:
+    """Make the program of this process, with users and signals as it expects them."""
+    for number in (*_PASSED_ON, signal.SIGPIPE, signal.SIGXFSZ):
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    try:
+        linux_calls.become_user(user, group)
+        os.execvp(program[0], program)
+    except OSError as error:
+        print(f"error: {program[0]} cannot be started: {error.strerror}", file=sys.stderr)
+        os._exit(127)
+
+
+def _code_of(status: int) -> int:
+    code = os.waitstatus_to_exitcode(status)
+    return code if code >= 0 else _BY_SIGNAL - code
+
+
+if __name__ == "__main__":
+    _, _parent, _user, _group, _space, _network, *_words = sys.argv
+    sys.exit(main(int(_parent), int(_user), int(_group), (_space, _network), _words))

@@ -1,0 +1,152 @@
+"""Two commands at the ends of an emulated link, from their start to the last kill.
+
+The link lasts until the near command ends; then the far one is ended. An end is asked for by
+signals first, and enforced after a moment, so that nothing of either command is left behind.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+
+from dva_sim.network.emulator.enter import KILL_ALL
+from dva_sim.network.emulator.forwarder import FAR, NEAR
+from dva_sim.network.emulator.needs import EmulatorError
+from dva_sim.network.emulator.process import LinkProcess
+from dva_sim.network.emulator.report import LinkReport
+
+GRACE_S = 2.0  # for a command to end by itself once a signal has asked it to
+_PATIENCE_S = 10.0  # for the kernel to end what does not
+_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+Tell = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class PairOutcome:
+    """Results of two commands over a link.
+
+    Attributes:
+        code: Exit code of the near command; 128 and the number of the signal that ended it.
+        report: The packets of the link.
+    """
+
+    code: int
+    report: LinkReport
+
+
+def run_pair(link: LinkProcess, near: str, far: str, tell: Tell) -> PairOutcome:
+    """Run two commands by the shell until the near one ends, or a signal asks for the end.
+
+    SIGINT, SIGTERM and SIGHUP go to both commands; a second one ends them at once.
+
+    Args:
+        link: Joins them.
+        near: Command whose end is the end; it reads the standard input.
+        far: Command that is ended then.
+        tell: Takes a line that should be read at once.
+
+    Raises:
+        EmulatorError: there is no shell.
+        LinkEnded: the link has ended by itself; so have both commands.
+    """
+    if shutil.which("sh") is None:
+        raise EmulatorError("the commands need a shell: there is no `sh` on the PATH")
+    with ExitStack() as at_end:
+        signals = at_end.enter_context(_caught_signals())
+        link.begin()
+        commands = {}
+        for end, command, stdin in ((FAR, far, subprocess.DEVNULL), (NEAR, near, None)):
+            process = link.start(end, ["sh", "-c", command], stdin=stdin)
+            at_end.callback(_end, process, 0.0)
+            commands[end] = _Command(end, process)
+            at_end.callback(os.close, commands[end].ended)
+        grace = _wait_for(commands[NEAR], commands[FAR], link, signals, tell)
+        code = _end(commands[NEAR].process, 0.0)
+        _end(commands[FAR].process, grace)
+        return PairOutcome(code, link.report())
+
+
+class _Command:
+    """A command that runs.
+
+    Attributes:
+        ended: File descriptor that becomes readable when it ends.
+    """
+
+    def __init__(self, name: str, process: subprocess.Popen[bytes]) -> None:
+        self.name, self.process, self.ended = name, process, os.pidfd_open(process.pid)
+
+
+def _wait_for(
+    near: _Command, far: _Command, link: LinkProcess, signals: socket.socket, tell: Tell
+) -> float:
+    """Wait until the near command has ended, or has to be; for how long the far one may go on [s].
+
+    Raises:
+        LinkEnded: the link has ended by itself.
+    """
+    watched: list[int] = [near.ended, far.ended, link.fileno(), signals.fileno()]
+    deadline: float | None = None
+    while True:
+        left = None if deadline is None else max(0.0, deadline - time.monotonic())
+        ready = select.select(watched, [], [], left)[0]
+        if link.fileno() in ready:
+            raise link.ended()
+        if near.ended in ready or not ready:
+            return GRACE_S if deadline is None else max(0.0, deadline - time.monotonic())
+        if far.ended in ready:
+            watched.remove(far.ended)
+            if code := far.process.wait():
+                tell(f"the far command has ended with exit code {code}")
+        if signals.fileno() in ready:
+            asked = signals.recv(64)
+            if deadline is not None or len(asked) > 1:
+                return 0.0
+            for command in (near, far):
+                with suppress(ProcessLookupError):
+                    command.process.send_signal(asked[0])
+            deadline = time.monotonic() + GRACE_S
+
+
+def _end(process: subprocess.Popen[bytes], grace: float) -> int:
+    """End a command with all that it has started; its exit code."""
+    asks = ((signal.SIGTERM, grace),) if grace else ()
+    for number, patience in (*asks, (KILL_ALL, _PATIENCE_S)):
+        if process.poll() is None:
+            process.send_signal(number)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(patience)
+    process.kill()  # not of any use unless the machine is so busy that patience has ended
+    return process.wait()
+
+
+@contextmanager
+def _caught_signals() -> Iterator[socket.socket]:
+    """A socket that gives the number of each signal that would end this process, as a byte.
+
+    Signals that are ignored, as SIGHUP by `nohup`, stay so.
+    """
+    reads, writes = socket.socketpair()
+    writes.setblocking(False)
+
+    def note(number: int, _: object) -> None:
+        with suppress(BlockingIOError):
+            writes.send(bytes([number]))
+
+    heard = [n for n in _SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, note) for number in heard}
+    with reads, writes:
+        try:
+            yield reads
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)

@@ -1,0 +1,109 @@
+"""What `dva-sim link` refuses, and how it tells and keeps what became of the packets."""
+
+import csv
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from helpers.wording import unnamed
+
+from dva_sim.cli import link_counts
+from dva_sim.cli.program import call
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.emulator.forwarder import links_of
+from dva_sim.network.emulator.report import DirectionReport, Durations, LinkFlow, LinkReport
+from dva_sim.network.link import LinkConfig
+from dva_sim.network.link.files import read_link
+
+ENDS = ("near", "far")
+CALM = LinkReport(
+    up=DirectionReport(10, 7, 700, 1, 1, 1, *(0.1, 0.2, 0.3)),
+    down=LinkFlow(links_of(LinkConfig(), 1)[1], waits=Durations()).report(),
+    late_p50_s=0.0001,
+    late_p99_s=0.002,
+    late_max_s=0.0123456789,
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["--near", "true"], ("--far",)),
+        (["--near", "true", "--far", " "], ("--far",)),
+        (["--near", "a", "--far", "b", "--set", "delay=1"], ("delay_s", "--set delay=1")),
+        (["--near", "a", "--far", "b", "--set", "up.loss=2"], ("up.loss", "0.9")),
+        (["--near", "a", "--far", "b", "--set", "trace_up=none.trace"], ("none.trace",)),
+        (["none.yaml", "--near", "a", "--far", "b"], ("none.yaml",)),
+        (["bad.yaml", "--near", "a", "--far", "b"], ("bad.yaml:2:3", "up.delay", "delay_s")),
+        (["--near", "a", "--far", "b", "-o", "counts.txt"], ("counts.txt", ".csv")),
+        (["--near", "a", "--far", "b", "-o", "kept.csv"], ("kept.csv", "--overwrite")),
+        (["--near", "a", "--far", "b", "-o", "kept.csv/x.csv"], ("kept.csv",)),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line_before_anything_starts(
+    words, names, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    Path("bad.yaml").write_text("up:\n  delay: 0.1\n")
+    Path("kept.csv").write_text("kept")
+    assert call(["link", *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert not unnamed(line, *names)
+
+
+def test_a_system_without_namespaces_is_named(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "platform", "plan9")
+    assert call(["link", "--near", "true", "--far", "true"]) == 2
+    assert not unnamed(capsys.readouterr().err, "Linux", "/dev/net/tun", "plan9")
+
+
+def test_a_link_is_read_from_its_keys_or_from_a_scenario(tmp_path):
+    (tmp_path / "link.yaml").write_text("delay_s: 0.2\nup: {loss: 0.1}\n")
+    (tmp_path / "run.yaml").write_text("horizon_s: 60\nlink:\n  delay_s: 0.2\n  up: {loss: 0.1}\n")
+    given = LinkConfig.model_validate({"delay_s": 0.2, "up": {"loss": 0.1}})
+    for name in ("link.yaml", "run.yaml"):
+        assert read_link(str(tmp_path / name), {}, ENDS) == given
+    changed = read_link(str(tmp_path / "run.yaml"), {"up.loss": 0.3, "rate_bps": 1e6}, ENDS)
+    assert (changed.toward("up").loss, changed.toward("down").loss) == (0.3, 0.0)
+    assert read_link("drive-to-event", {}, ENDS) == read_link(None, {}, ENDS) == LinkConfig()
+
+
+def test_mistakes_are_told_at_their_place_in_a_scenario(tmp_path):
+    (tmp_path / "run.yaml").write_text(
+        "model: full\nlink:\n  partitions:\n    - {from_s: 0, for_s: 1, source: robot-1}\n"
+    )
+    with pytest.raises(ConfigError) as told:
+        read_link(str(tmp_path / "run.yaml"), {}, ENDS)
+    assert not unnamed(str(told.value), "run.yaml:3:3", "robot-1", "near", "far")
+
+
+def test_a_table_has_a_row_for_each_direction_and_says_what_its_columns_mean(tmp_path):
+    files = link_counts.files_of(tmp_path / "counts", overwrite=False)
+    for path, text in files.items():
+        link_counts.keep(path, text(CALM, 3))
+    with (tmp_path / "counts/link.csv").open(newline="") as file:
+        there, back = csv.DictReader(file)
+    assert (there["direction"], there["passed_packets"], there["lost_in_outage"]) == (
+        *("near to far", "7", "1"),
+    )
+    assert (back["passed_packets"], back["waited_p50_s"]) == ("0", "")
+    assert {row["late_max_s"] for row in (there, back)} == {"0.012346"}
+    assert (there["disturbed"], there["seed"]) == ("false", "3")
+    with (tmp_path / "counts/columns.csv").open(newline="") as file:
+        assert [row["column"] for row in csv.DictReader(file)] == list(there)
+    with pytest.raises(ConfigError, match="--overwrite"):
+        link_counts.files_of(tmp_path / "counts", overwrite=False)
+
+
+def test_a_disturbed_run_is_marked_in_words_and_in_the_table(tmp_path, capsys):
+    path = tmp_path / "late.csv"
+    for late in (replace(CALM, late_p99_s=0.0062), replace(CALM, overrun_packets=17)):
+        link_counts.tell_report(late)
+        (text,) = link_counts.files_of(path, overwrite=True).values()
+        link_counts.keep(path, text(late, 1))
+        assert [line.split(",")[-2] for line in path.read_text().splitlines()[-2:]] == ["true"] * 2
+    told = capsys.readouterr().err
+    assert not unnamed(told, "near to far: 7 packets", "3 lost", "disturbed", "6.2 ms", "17")
+    link_counts.tell_report(CALM)
+    assert "disturbed" not in capsys.readouterr().err
