@@ -14,12 +14,12 @@ from typing import Any, Protocol
 
 from dva_sim.agents.observation import FRAME, CameraFrame
 from dva_sim.agents.people.bystander import SAFE
+from dva_sim.cameras.lines import FrameLine
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.messaging import Subscription, Transport
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.scenario import Scenario
 
-Line = dict[str, Any]
 MOST_UNDER_WAY = 400  # frames of a robot
 BEYOND = 2.0  # how much farther than the camera's range people are drawn
 LEAST_SEEN = 25.0  # people are drawn so far away in any case [m]
@@ -60,7 +60,7 @@ class Screens:
         run: FilmedRun,
         screen: str,
         numbers: dict[str, int],
-        tell: Callable[[Line, int], object],
+        tell: Callable[[FrameLine, int], object],
     ) -> None:
         self._run, self._screen, self._numbers, self._tell = run, screen, numbers, tell
         self._taken: dict[str, OrderedDict[int, tuple[int, list[Any]]]] = {}
@@ -101,7 +101,7 @@ class Screens:
         while next(iter(taken)) != tick:
             taken.popitem(last=False)
         seen = frame.observation
-        line = {
+        line: FrameLine = {
             "k": "frame",
             "t": round(1000 * now),
             "robot": self._numbers[robot],

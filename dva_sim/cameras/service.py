@@ -10,9 +10,9 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from typing import Any
 
 from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
+from dva_sim.cameras.lines import FrameLine, contained_line, scene_line
 from dva_sim.cameras.screens import FilmedRun, OwnScreens, camera_url
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import LiveClock
@@ -21,8 +21,6 @@ from dva_sim.serving.listening import listen
 MODULE = "dva_sim.cameras"
 FLUSH = 0.02  # from one try to write what waits to the next [s]
 AGAIN_AFTER = 5.0  # from the end of a process that failed until another one may begin [s]
-
-Line = dict[str, Any]
 
 
 class CameraService:
@@ -79,7 +77,7 @@ class CameraService:
         child = self._child = Child("camera process", MODULE, words, [self._listener], PAINTED)
         self._clock.watch(child.pipe.fileno(), self._hear)
         scenario = self._run.scenario.model_dump(mode="json")
-        child.pipe.put({"k": "scene", "t": 0, "scenario": scenario, "seed": self._seed})
+        child.pipe.put(scene_line(scenario, self._seed))
         self._contained.clear()
         self._clock.every(FLUSH, lambda: self._flush(child))
 
@@ -113,10 +111,10 @@ class CameraService:
         for number, when in self._run.field.contained.items():
             if number not in self._contained:
                 self._contained.add(number)
-                self._child.pipe.put({"k": "contain", "t": round(1000 * when), "n": number})
+                self._child.pipe.put(contained_line(number, when))
         self._screens.look()
 
-    def _show(self, line: Line, robot: int) -> None:
+    def _show(self, line: FrameLine, robot: int) -> None:
         if self._child is not None:
             self._child.pipe.put(line, robot)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -210,7 +210,7 @@ class LineOutbox:
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def put(self, line: Line, key: object = None) -> None:
+    def put(self, line: Mapping[str, Any], key: object = None) -> None:
         """Add a line; `key` tells lines of one kind apart of which only the newest counts."""
         kind = str(line.get("k"))
         self._number += 1
@@ -249,7 +249,7 @@ class LinePipe(PipeEnd):
         self.outbox = LineOutbox(kinds)
         super().__init__(end, self.outbox.next)
 
-    def put(self, line: Line, key: object = None) -> None:
+    def put(self, line: Mapping[str, Any], key: object = None) -> None:
         """Write a line as soon as there is room; see `LineOutbox`."""
         if self.is_open:
             self.outbox.put(line, key)

@@ -9,6 +9,7 @@ from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.seats import DoneLine
 from dva_sim.network.addresses import check_address
 
 Line = dict[str, Any]
@@ -43,7 +44,7 @@ class RobotDesk:
         world.hold = lambda _: self._hands.stop(world.field.robots)
         world.clock.pulse(LOOK, self._hands.look_for_the_silent)
 
-    def _tell(self, answer: Line) -> None:
+    def _tell(self, answer: DoneLine) -> None:
         self._world.tell({**answer, "t": self._world.feed.now_ms})
         self._world.tell_now()
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Final
 
 from dva_sim.agents.observation import Cameras
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.lines import Show, scene_line
 from dva_sim.cameras.screens import OwnScreens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
@@ -24,8 +25,11 @@ from dva_sim.console.running.real_links import ConsoleSockets
 from dva_sim.console.running.recorder import ConsoleRecorder
 from dva_sim.console.shown.feed import Feed
 from dva_sim.console.shown.logs import Logs
+from dva_sim.console.shown.news import News, clock_shown
 from dva_sim.console.shown.scene import scene_of
 from dva_sim.console.wire.limits import LOG_PERIOD
+from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link.link import Link
@@ -39,12 +43,10 @@ from dva_sim.simulation.full.stage import Stage, id_of
 from dva_sim.simulation.full.team import TeamBuilder
 from dva_sim.simulation.scenario import Scenario
 
-Line = dict[str, Any]
-Tell = Callable[..., object]
-
 POSITIONS, WINDOWS, ROWS, TIDY = 0.1, 0.1, 0.5, 1.0  # from one line to the next, real time [s]
 SOON = 0.05  # from one look at what has changed to the next, real time [s]
-PAGES = "robots", "map", "audit"
+PAGES = ["robots", "map", "audit"]
+LINK: Final[LinkShown] = {"kind": "real", "processing_s": 0.0}
 
 
 class RobotWorld:
@@ -93,9 +95,9 @@ class RobotWorld:
             self.sockets.close()
             raise
         self.tell: Tell = lambda *_: None
-        self.show: Tell = lambda *_: None
+        self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
-        self.lag, self._newest = LagRule(), dict[str, Any]()
+        self.lag, self._news = LagRule(), News(lambda: self.tell)
         self.hold: Callable[[str], object] = lambda _: None
         self.clock.on_late = self._late
         self.audited: Audited | None = None
@@ -144,7 +146,7 @@ class RobotWorld:
             self.recorder, self.field.robots, *about, self.recorder.sent_at, self._lost
         )
         self.windows.by_id[id_tag].station = self.station
-        self.feed.things[self.feed.numbers[id_tag]] |= self.windows.about(id_tag)
+        self.feed.things.learn(id_tag, self.windows.about(id_tag))
         self.logs = Logs(
             self.network, lambda label: id_tag if label == robot.device.label else None
         )
@@ -185,12 +187,12 @@ class RobotWorld:
     def begin(self) -> None:
         """See `ConsoleSubject`."""
         scene = scene_of(
-            *(self.scenario, self.stage.site, (), self.feed.things),
+            *(self.scenario, self.stage.site, (), self.feed.things.all, LINK),
             name=f"robot {self.scenario.robot.profile}",
             seed=self.seed,
         )
-        link = {"kind": "real", "processing_s": 0.0}
-        self.tell(scene | {"link": link, "pages": PAGES})
+        scene["pages"] = PAGES
+        self.tell(scene)
         self.show_scene()
         self.clock.pulse(POSITIONS, self._tell_positions)
         self.clock.pulse(WINDOWS, self._tell_windows)
@@ -202,7 +204,7 @@ class RobotWorld:
     def show_scene(self) -> None:
         """See `ConsoleSubject`."""
         scenario = self.scenario.model_dump(mode="json")
-        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+        self.show(scene_line(scenario, self.seed))
 
     def note(self, text: str) -> None:
         """See `ConsoleSubject`."""
@@ -213,19 +215,12 @@ class RobotWorld:
     def tell_now(self) -> None:
         """How the robot is."""
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
-        clock = {
-            "factor": self.clock.factor,
-            "paused": self.clock.paused,
-            "lag_s": round(self.lag.newest, 3),
-            "given_up_s": round(self.clock.given_up, 2),
-            "held_by_lag": self.lag.held,
-        }
         self.tell(
             {
                 "k": "rows",
                 "t": self.feed.now_ms,
-                "clock": clock,
-                "link": {"kind": "real", "processing_s": 0.0},
+                "clock": clock_shown(self.clock, self.lag),
+                "link": LINK,
                 "dropped": self.dropped(),
                 "robots": self.feed.robots(self.lag.held),
                 "people": [],
@@ -234,7 +229,7 @@ class RobotWorld:
         )
 
     def _tell_positions(self) -> None:
-        self._tell_new(self.feed.positions())
+        self._news.tell(self.feed.positions())
 
     def _tell_windows(self) -> None:
         def stands(robot: RobotAgent) -> str:
@@ -243,22 +238,16 @@ class RobotWorld:
             return why_stands(robot, self.clock.now, self.lag.held)
 
         for line in self.windows.lines(self.screens.watched, stands):
-            self._tell_new(line)
+            self._news.tell(line)
 
     def _tell_news(self) -> None:
         for line in self.feed.story():
             self.tell(line)
         if self.audited is not None:
-            self._tell_new(self.audited.keeper.line(self.feed.now_ms))
+            self._news.tell(self.audited.keeper.line(self.feed.now_ms))
 
     def _tell_logs(self) -> None:
         for line in self.logs.batches():
-            self.tell(line)
-
-    def _tell_new(self, line: Line) -> None:
-        said = {name: value for name, value in line.items() if name != "t"}
-        if self._newest.get(line["k"]) != said:
-            self._newest[line["k"]] = said
             self.tell(line)
 
     def _late(self, behind: float) -> None:

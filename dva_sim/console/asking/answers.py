@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final, Unpack
 
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.seats import Answered, DoneLine
 from dva_sim.kernel.errors import DvaSimError
-
-Line = dict[str, Any]
 
 SAME: Final = 1.0  # an emergency stop by two paths is one, if they arrive within this [s]
 
@@ -27,14 +26,14 @@ class Answers:
     MOST = 1000
 
     def __init__(self) -> None:
-        self.given: dict[str, Line | None] = {}
+        self.given: dict[str, DoneLine | None] = {}
         self._at: dict[str, float] = {}  # when, real time [s]
 
     def once(
         self,
         number: str,
         do: Callable[[Said], object],
-        tell: Callable[[Line], object],
+        tell: Callable[[DoneLine], object],
         *,
         repeats: bool = False,
     ) -> None:
@@ -60,8 +59,8 @@ class Answers:
             del self.given[oldest]
             self._at.pop(oldest, None)
 
-        def said(ok: bool, text: str, /, **more: Any) -> None:
-            answer = {"k": "done", "id": number, "ok": ok, "text": text, **more}
+        def said(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
+            answer: DoneLine = {"k": "done", "id": number, "ok": ok, "text": text, **more}
             self.given[number], self._at[number] = answer, time.monotonic()
             tell(answer)
 

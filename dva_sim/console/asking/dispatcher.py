@@ -14,6 +14,7 @@ from dva_sim.console.asking.answers import Answers, answering
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, ActionPlace, Queueing
 from dva_sim.console.wire.kinds import BadMessage
+from dva_sim.console.wire.seats import DoneLine
 
 Line = dict[str, Any]
 Doer = Callable[[str, Line, Said], object]
@@ -68,7 +69,7 @@ class ActionDispatcher:
         self,
         place: ActionPlace,
         holders: Iterable[object],
-        tell: Callable[[Line], object],
+        tell: Callable[[DoneLine], object],
         elsewhere: str,
         audited: Callable[[], AuditedActions | None] = lambda: None,
     ) -> None:

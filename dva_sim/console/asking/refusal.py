@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol
+from typing import Final, Protocol, Unpack
+
+from dva_sim.console.wire.seats import Answered
 
 UNKNOWN: Final = "unknown"  # outcome of what may have been done or not: nobody has answered
 NO_ANSWER: Final = "the DVA does not answer"
@@ -11,7 +13,7 @@ NO_ANSWER: Final = "the DVA does not answer"
 class Said(Protocol):
     """Whoever waits for the answer to an action."""
 
-    def __call__(self, ok: bool, text: str, /, **more: Any) -> object:
+    def __call__(self, ok: bool, text: str, /, **more: Unpack[Answered]) -> object:
         """Told whether it was done, what there is to say of it, and what was asked for."""
 
 

@@ -12,6 +12,7 @@ from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.seats import DoneLine
 from dva_sim.protocol import messages as m
 
 Line = dict[str, Any]
@@ -47,7 +48,7 @@ class AttachedActions:
     def _watch(self, _: str, line: Line) -> None:
         self._pages.sensors.watch(line["robots"])
 
-    def _tell(self, answer: Line) -> None:
+    def _tell(self, answer: DoneLine) -> None:
         self._pages.tell({**answer, "t": self._system.now_ms})
 
     @does("release")

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.attached.lines import SILENT_AFTER
 from dva_sim.console.attached.system import AttachedSystem
+from dva_sim.console.wire.rows import RobotRow
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
-
-Line = dict[str, Any]
 
 
 class ToldFacts:
@@ -24,7 +22,7 @@ class ToldFacts:
     def __init__(self, system: AttachedSystem) -> None:
         self._system = system
 
-    def lost(self, robots: Sequence[Line]) -> Iterator[tuple[str, str]]:
+    def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
         """Robots of which nothing is heard since they were driven."""
         for told in self._system.told.devices.values():
             status = told.status

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
 from dva_sim.console.wire.actions import ACTIONS, Action, Audit
+from dva_sim.console.wire.seats import Answered
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
 
@@ -71,7 +72,7 @@ class AttachedAudit(Audited):
         number = str(line["id"])
         asked = self._asked[number] = AskedDecision(_action(what), line.get("event"))
 
-        def wait(ok: bool, text: str, /, **more: Any) -> None:
+        def wait(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             asked.finish = partial(told, ok, text, **more)
             if not ok or asked.record is not None:
                 asked.finish()

@@ -4,40 +4,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.console.attached.told import ToldDevice
 from dva_sim.console.dva.device_rows import link_of
 from dva_sim.console.running.lag import LIMIT
 from dva_sim.console.shown.feed import SEVERITIES
 from dva_sim.console.shown.scene import RULES, legend, site_of
-from dva_sim.console.shown.strangers import UNKNOWN_ROBOT, row_of_stranger
+from dva_sim.console.shown.strangers import row_of_stranger
+from dva_sim.console.shown.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
+from dva_sim.console.wire.events import EventFacts
+from dva_sim.console.wire.rows import DeviceRow, RobotRow
+from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.geo import GeoFrame
 from dva_sim.worlds.site import Site
 
-Line = dict[str, Any]
+LINK: Final[LinkShown] = {"kind": "attached", "processing_s": None}
 AROUND: Final = 40.0  # of the first position, where no site is known [m]
 UNKNOWN_ROOM: Final = "unknown room"  # where no site is known
 KINDS: Final = {ROBOT: "robot", GUARD: "guard"}
+BODIES: Final[Mapping[str, ThingBody]] = {"robot": UNKNOWN_ROBOT, "guard": UNKNOWN_PERSON}
 SILENT_AFTER: Final = 10.0  # without a place on the list: the DVA's own time-out [s]
 
 
-def things_of(devices: Iterable[ToldDevice], numbers: dict[str, int]) -> list[Line]:
+def things_of(devices: Iterable[ToldDevice], numbers: dict[str, int]) -> list[ThingShown]:
     """Everybody, with numbers that stay as they are."""
-    things = []
+    things: list[ThingShown] = []
     for told in devices:
         device = told.device
         kind = KINDS.get(device.device_type, "operator")
         number = numbers.setdefault(device.id_tag, len(numbers))
-        more = UNKNOWN_ROBOT if kind == "robot" else {"radius_m": 0.25}
-        thing = {"i": number, "id": device.id_tag, "label": device.label, "kind": kind}
-        things.append(thing | (more if kind != "operator" else {}))
+        body = BODIES.get(kind, {})
+        things.append(
+            {"i": number, "id": device.id_tag, "label": device.label, "kind": kind, **body}
+        )
     return things
 
 
-def scene_of_told(things: list[Line], address: str, site: Site | None, frame: GeoFrame) -> Line:
+def scene_of_told(
+    things: list[ThingShown], address: str, site: Site | None, frame: GeoFrame
+) -> SceneLine:
     """The first line that a page gets."""
     return {
         "k": "scene",
@@ -49,7 +57,7 @@ def scene_of_told(things: list[Line], address: str, site: Site | None, frame: Ge
         "site": site_of(site) if site is not None else nowhere(frame),
         "things": things,
         "patterns": [],
-        "link": link(),
+        "link": LINK,
         "link_limits": {},
         "pace_limits": [1.0, 1.0],
         "watchdog_s": None,
@@ -61,21 +69,19 @@ def scene_of_told(things: list[Line], address: str, site: Site | None, frame: Ge
     }
 
 
-def nowhere(frame: GeoFrame) -> Line:
+def nowhere(frame: GeoFrame) -> SiteShown:
     """A site of which nothing is known but where on earth it lies."""
-    origin = {"latitude_deg": frame.latitude, "longitude_deg": frame.longitude}
     return {
         "name": "unknown",
         "extent_m": [-AROUND, -AROUND, AROUND, AROUND],
-        "origin": origin,
+        "origin": {"latitude_deg": frame.latitude, "longitude_deg": frame.longitude},
         "features": {"type": "FeatureCollection", "features": []},
-        **{key: [] for key in ("rooms", "walls_m", "solids_m", "doors_m", "exits_m")},
+        "rooms": [],
+        "walls_m": [],
+        "solids_m": [],
+        "doors_m": [],
+        "exits_m": [],
     }
-
-
-def link() -> Line:
-    """How messages travel."""
-    return {"kind": "attached", "processing_s": None}
 
 
 def positions(
@@ -96,21 +102,20 @@ def positions(
     return rows
 
 
-def robot_row(told: ToldDevice, number: int, now: float) -> Line:
+def robot_row(told: ToldDevice, number: int, now: float) -> RobotRow:
     """A robot, as it says itself."""
     status, holder = told.status, told.holder
     known = status if isinstance(status, m.RobotStatus) else None
     said, since = holder if holder is not None else (None, now)
     held = said is not None and said.holder is not None
-    return row_of_stranger(
-        number,
-        known.mode if known is not None else "unknown",
-        holder=said.holder if said is not None else None,
-        holder_label=said.label if said is not None else None,
-        session_age_s=round(said.held_for + now - since, 1) if said and held else None,
-        camera=told.camera,
-        sensors=readings_of(told, now),
-    )
+    return {
+        **row_of_stranger(number, known.mode if known is not None else "unknown"),
+        "holder": said.holder if said is not None else None,
+        "holder_label": said.label if said is not None else None,
+        "session_age_s": round(said.held_for + now - since, 1) if said and held else None,
+        "camera": told.camera,
+        "sensors": readings_of(told, now),
+    }
 
 
 def sensors_of(told: ToldDevice) -> list[str]:
@@ -133,7 +138,7 @@ def _reading(sensor: m.Sensor, told: ToldDevice, now: float) -> str:
     return f"{value.values[0]:.3g}{unit}"
 
 
-def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> Line:
+def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) -> DeviceRow:
     """A device, as the DVA lists it and as it is heard here."""
     device, status, said = told.device, told.status, told.holder
     silent = now - told.listed > SILENT_AFTER
@@ -151,9 +156,12 @@ def device_row(told: ToldDevice, now: float, is_fake: bool, may_revoke: bool) ->
         "beats_hz": round(told.rate.of(told.beats, now), 2),
         "link": None if is_fake or heard is None else link_of(heard, silent),
         "fake": is_fake,
-        **dict.fromkeys(
-            ("round_trip_s", "commands_hz", "refused", "picture_age_s", "level", "ends_s")
-        ),
+        "round_trip_s": None,
+        "commands_hz": None,
+        "refused": None,
+        "picture_age_s": None,
+        "level": None,
+        "ends_s": None,
         "holder": holder.holder if holder is not None else None,
         "holder_label": (holder.label if holder is not None else None) or "",
         "holder_known": holder is not None or device.device_type != ROBOT,
@@ -169,7 +177,7 @@ def event_row(
     labels: Mapping[str, str],
     site: Site | None,
     frame: GeoFrame,
-) -> Line:
+) -> EventFacts:
     """An event, as the DVA tells it."""
     x, y = frame.to_xy(status.position.latitude, status.position.longitude)
     sent = dict.fromkeys((status.responder, status.operator, status.actor))

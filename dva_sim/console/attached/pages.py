@@ -6,8 +6,9 @@ While the DVA does not answer, what it last said stays shown, with a word that s
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
+from dva_sim.cameras.lines import Show
 from dva_sim.console.attached import lines
 from dva_sim.console.attached.alarm_facts import ToldFacts
 from dva_sim.console.attached.audit import AttachedAudit
@@ -16,15 +17,18 @@ from dva_sim.console.attached.sensing import ToldSensors
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.events.alarm_desk import AlarmDesk
-from dva_sim.console.events.decisions import about_event, dispatch_line
+from dva_sim.console.events.decisions import about_event, dispatch_shown
+from dva_sim.console.running.lag import LagRule
+from dva_sim.console.shown.feed import story_of
+from dva_sim.console.shown.news import News, clock_shown
+from dva_sim.console.wire.events import EventShown
+from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.rows import DoingShown, RobotRow, ServerShown
 from dva_sim.core.registry import ROBOT
-from dva_sim.kernel.recorder import Moment
 from dva_sim.protocol import messages as m
 
-Line = dict[str, Any]
-Tell = Callable[..., object]
-
 POSITIONS, ROWS, DEVICES, SOON = 0.2, 0.5, 1.0, 0.1  # from one line to the next, real time [s]
+NEVER_LATE: Final = LagRule()  # nothing runs here that could be
 FIRST_SCENE: Final = 1.5  # so long a position is waited for, where no site is known [s]
 
 
@@ -46,14 +50,14 @@ class AttachedPages:
     def __init__(self, system: AttachedSystem, audit: AuditKeeper) -> None:
         self.system, self.clock = system, system.clock
         self.tell: Tell = lambda *_: None
-        self.show: Tell = lambda *_: None
+        self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self.looked, self.people = False, AttachedPeople()
         self.sensors = ToldSensors(system.device, system.told, system.id_of)
         self.alarms = AlarmDesk(ToldFacts(system))
         self.audited = AttachedAudit(audit, system, self.people.author)
         system.on_record = self.audited.heard
-        self._answers, self._newest, self._is_shown = False, dict[str, Any](), False
+        self._answers, self._news, self._is_shown = False, News(lambda: self.tell), False
         system.on_devices = self._tell_scene
 
     # --- see `ConsoleSubject` --------------------------------------------------------------
@@ -98,7 +102,7 @@ class AttachedPages:
             self._tell_scene()
         if self._is_shown:
             rows = lines.positions(system.told.devices, system.numbers, system.frame)
-            self._tell_new({"k": "pos", "t": system.now_ms, "p": rows})
+            self._news.tell({"k": "pos", "t": system.now_ms, "p": rows})
 
     def _tell_rows(self) -> None:
         system = self.system
@@ -106,13 +110,12 @@ class AttachedPages:
             self._answers = system.answers
             word = "answers" if self._answers else "does not answer: what is shown is old"
             system.recorder.tell(self.clock.now, "dva", word, "link")
-        clock = {"factor": 1, "paused": False, "lag_s": 0, "given_up_s": 0, "held_by_lag": False}
         self.tell(
             {
                 "k": "rows",
                 "t": system.now_ms,
-                "clock": clock,
-                "link": lines.link(),
+                "clock": clock_shown(self.clock, NEVER_LATE),
+                "link": lines.LINK,
                 "dropped": self.dropped(),
                 "server": self._server(),
                 "robots": self._robots(),
@@ -126,9 +129,9 @@ class AttachedPages:
         system, now_ms = self.system, self.system.now_ms
         is_known = system.is_told and system.answers
         known = self.alarms.look(self._events(), [], now_ms) if is_known else None
-        self._tell_new(known or self.alarms.hold(now_ms))
+        self._news.tell(known or self.alarms.hold(now_ms))
 
-    def _robots(self) -> list[Line]:
+    def _robots(self) -> list[RobotRow]:
         now, numbers = self.clock.now, self.system.numbers
         return [
             lines.robot_row(told, numbers[id_tag], now)
@@ -136,7 +139,7 @@ class AttachedPages:
             if told.device.device_type == ROBOT and id_tag in numbers
         ]
 
-    def _people(self) -> list[Line]:
+    def _people(self) -> list[DoingShown]:
         numbers = self.system.numbers
         return [
             {"i": numbers[id_tag], "doing": told.status.activity}
@@ -144,31 +147,39 @@ class AttachedPages:
             if isinstance(told.status, m.PersonStatus) and id_tag in numbers
         ]
 
-    def _server(self) -> Line:
+    def _server(self) -> ServerShown:
         system = self.system
-        told: Line = {"listens": system.answers, "address": system.options.dva, "port": None}
-        return told | {"modelled": False, "own": False, "role": system.role}
+        return {
+            "listens": system.answers,
+            "address": system.options.dva,
+            "port": None,
+            "modelled": False,
+            "own": False,
+            "role": system.role,
+        }
 
     def _tell_news(self) -> None:
         """Events, how orders are given, and the story, as soon as they change."""
         system, now_ms = self.system, self.system.now_ms
         if system.is_told:
-            self._tell_new({"k": "events", "t": now_ms, "events": self._events()})
-        dispatch = dispatch_line(system.agent.dispatch, 0.0)
+            self._news.tell({"k": "events", "t": now_ms, "events": self._events()})
+        dispatch = dispatch_shown(system.agent.dispatch, 0.0)
         rooms = self.people.lines(system.role)
-        self._tell_new({"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms})
-        self._tell_new(self.audited.keeper.line(now_ms))
-        moments, system.recorder.timeline = system.recorder.timeline, list[Moment]()
-        for time, who, what, kind in moments:
-            line = {"k": "story", "t": round(1000 * time), "who": who, "what": what}
-            self.tell(line | {"kind": kind})
+        self._news.tell({"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms})
+        self._news.tell(self.audited.keeper.line(now_ms))
+        for line in story_of(system.recorder):
+            self.tell(line)
 
-    def _events(self) -> list[Line]:
+    def _events(self) -> list[EventShown]:
         system, agent = self.system, self.system.agent
         labels = {i: told.device.label for i, told in system.told.devices.items()}
         return [
-            lines.event_row(status, agent.told_at[number], labels, system.site, system.frame)
-            | about_event(agent.events, agent.told_at, number)
+            {
+                **lines.event_row(
+                    *(status, agent.told_at[number], labels, system.site, system.frame)
+                ),
+                **about_event(agent.events, agent.told_at, number),
+            }
             for number, status in sorted(agent.events.items())
         ]
 
@@ -180,10 +191,3 @@ class AttachedPages:
                 for id_tag, told in self.system.told.devices.items()
             ]
             self.tell({"k": "devices", "t": self.system.now_ms, "devices": rows})
-
-    def _tell_new(self, line: Line) -> None:
-        """Tell a line unless nothing in it has changed, its time apart."""
-        said = {name: value for name, value in line.items() if name != "t"}
-        if self._newest.get(line["k"]) != said:
-            self._newest[line["k"]] = said
-            self.tell(line)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dva_sim.console.audit.audited import name_of_page
+from dva_sim.console.wire.events import RoomEntry
 from dva_sim.core.roles import ControlRoomRole
 
-Line = dict[str, Any]
 Named = tuple[str, ControlRoomRole]
 
 
@@ -42,7 +40,7 @@ class AttachedPeople:
         known = self.by_client.get(client)
         return name_of_page(client) if known is None else known[0]
 
-    def lines(self, allowed: str) -> list[Line]:
+    def lines(self, allowed: str) -> list[RoomEntry]:
         """Who decides, with what both the DVA and the address of the page allow."""
         most = ControlRoomRole(allowed)
         return [

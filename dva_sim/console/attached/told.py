@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.device import HEARTBEAT, HOLDER, STATUS, AgentDevice
 from dva_sim.core.registry import GUARD, ROBOT
@@ -13,7 +13,6 @@ from dva_sim.live.parts import Rate
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-Line = dict[str, Any]
 FORGET_AFTER: Final = 60.0  # without being on the list [s]
 TOPICS: Final = {ROBOT: (HEARTBEAT, STATUS, HOLDER), GUARD: (HEARTBEAT, STATUS)}
 

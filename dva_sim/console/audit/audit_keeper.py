@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+from dva_sim.console.wire.events import AuditLine
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import (
@@ -114,11 +115,17 @@ class AuditKeeper:
         """`then` is told when all that was put so far is on the disk, or why it is not yet."""
         self._asked.put((None, then))
 
-    def line(self, now_ms: int) -> dict[str, Any]:
+    def line(self, now_ms: int) -> AuditLine:
         """How the log stands, for pages."""
-        stands = {"rows": self.number, "hash": self.head, "problem": self.problem}
-        where = {"lasting": self.is_lasting, "file": str(self.path) if self.is_lasting else ""}
-        return {"k": "audit", "t": now_ms, **stands, **where}
+        return {
+            "k": "audit",
+            "t": now_ms,
+            "rows": self.number,
+            "hash": self.head,
+            "problem": self.problem,
+            "lasting": self.is_lasting,
+            "file": str(self.path) if self.is_lasting else "",
+        }
 
     # --- in the world's thread ------------------------------------------------------------------
 

@@ -6,11 +6,12 @@ An answer to a page waits until its row is on the disk. Whatever only stops some
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.wire.actions import ACTIONS, Action, Audit
+from dva_sim.console.wire.seats import Answered
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.audit_log import AuditEntry
@@ -52,7 +53,7 @@ class Audited:
         if self.keeper.problem and not action.stops:
             raise Refused(f"{self.keeper.problem}; nothing is done until it can be")
 
-        def told(ok: bool, text: str, /, **more: Any) -> None:
+        def told(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             if self.is_noted(action):
                 outcome = more.get("outcome", DONE if ok else REFUSED)
                 self._note(what, client, line, outcome, text)

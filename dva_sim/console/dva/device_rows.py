@@ -6,15 +6,16 @@ import math
 import statistics
 from collections.abc import Collection
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.device import HEARTBEAT_PERIOD
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.wire.rows import DeviceRow
 from dva_sim.core.registry import DETECTOR, DeviceEntry
+from dva_sim.core.sessions import Grant
 from dva_sim.live.parts import Rate
 from dva_sim.simulation.full.run import Run
 
-Line = dict[str, Any]
 MOST_ROWS: Final = 200
 FAIR, POOR = 2.5 * HEARTBEAT_PERIOD, 4 * HEARTBEAT_PERIOD  # without a word [s]
 
@@ -40,7 +41,7 @@ class DeviceRows:
         self._beats: dict[str, Rate] = {}
         self._commands: dict[str, Rate] = {}
 
-    def rows(self, fakes: Collection[str]) -> list[Line]:
+    def rows(self, fakes: Collection[str]) -> list[DeviceRow]:
         """A row for each, those that are there first; to be asked for once a second.
 
         Args:
@@ -51,9 +52,11 @@ class DeviceRows:
         self._beats = {i: self._beats.get(i) or Rate() for i in first}
         return [self._row(i, entries[i], i in fakes) for i in self._beats]
 
-    def _row(self, id_tag: str, entry: DeviceEntry, is_fake: bool) -> Line:
+    def _row(self, id_tag: str, entry: DeviceEntry, is_fake: bool) -> DeviceRow:
         run, now, device = self._run, self._run.clock.now, entry.device
-        heard = now - entry.last_heard
+        heard, robot = now - entry.last_heard, run.field.robots.get(id_tag)
+        grant = run.dva.desk.sessions.permissions.grants.get(id_tag)
+        rate = self._rate_of(robot, now)
         speaks = not is_fake and device.device_type != DETECTOR
         return {
             "id": id_tag,
@@ -67,8 +70,13 @@ class DeviceRows:
             "link": link_of(heard, entry.silent) if speaks else None,
             "fake": is_fake,
             "round_trip_s": self._round_trip(id_tag),
-            **self._as_robot(id_tag, now),
-            **self._permission(id_tag, now),
+            "commands_hz": rate if rate is None else round(rate, 1),
+            "refused": None if robot is None else robot.refused,
+            "picture_age_s": _finite(robot.picture_age, 2) if robot and rate else None,
+            "holder": None if grant is None else grant.holder,
+            "holder_label": None if grant is None else self._label_of(grant.holder),
+            "level": None if grant is None else grant.level,
+            "ends_s": None if grant is None else _finite(self._end_of(grant, now) - now, 1),
         }
 
     def _doing(self, id_tag: str, entry: DeviceEntry) -> str | None:
@@ -80,37 +88,29 @@ class DeviceRows:
             return guard.activity
         return entry.mode if entry.position is not None and entry.kind == "Robot" else None
 
-    def _as_robot(self, id_tag: str, now: float) -> Line:
-        """What only the world of a robot can tell; of those outside it is unknown."""
-        robot: RobotAgent | None = self._run.field.robots.get(id_tag)
+    def _rate_of(self, robot: RobotAgent | None, now: float) -> float | None:
+        """Commands in a second; of a robot outside it is unknown."""
         if robot is None:
-            return {"commands_hz": None, "refused": None, "picture_age_s": None}
-        rate = self._commands.setdefault(id_tag, Rate()).of(robot.applied, now)
-        age = robot.picture_age if rate else None
-        return {
-            "commands_hz": round(rate, 1),
-            "refused": robot.refused,
-            "picture_age_s": None if age is None or math.isinf(age) else round(age, 2),
-        }
+            return None
+        return self._commands.setdefault(robot.device.id_tag, Rate()).of(robot.applied, now)
 
     def _round_trip(self, id_tag: str) -> float | None:
         device = next((d for d in self._run.stage.devices if d.id_tag == id_tag), None)
         trips = device.round_trips if device is not None else []
         return round(statistics.median(trips), 4) if trips else None
 
-    def _permission(self, id_tag: str, now: float) -> Line:
-        desk, labels = self._run.dva.desk, self._run.stage.labels
-        grant = desk.sessions.permissions.grants.get(id_tag)
-        if grant is None:
-            return {"holder": None, "holder_label": None, "level": None, "ends_s": None}
-        holder = desk.registry.entries.get(grant.holder)
-        label = labels.get(grant.holder, "") if holder is None else holder.device.label
-        robot, ends = desk.registry.entries.get(id_tag), math.inf
-        if holder is not None and robot is not None:
-            ends = desk.access.ends(holder.device, robot.device, grant.level, now)
-        return {
-            "holder": grant.holder,
-            "holder_label": label,
-            "level": grant.level,
-            "ends_s": None if math.isinf(ends) else round(ends - now, 1),
-        }
+    def _label_of(self, holder: str) -> str:
+        entry = self._run.dva.desk.registry.entries.get(holder)
+        return self._run.stage.labels.get(holder, "") if entry is None else entry.device.label
+
+    def _end_of(self, grant: Grant, now: float) -> float:
+        """When a permission ends [s]; infinity: never."""
+        desk = self._run.dva.desk
+        holder, robot = (desk.registry.entries.get(one) for one in (grant.holder, grant.robot))
+        if holder is None or robot is None:
+            return math.inf
+        return desk.access.ends(holder.device, robot.device, grant.level, now)
+
+
+def _finite(seconds: float | None, digits: int) -> float | None:
+    return None if seconds is None or math.isinf(seconds) else round(seconds, digits)

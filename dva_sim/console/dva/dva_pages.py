@@ -12,6 +12,7 @@ from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.dva_port import DvaPort
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
 
@@ -48,7 +49,7 @@ class DvaPages:
             self._make, lambda i: i == DVA or i in entries, self._identity, self._dismiss
         )
 
-    def devices(self, now_ms: int) -> Line | None:
+    def devices(self, now_ms: int) -> DevicesLine | None:
         """The table, once a second; None if nobody looks."""
         if not self.looked:
             return None

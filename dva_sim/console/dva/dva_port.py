@@ -6,13 +6,12 @@ from typing import Any, cast
 
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.console.wire.rows import ServerShown
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.sockets import NetworkError, split_address
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA
-
-Line = dict[str, Any]
 
 
 class DvaPort:
@@ -38,7 +37,7 @@ class DvaPort:
         self._run, self._recorder, self._sockets = run, recorder, sockets
         self.address, self.listens = address, True
 
-    def line(self) -> Line:
+    def line(self) -> ServerShown:
         """What a page is told."""
         return {
             "listens": self.listens,

@@ -12,11 +12,11 @@ from typing import Any, Final, Protocol
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.events.alarms import AlarmCondition, Alarms
+from dva_sim.console.wire.events import AlarmsLine, EventShown
+from dva_sim.console.wire.rows import RobotRow
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.recorder import Breach
 from dva_sim.simulation.full.run import Run
-
-Line = dict[str, Any]
 
 ESCALATED_FOR: Final = 60.0  # so long an escalation counts as lasting, time of the run [s]
 OUTDOORS: Final = "outdoors"
@@ -25,7 +25,7 @@ OUTDOORS: Final = "outdoors"
 class AlarmFacts(Protocol):
     """What can become an alarm, beside the events that pages are told of."""
 
-    def lost(self, robots: Sequence[Line]) -> Iterable[tuple[str, str]]:
+    def lost(self, robots: Sequence[RobotRow]) -> Iterable[tuple[str, str]]:
         """The labels of robots that are lost in drive, by the rows that pages get, and why."""
 
     def is_somebody_free(self) -> bool:
@@ -45,7 +45,7 @@ class RunFacts:
     def __init__(self, run: Run) -> None:
         self._run = run
 
-    def lost(self, robots: Sequence[Line]) -> Iterator[tuple[str, str]]:
+    def lost(self, robots: Sequence[RobotRow]) -> Iterator[tuple[str, str]]:
         """Robots that their watchdog has stopped."""
         labels = self._run.stage.labels
         by_row = {n: labels[robot] for n, robot in enumerate(self._run.field.robots)}
@@ -85,7 +85,9 @@ class AlarmDesk:
         self.alarms = Alarms()
         self._since: dict[str, int] = {}
 
-    def look(self, events: Sequence[Line], robots: Sequence[Line], now_ms: int) -> Line:
+    def look(
+        self, events: Sequence[EventShown], robots: Sequence[RobotRow], now_ms: int
+    ) -> AlarmsLine:
         """Look at what pages are told, and tell the alarms."""
         found = [*_of_events(events, now_ms), *self._lost(robots), *self._nobody(events)]
         found += self._broken()
@@ -99,12 +101,12 @@ class AlarmDesk:
     def _from(self, key: str, now_ms: int) -> int:
         return self._since.get(key, now_ms)
 
-    def hold(self, now_ms: int) -> Line:
+    def hold(self, now_ms: int) -> AlarmsLine:
         """Nothing is known of what has changed: the alarms stay as they are, but for shelves."""
         self.alarms.go_on(self._clock())
         return self._line(now_ms)
 
-    def _line(self, now_ms: int) -> Line:
+    def _line(self, now_ms: int) -> AlarmsLine:
         now = self._clock()
         return {
             "k": "alarms",
@@ -116,7 +118,7 @@ class AlarmDesk:
             "left_out": self.alarms.left_out,
         }
 
-    def _lost(self, robots: Sequence[Line]) -> Iterator[AlarmCondition]:
+    def _lost(self, robots: Sequence[RobotRow]) -> Iterator[AlarmCondition]:
         """Robots that are driven and hear nothing."""
         for label, why in self._facts.lost(robots):
             text = f"{label} is lost in drive: {why}"
@@ -129,7 +131,7 @@ class AlarmDesk:
             key, since = f"rule {breach.rule} {breach.who}", max(1, round(1000 * breach.time))
             yield AlarmCondition(key, "safety rule broken", "critical", "", text, since)
 
-    def _nobody(self, events: Iterable[Line]) -> Iterator[AlarmCondition]:
+    def _nobody(self, events: Iterable[EventShown]) -> Iterator[AlarmCondition]:
         """Events wait, and nobody is free to go."""
         waits = sum(1 for event in events if event["state"] == "pending")
         if waits and not self._facts.is_somebody_free():
@@ -173,13 +175,13 @@ class AlarmDesk:
             self.alarms.unshelve(key, self._clock())
 
 
-def _of_events(events: Iterable[Line], now_ms: int) -> Iterator[AlarmCondition]:
+def _of_events(events: Iterable[EventShown], now_ms: int) -> Iterator[AlarmCondition]:
     """What is open, and what has just been escalated."""
     for event in events:
         number, kind = event["number"], event["kind"].replace("_", " ")
         place = event["room"] or OUTDOORS
         if not event["over"]:
-            seen = event.get("acknowledged")
+            seen = event["acknowledged"]
             yield AlarmCondition(
                 *(f"event {number}", kind, event["severity"], place),
                 text=f"{kind.capitalize()}, {place}",

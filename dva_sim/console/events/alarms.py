@@ -20,7 +20,9 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
+
+from dva_sim.console.wire.events import AlarmRow
 
 PRIORITIES: Final = ("critical", "high", "medium", "low")
 NEW_FOR: Final = 5.0  # so long an alarm stands out as new [s]
@@ -204,12 +206,12 @@ class Alarms:
 
     # --- what is shown ----------------------------------------------------------------------
 
-    def rows(self, now: float) -> list[dict[str, Any]]:
+    def rows(self, now: float) -> list[AlarmRow]:
         """The list: the gravest first, and of those the newest that nobody has seen."""
         listed = [alarm for alarm in self.known.values() if alarm.shelved_until is None]
         return [_row(alarms, now) for alarms in sorted(self._folded(listed), key=_rank)]
 
-    def shelved(self, now: float) -> list[dict[str, Any]]:
+    def shelved(self, now: float) -> list[AlarmRow]:
         """What is shelved, with what is left of that; the first to come back first."""
         found = [alarm for alarm in self.known.values() if alarm.shelved_until is not None]
         found.sort(key=lambda alarm: alarm.shelved_until or 0.0)
@@ -241,7 +243,7 @@ def _rank(alarms: Sequence[RaisedAlarm]) -> tuple[int, int, float, str]:
     return priority, urgency, -max(alarm.raised for alarm in alarms), alarms[0].condition.key
 
 
-def _row(alarms: Sequence[RaisedAlarm], now: float) -> dict[str, Any]:
+def _row(alarms: Sequence[RaisedAlarm], now: float) -> AlarmRow:
     """A row of the list, for one alarm or for several that are alike."""
     first = min(alarms, key=lambda alarm: _rank([alarm]))
     condition, count = first.condition, len(alarms)

@@ -6,6 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from dva_sim.agents.people.person_guard import SEVERITIES
+from dva_sim.console.wire.events import DecidedShown, DispatchShown, EventDecisions
+from dva_sim.console.wire.scenes import LabelledMoment
+from dva_sim.console.wire.seats import Answered, CandidateShown
 from dva_sim.core.candidates import FREE
 from dva_sim.protocol import messages as m
 
@@ -65,7 +68,7 @@ def report_of(line: Line, place: m.Position) -> tuple[m.EventReport, str]:
     return report, f"{kind.replace('_', ' ')} is raised"
 
 
-def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Line:
+def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Answered:
     """What a page is told of a reply beside that it is done: a proposal with its reasons."""
     proposal = reply.content
     if not isinstance(proposal, m.Proposal):
@@ -85,7 +88,7 @@ def answer_of(reply: m.Reply, is_robot: Callable[[str], bool]) -> Line:
     }
 
 
-def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> Line:
+def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> CandidateShown:
     return {
         "label": who.label,
         "robot": is_robot(who.device),
@@ -96,7 +99,9 @@ def _candidate(who: m.Candidate, is_robot: Callable[[str], bool]) -> Line:
     }
 
 
-def about_event(events: Mapping[int, m.EventStatus], at: Mapping[int, float], number: int) -> Line:
+def about_event(
+    events: Mapping[int, m.EventStatus], at: Mapping[int, float], number: int
+) -> EventDecisions:
     """What a page is told of an event beside what everybody sees.
 
     Args:
@@ -107,13 +112,14 @@ def about_event(events: Mapping[int, m.EventStatus], at: Mapping[int, float], nu
     status = events.get(number)
     if status is None:
         return {"decisions": None, "acknowledged": None, "decided": None, "note": None}
-    last = status.last_decision
-    decided = last and {
-        "label": last.label,
-        "action": last.action,
-        "at_ms": moment_ms(at[number] - last.ago),
-        "reason": last.reason or "",
-    }
+    last, decided = status.last_decision, None
+    if last is not None:
+        decided = DecidedShown(
+            label=last.label,
+            action=last.action,
+            at_ms=moment_ms(at[number] - last.ago),
+            reason=last.reason or "",
+        )
     return {
         "decisions": status.decisions,
         "acknowledged": by_whom(status.acknowledged, at[number]),
@@ -122,15 +128,15 @@ def about_event(events: Mapping[int, m.EventStatus], at: Mapping[int, float], nu
     }
 
 
-def dispatch_line(status: m.DispatchStatus | None, at: float) -> Line | None:
+def dispatch_shown(status: m.DispatchStatus | None, at: float) -> DispatchShown | None:
     """How orders are given, as the DVA has said at a time [s]."""
     if status is None:
         return None
-    by = status.switched and {"label": status.switched.label, "at_ms": moment_ms(at)}
+    by = status.switched
     return {
         "mode": status.dispatch_mode,
         "decide_within_s": status.decide_within,
-        "switched": by,
+        "switched": None if by is None else {"label": by.label, "at_ms": moment_ms(at)},
     }
 
 
@@ -139,6 +145,6 @@ def moment_ms(seconds: float) -> int:
     return 100 * round(10 * seconds)
 
 
-def by_whom(whom: m.ByWhom | None, at: float) -> Line | None:
+def by_whom(whom: m.ByWhom | None, at: float) -> LabelledMoment | None:
     """Who did something, and when."""
     return None if whom is None else {"label": whom.label, "at_ms": moment_ms(at - whom.ago)}

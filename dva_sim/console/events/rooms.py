@@ -9,19 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import Said, unanswered
-from dva_sim.console.events.decisions import dispatch_line
+from dva_sim.console.events.decisions import dispatch_shown
+from dva_sim.console.wire.events import ControlLine, RoomEntry
+from dva_sim.console.wire.seats import Answered
 from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.core.roles import Roles
 from dva_sim.kernel.labels import with_id
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
-
-Line = dict[str, Any]
 
 LISTENER: Final = 1000  # number of the device that listens for the pages; a scenario's are below
 MOST_ROOMS: Final = 250
@@ -56,7 +56,7 @@ class ConsoleRoom:
         return self.agent.device
 
     def ask(
-        self, body: m.Body, said: Said, done: str, then: Callable[[m.Reply], Line] | None = None
+        self, body: m.Body, said: Said, done: str, then: Callable[[m.Reply], Answered] | None = None
     ) -> None:
         """Ask the DVA, and tell how that went.
 
@@ -181,12 +181,12 @@ class ConsoleRooms:
         every = self.listener.events.values()
         return next((e for e in every if e.closed_for is None and e.responder == robot), None)
 
-    def line(self, now_ms: int) -> Line:
+    def line(self, now_ms: int) -> ControlLine:
         """How orders are given, and who decides."""
-        rooms = [
+        rooms: list[RoomEntry] = [
             {"label": room.device.label, "role": room.role, "client": client}
             for client, room in self.by_client.items()
             if room.registered
         ]
-        dispatch = dispatch_line(self.listener.dispatch, self._switched)
+        dispatch = dispatch_shown(self.listener.dispatch, self._switched)
         return {"k": "control", "t": now_ms, "dispatch": dispatch, "rooms": rooms}

@@ -9,11 +9,12 @@ step is a message, and the DVA may refuse any.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.console.asking.refusal import Said, unanswered
 from dva_sim.console.events.rooms import why
+from dva_sim.console.wire.seats import Answered
 from dva_sim.protocol import messages as m
 
 AGAIN: Final = 0.5  # while a robot is brought to a standstill, or the policy was quicker [s]
@@ -94,7 +95,7 @@ class Takeover:
     def _ask_for_it(self) -> None:
         self._take(self._taken)
 
-    def _taken(self, ok: bool, text: str, /, **more: object) -> None:
+    def _taken(self, ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
         if ok or not self._has_another_try():
             self._said(ok, text, **more)
         else:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.console.shown.feed import Feed
+from dva_sim.console.wire.seats import GuardLine, GuardOrder, WayThere
 from dva_sim.simulation.full.run import Run
-
-Line = dict[str, Any]
 
 
 class PlayedGuards:
@@ -26,7 +24,7 @@ class PlayedGuards:
     def __init__(self, run: Run, feed: Feed) -> None:
         self._run, self._feed = run, feed
         self.by_client: dict[str, PersonGuard] = {}
-        self._ways: dict[str, tuple[object, Line]] = {}  # the newest, and what it is of
+        self._ways: dict[str, tuple[object, WayThere]] = {}  # the newest, and what it is of
         self._left: list[str] = []  # who is to be told so
 
     def named(self, label: str) -> PersonGuard | None:
@@ -49,42 +47,45 @@ class PlayedGuards:
             self._ways.pop(client, None)
         return guard is not None
 
-    def lines(self) -> Iterator[tuple[str, Line]]:
-        """A line for each who plays."""
+    def lines(self) -> Iterator[tuple[str, GuardLine]]:
+        """A line for each who plays, and one more for who plays no longer."""
         gone, self._left = self._left, []
         for client in gone:
             if client not in self.by_client:
-                yield client, self._line(client) | _NOBODY
+                yield client, self._line(client, None)
         for client, guard in self.by_client.items():
-            yield (
-                client,
-                self._line(client)
-                | {
-                    "guard": self._feed.numbers[guard.device.id_tag],
-                    "label": guard.device.label,
-                    "doing": guard.activity,
-                    "order": self._order(client, guard),
-                    "alert": guard.alert or guard.device.dva_alert,
-                },
-            )
+            yield client, self._line(client, guard)
 
-    def _line(self, client: str) -> Line:
-        return {"k": "guard", "t": self._feed.now_ms, "seat": client}
+    def _line(self, client: str, guard: PersonGuard | None) -> GuardLine:
+        device = None if guard is None else guard.device
+        return {
+            "k": "guard",
+            "t": self._feed.now_ms,
+            "seat": client,
+            "guard": None if device is None else self._feed.numbers[device.id_tag],
+            "label": "" if device is None else device.label,
+            "doing": "" if guard is None else guard.activity,
+            "order": None if guard is None else self._order(client, guard),
+            "alert": "" if guard is None else guard.alert or guard.device.dva_alert,
+        }
 
-    def _order(self, client: str, guard: PersonGuard) -> Line | None:
+    def _order(self, client: str, guard: PersonGuard) -> GuardOrder | None:
         """The order, and the way there from where the person stands."""
         order = guard.order
         if order is None:
             return None
         of = order, guard.walking.place
-        known, line = self._ways.get(client, (None, {}))
-        if known != of:
-            line = self._way(guard)
-            self._ways[client] = of, line
-        about = {"event": order.event_id, "kind": order.kind, "task": order.task}
-        return {**about, **line, "answered": guard.answered}
+        if client not in self._ways or self._ways[client][0] != of:
+            self._ways[client] = of, self._way(guard)
+        return {
+            "event": order.event_id,
+            "kind": order.kind,
+            "task": order.task,
+            **self._ways[client][1],
+            "answered": guard.answered,
+        }
 
-    def _way(self, guard: PersonGuard) -> Line:
+    def _way(self, guard: PersonGuard) -> WayThere:
         goal = guard.goal()
         assert goal is not None
         (x, y), length, points = goal
@@ -95,6 +96,3 @@ class PlayedGuards:
             "distance_m": round(length, 1) if length < 1e6 else None,
             "way_m": points,
         }
-
-
-_NOBODY: Line = {"guard": None, "label": "", "doing": "", "order": None, "alert": ""}

@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
+from dva_sim.cameras.lines import Show
 from dva_sim.console.pages.page_options import PageOptions
-from dva_sim.console.wire.lines import KINDS
+from dva_sim.console.wire.lines import KINDS, Tell
 from dva_sim.network.realtime import PacedClock
 from dva_sim.serving.listening import listen
 
@@ -46,8 +47,8 @@ class ConsoleSubject(Protocol):
     """
 
     clock: PacedClock
-    tell: Callable[..., object]
-    show: Callable[..., object]
+    tell: Tell
+    show: Show
     dropped: Callable[[], int]
 
     def serve_cameras(self, base: str) -> None:

@@ -24,6 +24,7 @@ from dva_sim.console.running.sliders import change_pattern
 from dva_sim.console.wire.actions import ActionPlace
 from dva_sim.console.wire.arguments import FASTEST
 from dva_sim.console.wire.limits import SILENT_AFTER
+from dva_sim.console.wire.seats import DoneLine
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.network.patterns import PATTERNS
 
@@ -65,7 +66,7 @@ class Actions:
         world.hold = self._stop_all
         world.clock.pulse(LOOK, self._look_for_the_silent)
 
-    def _tell(self, answer: Line) -> None:
+    def _tell(self, answer: DoneLine) -> None:
         self._world.tell({**answer, "t": self._world.feed.now_ms})
         self._world.tell_now()
 
@@ -339,7 +340,7 @@ class Actions:
 
     @does("watch")
     def _watch(self, _: str, line: Line) -> None:
-        ids = {t["id"] for t in self._world.feed.things if t["i"] in line["robots"]}
+        ids = {t["id"] for t in self._world.feed.things.all if t["i"] in line["robots"]}
         self._world.screens.watch(ids)
 
     @does("look")

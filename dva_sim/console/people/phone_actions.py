@@ -16,6 +16,7 @@ from dva_sim.console.asking.refusal import NO_ANSWER, Refused, Said
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
+from dva_sim.console.wire.seats import DeviceShown
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
@@ -209,7 +210,7 @@ class PhoneActions:
         said(True, f"calibrated{later}{kept}")
 
 
-def _shown(device: m.Device) -> Line:
+def _shown(device: m.Device) -> DeviceShown:
     return {
         "id": device.id_tag,
         "label": device.label,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Unpack
 
 from dva_sim.console.asking.dispatcher import Doer, does
 from dva_sim.console.asking.refusal import Refused, Said
@@ -13,6 +13,7 @@ from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, 
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.rooms import ConsoleRoom
 from dva_sim.console.events.takeover import Takeover
+from dva_sim.console.wire.seats import Answered
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.protocol import messages as m
 
@@ -75,7 +76,7 @@ class RoomActions:
         said: Said,
         body: m.Body,
         done: str,
-        then: Callable[[m.Reply], Line] | None = None,
+        then: Callable[[m.Reply], Answered] | None = None,
     ) -> None:
         self._room(client, line, said, lambda room: room.ask(body, said, done, then))
 
@@ -91,7 +92,7 @@ class RoomActions:
     def _raise(self, client: str, line: Line, said: Said) -> None:
         body, done = report_of(line, self._place(line))
 
-        def then(_: m.Reply) -> Line:
+        def then(_: m.Reply) -> Answered:
             event = self._world.run.dva.desk.book.near(body.kind, body.position)
             return {} if event is None else {"event": event.number}
 
@@ -156,7 +157,7 @@ class RoomActions:
             label = self._world.run.stage.labels[robot]
             take = partial(self._take, client, line | {"robots": [label]})
 
-            def ended(ok: bool, text: str, /, **more: Any) -> None:
+            def ended(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
                 if not ok and not seat.robots:
                     self._seats.stand_up(client)
                     seat.attended = client in self._world.client_of.values()

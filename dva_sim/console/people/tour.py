@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise, product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.console.wire.seats import TourPlan
 from dva_sim.simulation.full.run import Run
 from dva_sim.worlds.site import Site
 
@@ -36,7 +37,7 @@ class FreeWay(NamedTuple):
     side: float
 
 
-def tour_of(run: Run, numbers: Mapping[str, int]) -> dict[str, Any] | None:
+def tour_of(run: Run, numbers: Mapping[str, int]) -> TourPlan | None:
     """Two robots and their goals, from where they stand now; None: no two have such a way.
 
     Args:

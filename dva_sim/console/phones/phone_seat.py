@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Any
 
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
@@ -18,10 +17,10 @@ from dva_sim.agents.tilt.accelerometer import Triple
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.device_axes import to_tilt_axes
 from dva_sim.console.phones.phone_input import PhoneSettings, Samples
+from dva_sim.console.wire.seats import PhoneIdentityShown, PhoneShown
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.motion import MotionApp, MotionSample, MotionWriter
 
-Line = dict[str, Any]
 USUAL_HZ = 60.0  # of a phone's browser, until its own rate is known
 RATED_BY = 64  # samples, by which the rate is told
 LEAST_RATED = 8
@@ -195,7 +194,7 @@ class PhoneSeat:
             return None
         return (len(self._told) - 1) / (self._told[-1] - self._told[0])
 
-    def line(self, now: float) -> Line:
+    def line(self, now: float) -> PhoneShown:
         """The phone's part of a seat's line.
 
         Args:
@@ -223,7 +222,7 @@ class PhoneSeat:
             "attempts": self._attempts,
         }
 
-    def identity(self) -> Line:
+    def identity(self) -> PhoneIdentityShown:
         """Who it is on the wire."""
         device = None if self.person is None else self.person.device
         return {

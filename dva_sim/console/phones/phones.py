@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.operator.handheld import Console
@@ -18,6 +18,7 @@ from dva_sim.agents.tilt import PhoneProfile, known_filters, known_mappings
 from dva_sim.console.phones.phone_input import PIPELINES, PhoneSettings
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.arguments import DELAYS, STEPS
+from dva_sim.console.wire.scenes import PhoneOffer
 from dva_sim.core.registry import FORGET_AFTER, OPERATOR, REMOTE, ROBOT
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.realtime import PacedClock
@@ -26,7 +27,6 @@ from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of
 from dva_sim.simulation.scenario import PhoneConfig, phone_profile
 
-Line = dict[str, Any]
 DVA_PORT: Final = 5555  # at which the modelled DVA is said to listen
 NOBODY: Final = "02:00:00:00:FF:FF"  # who listens at any other address
 MOST_PHONES: Final = 64
@@ -80,7 +80,7 @@ class Phones:
         phone = PhoneConfig(profile=settings.pipeline, **settings.changes)
         return phone_profile(self._run.scenario.model_copy(update={"phone": phone}))
 
-    def offer(self) -> Line:
+    def offer(self) -> PhoneOffer:
         """What a phone's page may choose from."""
         default = self.profile(PhoneSettings())
         return {

@@ -8,9 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from dva_sim.console.wire.events import AuditLine
 from dva_sim.recordings.audit_log import NOTHING_BEFORE
-
-Line = dict[str, Any]
 
 
 class RecordedAudit:
@@ -25,14 +24,21 @@ class RecordedAudit:
         self.path = Path(self._folder.name) / "audit.json"
         self.path.write_text("[]")
 
-    def show(self, rows: Sequence[Mapping[str, Any]], name: str) -> Line:
+    def show(self, rows: Sequence[Mapping[str, Any]], name: str) -> AuditLine:
         """Another recording is played; what pages are told of its log."""
         new = self.path.with_suffix(".new")
         new.write_text(json.dumps(rows))
         new.replace(self.path)  # at once: somebody may be reading
-        last = rows[-1] if rows else {"number": 0, "hash": NOTHING_BEFORE}
-        stands = {"rows": last["number"], "hash": last["hash"], "problem": ""}
-        return {"k": "audit", "t": 0, **stands, "lasting": True, "file": name}
+        last = rows[-1] if rows else None
+        return {
+            "k": "audit",
+            "t": 0,
+            "rows": 0 if last is None else last["number"],
+            "hash": NOTHING_BEFORE if last is None else last["hash"],
+            "problem": "",
+            "lasting": True,
+            "file": name,
+        }
 
     def close(self) -> None:
         """Leave nothing behind."""

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
-from typing import Any
 
+from dva_sim.console.wire.rows import DeviceRow, RobotRow
 from dva_sim.kernel.recorder import Sent
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 
-Line = dict[str, Any]
 BEATING = 10.0  # over which heartbeats are counted [s]
-_UNKNOWN = (
-    *("round_trip_s", "refused", "picture_age_s", "level", "ends_s"),
-    *("link", "commands_hz", "holder", "holder_label"),
-)
 
 
 class RecordedDevices:
@@ -48,7 +43,9 @@ class RecordedDevices:
             if isinstance(body, m.Registration):
                 self._registered[who] = sent.time, body
 
-    def rows(self, now: float, robots: Mapping[str, Line], doing: Mapping[str, str]) -> list[Line]:
+    def rows(
+        self, now: float, robots: Mapping[str, RobotRow], doing: Mapping[str, str]
+    ) -> list[DeviceRow]:
         """A row for each that had registered by then; what nobody recorded is open.
 
         Args:
@@ -67,13 +64,13 @@ class RecordedDevices:
         who: str,
         about: m.Registration,
         now: float,
-        robot: Line | None,
+        robot: RobotRow | None,
         doing: Mapping[str, str],
-    ) -> Line:
+    ) -> DeviceRow:
         heard, beats = self._heard[who], self._beats.get(who, [])
         last = heard[bisect_right(heard, now) - 1]
         recent = bisect_right(beats, now) - bisect_right(beats, now - BEATING)
-        row: Line = dict.fromkeys(_UNKNOWN) | {
+        return {
             "id": who,
             "label": about.label,
             "type": about.device_type,
@@ -84,8 +81,13 @@ class RecordedDevices:
             "beats_hz": round(recent / BEATING, 2),
             "fake": False,
             "revocable": False,
+            "link": None,
+            "holder": None if robot is None else robot["holder"],
+            "holder_label": None if robot is None else robot["holder_label"],
+            "commands_hz": None if robot is None else robot["commands_hz"],
+            "round_trip_s": None,
+            "refused": None,
+            "picture_age_s": None,
+            "level": None,
+            "ends_s": None,
         }
-        if robot is not None:
-            known = ("holder", "holder_label", "commands_hz")
-            row |= {key: robot[key] for key in known}
-        return row

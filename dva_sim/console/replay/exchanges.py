@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from typing import Any
 
 from dva_sim.console.wire.limits import LOG_BATCH
+from dva_sim.console.wire.records import ExchangesLine
 from dva_sim.kernel.recorder import Sent
 
-Line = dict[str, Any]
 FIRST = 2000  # of those before the moment that is shown
 # What is published, to whom it may concern; nobody answers it.
 PUBLISHED = re.compile(
@@ -62,7 +62,7 @@ class ExchangeLog:
         """How many there were up to a moment [s]."""
         return bisect_right(self._times, now)
 
-    def batches(self, name: str, told: int, end: int) -> list[Line]:
+    def batches(self, name: str, told: int, end: int) -> list[ExchangesLine]:
         """Lines for pages, of those after the first `told` up to the first `end`."""
         starts = range(max(told, end - FIRST), end, LOG_BATCH)
         return [

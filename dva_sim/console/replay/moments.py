@@ -6,8 +6,8 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
+from dva_sim.console.wire.events import EventDecisions
 from dva_sim.core.audit import Fact
 from dva_sim.core.events import Event, State
 from dva_sim.kernel.recorder import DriveLog, TrackPoint
@@ -71,7 +71,7 @@ def event_at(event: Event, now: float) -> Event | None:
     )
 
 
-def decided_on(facts: Sequence[Fact], number: int, now: float) -> dict[str, Any]:
+def decided_on(facts: Sequence[Fact], number: int, now: float) -> EventDecisions:
     """What people and the policy had decided on an event by then, where that was recorded."""
     past = [f for f in facts if f.event == number and f.time <= now + ROUNDED and f.code == m.OK]
     seen = next((f for f in past if f.action == "acknowledge"), None)
@@ -79,9 +79,12 @@ def decided_on(facts: Sequence[Fact], number: int, now: float) -> dict[str, Any]
     note = next((f.text for f in reversed(past) if f.action == "note"), None)
     return {
         "decisions": None,
-        "acknowledged": seen and {"label": seen.label, "at_ms": round(1000 * seen.time)},
-        "decided": last
-        and {
+        "acknowledged": None
+        if seen is None
+        else {"label": seen.label, "at_ms": round(1000 * seen.time)},
+        "decided": None
+        if last is None
+        else {
             "label": last.label,
             "action": last.action,
             "at_ms": round(1000 * last.time),

@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from dva_sim.cameras.lines import Show, contained_line, scene_line
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.replay.audit import RecordedAudit
@@ -18,6 +19,9 @@ from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
 from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.rows import ClockShown, RowsLine
+from dva_sim.console.wire.seats import DoneLine
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import pack
@@ -48,8 +52,8 @@ class Player:
     ) -> None:
         self.run, self.shelf, self.audit = run, shelf, RecordedAudit()
         self.clock = clock or PacedClock()
-        self.tell: Callable[..., object] = lambda *_: None
-        self.show: Callable[..., object] = lambda *_: None
+        self.tell: Tell = lambda *_: None
+        self.show: Show = lambda *_: None
         self.dropped: Callable[[], int] = lambda: 0
         self._offset, self._jumps, self._frames = 0.0, 0, 0
         self._watched: set[str] = set()
@@ -94,9 +98,9 @@ class Player:
         )
         scenario = run.playback.scenario.model_copy(update={"site": named})
         told = scenario.model_dump(mode="json")
-        self.show({"k": "scene", "t": 0, "scenario": told, "seed": run.playback.seed})
+        self.show(scene_line(told, run.playback.seed))
         for number, when in run.playback.contained.items():
-            self.show({"k": "contain", "t": round(1000 * when), "n": number})
+            self.show(contained_line(number, when))
 
     def note(self, text: str) -> None:
         """See `ConsoleSubject`."""
@@ -123,7 +127,7 @@ class Player:
 
     def _tell_scene(self) -> None:
         if self.run is None:
-            self.tell(self._empty_scene())
+            self.tell({"k": "scene", "t": 0, "things": [], "replay": None, "shelf": True})
         else:
             self.tell(self.run.scene())
             self.tell(self.audit.show(self.run.audit, self.run.name))
@@ -133,10 +137,6 @@ class Player:
         if self.shelf is not None:
             self.tell(self.shelf.line())
         self.tell_now()
-
-    def _empty_scene(self) -> Line:
-        """A console where nothing is played yet."""
-        return {"k": "scene", "t": 0, "things": [], "replay": None, "shelf": True}
 
     def tell_now(self) -> None:
         """Tell everything about the moment."""
@@ -155,7 +155,7 @@ class Player:
             return
         if now >= run.duration and not self.clock.paused:
             self.clock.pace(paused=True)
-        rows = {
+        rows: RowsLine = {
             "k": "rows",
             "t": round(1000 * now),
             "clock": self._clock_line(),
@@ -171,7 +171,7 @@ class Player:
         for robot in self._watched:
             self.tell(run.window(robot, now))
 
-    def _clock_line(self) -> Line:
+    def _clock_line(self) -> ClockShown:
         return {
             "factor": self.clock.factor,
             "paused": self.clock.paused,
@@ -188,10 +188,10 @@ class Player:
     def _show_frames(self) -> None:
         run = self.run
         for robot in self._watched if run is not None else ():
-            frame = run.frame(robot, self.now) if run is not None else None
+            frame = run.frame(robot, self._frames + 1, self.now) if run is not None else None
             if frame is not None:
                 self._frames += 1
-                self.show(frame | {"number": self._frames}, frame["robot"])
+                self.show(frame, frame["robot"])
 
     def _tell_logs(self) -> None:
         """What was asked and answered since the last time; after a jump, all of it anew."""
@@ -202,8 +202,10 @@ class Player:
             lines = log.batches(name, max(0, told), end)
             if anew and not lines:
                 lines = [{"k": "log", "log": name, "lines": []}]
-            for number, line in enumerate(lines):
-                self.tell(line | ({"anew": True} if anew and number == 0 else {}))
+            if anew:
+                lines[0]["anew"] = True
+            for line in lines:
+                self.tell(line)
             self._told[name] = end
 
     def _tell_devices(self) -> None:
@@ -220,7 +222,7 @@ class Player:
 
     # --- what is asked for -----------------------------------------------------------------
 
-    def _tell(self, answer: Line) -> None:
+    def _tell(self, answer: DoneLine) -> None:
         self.tell({**answer, "t": round(1000 * self.now)})
 
     @does("pace")
@@ -259,7 +261,7 @@ class Player:
 
     @does("watch")
     def _watch(self, _: str, line: Line) -> None:
-        things = () if self.run is None else self.run.things
+        things = () if self.run is None else self.run.things.all
         watched = (t for t in things if t["i"] in line["robots"])
         self._watched = {t["id"] for t in watched if t["kind"] == "robot"}
 

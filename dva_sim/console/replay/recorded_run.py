@@ -10,6 +10,7 @@ from bisect import bisect_right
 from typing import Any
 
 from dva_sim.agents.robot.controller import Mode
+from dva_sim.cameras.lines import FrameLine
 from dva_sim.console.replay.device_table import RecordedDevices
 from dva_sim.console.replay.moments import (
     ROUNDED,
@@ -21,16 +22,19 @@ from dva_sim.console.replay.moments import (
     set_point,
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
-from dva_sim.console.shown.feed import event_line
+from dva_sim.console.shown.feed import event_facts, moment_shown
 from dva_sim.console.shown.fields import HazardFeed
 from dva_sim.console.shown.scene import scene_of
+from dva_sim.console.shown.things import UNKNOWN_PERSON, Things, camera_shown
+from dva_sim.console.wire.events import EventShown, EventsLine, HazardsLine, ToldLine
+from dva_sim.console.wire.rows import DevicesLine, DoingShown, PlacesLine, RobotLine, RobotRow
+from dva_sim.console.wire.scenes import LinkShown, SceneLine, StoryShown, ThingBody
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.recordings.reading import Opened, RecordedHazard
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.simulation.scenario import robot_profiles
 
-Line = dict[str, Any]
 TURNING = 0.25  # over which a turn rate is measured [s]
 STORY_KEPT = 200  # lines of the story up to a moment
 MOST_MARKS = 400  # moments to jump to
@@ -46,8 +50,8 @@ class RecordedRun:
 
     Attributes:
         playback: What can be told and shown of the run.
-        things: Everybody, with the number that lines call them by.
-        numbers: Those numbers, by id and by label.
+        things: Everybody.
+        numbers: By which lines call them, by id and by label.
         duration: How long it lasts [s].
         audit: The rows of the console's audit log, if it had one.
         tracks: Where everybody was.
@@ -57,8 +61,8 @@ class RecordedRun:
         self.playback = playback = opened.playback
         self.name, self.is_whole, self.audit = name, opened.is_whole, opened.audit
         self.duration = playback.duration
-        self.things: list[Line] = []
-        self.numbers: dict[str, int] = {}
+        self.things = Things()
+        self.numbers = self.things.numbers
         self._number_all()
         self.tracks = RecordedTracks(playback.recorder.tracks, playback.duration)
         self._moments = [moment.time for moment in playback.recorder.timeline]
@@ -72,33 +76,27 @@ class RecordedRun:
         )
 
     def _number_all(self) -> None:
-        playback, camera = self.playback, self.playback.scenario.camera
-        limits = self._limits()
+        playback, limits = self.playback, self._limits()
+        camera = camera_shown(playback.scenario.camera)
         for number, (id_tag, radius) in enumerate(playback.radii.items()):
             speed, turn_rate = limits[number] if number < len(limits) else (0.5, math.pi / 6)
-            self._number(
-                *(id_tag, playback.labels[id_tag], "robot"),
-                radius_m=radius,
-                max_speed_mps=speed,
-                max_turn_rate_radps=turn_rate,
+            body: ThingBody = {
                 **about(radius),
-                camera={
-                    "field_of_view_deg": camera.field_of_view_deg,
-                    "range_m": camera.range_m,
-                    "rate_hz": camera.rate_hz,
-                    "frame_bytes": camera.frame_bytes,
-                },
-            )
+                "max_speed_mps": speed,
+                "max_turn_rate_radps": turn_rate,
+                "camera": camera,
+            }
+            self.things.add(id_tag, playback.labels[id_tag], "robot", body)
         ids = {label: id_tag for id_tag, label in playback.labels.items()}
         for label in playback.recorder.tracks:
             if label not in self.numbers:
                 kind = label.rpartition("-")[0]
                 known = kind if kind in ("guard", "bystander") else "guard"
-                self._number(ids.get(label, label), label, known, radius_m=0.25)
+                self.things.add(ids.get(label, label), label, known, UNKNOWN_PERSON)
         for id_tag, label in playback.labels.items():
             if label not in self.numbers:
                 kind = label.partition("-")[0]
-                self._number(id_tag, label, kind if kind in ("dva", "operator") else "device")
+                self.things.add(id_tag, label, kind if kind in ("dva", "operator") else "device")
 
     def _limits(self) -> list[tuple[float, float]]:
         """Of the robots, if their profiles are still to be found; no code is loaded for it."""
@@ -108,11 +106,6 @@ class RecordedRun:
             return []
         return [(one.max_speed_mps, one.max_turn_rate_rad_s) for one in found]
 
-    def _number(self, id_tag: str, label: str, kind: str, **more: Any) -> None:
-        number = len(self.things)
-        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
-        self.numbers[id_tag] = self.numbers[label] = number
-
     @property
     def is_drawn(self) -> bool:
         """Whether cameras can be drawn: not if a hazard's class is the user's own."""
@@ -121,16 +114,11 @@ class RecordedRun:
 
     # --- what does not change --------------------------------------------------------------
 
-    def scene(self) -> Line:
+    def scene(self) -> SceneLine:
         """The first line."""
         playback = self.playback
-        line = scene_of(
-            *(playback.scenario, playback.site, playback.incidents, self.things),
-            name=self.name,
-            seed=playback.seed,
-        )
         link = playback.scenario.link
-        line["link"] = {
+        how: LinkShown = {
             "kind": "modelled",
             "delay_s": link.delay_s,
             "jitter_s": link.jitter_s,
@@ -139,6 +127,11 @@ class RecordedRun:
             "processing_s": 0.0,
             "trace": link.trace_up or link.trace_down or link.delay_log,
         }
+        line = scene_of(
+            *(playback.scenario, playback.site, playback.incidents, self.things.all, how),
+            name=self.name,
+            seed=playback.seed,
+        )
         line["replay"] = {
             "name": self.name,
             "duration_ms": round(1000 * self.duration),
@@ -148,19 +141,16 @@ class RecordedRun:
         }
         return line
 
-    def _marks(self) -> list[Line]:
+    def _marks(self) -> list[StoryShown]:
         """Moments to jump to, in order; of too many, evenly chosen ones."""
         timeline = self.playback.recorder.timeline
         marks = [moment for moment in timeline if moment.kind in MARKED]
         step = max(1, math.ceil(len(marks) / MOST_MARKS))
-        return [
-            {"t": round(1000 * m.time), "who": m.who, "what": m.what, "kind": m.kind}
-            for m in marks[::step]
-        ]
+        return [moment_shown(moment) for moment in marks[::step]]
 
     # --- a moment --------------------------------------------------------------------------
 
-    def positions(self, now: float) -> Line:
+    def positions(self, now: float) -> PlacesLine:
         """Where everybody is."""
         rows = [
             [
@@ -173,7 +163,7 @@ class RecordedRun:
         ]
         return {"k": "pos", "t": _ms(now), "p": rows}
 
-    def robots(self, now: float) -> list[Line]:
+    def robots(self, now: float) -> list[RobotRow]:
         """A row for each robot."""
         doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
         return [
@@ -181,7 +171,7 @@ class RecordedRun:
             for id_tag in self.playback.radii
         ]
 
-    def _robot(self, id_tag: str, mode: str, now: float) -> Line:
+    def _robot(self, id_tag: str, mode: str, now: float) -> RobotRow:
         drive = self._drive_of(id_tag, now)
         speed, turn_rate = set_point(drive, now) if mode == Mode.TELEOPERATION else (0.0, 0.0)
         holder = None if drive is None else drive.operator
@@ -204,7 +194,7 @@ class RecordedRun:
             "timeouts": 0,
         }
 
-    def window(self, id_tag: str, now: float) -> Line:
+    def window(self, id_tag: str, now: float) -> RobotLine:
         """What the windows of a robot show."""
         if id_tag not in self._windows:
             playback = self.playback
@@ -230,7 +220,7 @@ class RecordedRun:
                 return None if over else drive
         return None
 
-    def people(self, now: float) -> list[Line]:
+    def people(self, now: float) -> list[DoingShown]:
         """What those on foot are doing."""
         radii = {self.playback.labels[robot] for robot in self.playback.radii}
         return [
@@ -239,42 +229,44 @@ class RecordedRun:
             if label not in radii
         ]
 
-    def devices(self, now: float) -> Line:
+    def devices(self, now: float) -> DevicesLine:
         """The table of devices."""
         if self._devices is None:
             self._devices = RecordedDevices(self.playback.recorder.traffic or (), DVA)
-        ids = {thing["i"]: thing["id"] for thing in self.things}
+        ids = {thing["i"]: thing["id"] for thing in self.things.all}
         robots = {ids[row["i"]]: row for row in self.robots(now)}
         doing = {label: at.mode for label, at, _ in self.tracks.places(now)}
         rows = self._devices.rows(now, robots, doing)
         return {"k": "devices", "t": _ms(now), "devices": rows}
 
-    def hazards(self, now: float) -> Line:
+    def hazards(self, now: float) -> HazardsLine:
         """Where hazards are, and what they make of air and floor."""
         return self._hazards.line(_ms(now))
 
-    def events(self, now: float) -> Line:
+    def events(self, now: float) -> EventsLine:
         """How the events stand."""
         playback = self.playback
         site, labels = playback.site, playback.labels
         known = (event_at(event, now) for event in self.playback.events)
-        lines = [
-            event_line(event, site, labels) | decided_on(playback.facts, event.number, now)
+        lines: list[EventShown] = [
+            {
+                **event_facts(event, site, labels),
+                **decided_on(playback.facts, event.number, now),
+            }
             for event in known
             if event is not None
         ]
         return {"k": "events", "t": _ms(now), "events": lines}
 
-    def story(self, now: float) -> Line:
+    def story(self, now: float) -> ToldLine:
         """What was told up to a moment."""
         end = bisect_right(self._moments, now + ROUNDED)
         told = self.playback.recorder.timeline[max(0, end - STORY_KEPT) : end]
-        lines = [{"t": _ms(m.time), "who": m.who, "what": m.what, "kind": m.kind} for m in told]
-        return {"k": "told", "t": _ms(now), "lines": lines}
+        return {"k": "told", "t": _ms(now), "lines": [moment_shown(moment) for moment in told]}
 
     # --- pictures --------------------------------------------------------------------------
 
-    def frame(self, robot: str, now: float) -> Line | None:
+    def frame(self, robot: str, number: int, now: float) -> FrameLine | None:
         """What a robot's operator saw at a moment, or if nobody drove it what its camera showed.
 
         The picture is drawn from where everybody was when it was taken.
@@ -288,8 +280,8 @@ class RecordedRun:
         own = next((at for name, at, _ in there if name == label), None)
         if own is None:
             return None
-        kinds = {thing["i"]: thing["kind"] for thing in self.things}
-        figures = [
+        kinds = {thing["i"]: thing["kind"] for thing in self.things.all}
+        figures: list[list[Any]] = [
             [
                 *(kinds[self.numbers[name]], self.numbers[name]),
                 *(round(at.x, 3), round(at.y, 3), round(at.heading, 3), at.mode),
@@ -301,6 +293,7 @@ class RecordedRun:
             "k": "frame",
             "t": _ms(now),
             "robot": self.numbers[robot],
+            "number": number,
             "captured_ms": _ms(captured),
             "pose": [round(own.x, 3), round(own.y, 3), round(own.heading, 4)],
             "figures": figures,

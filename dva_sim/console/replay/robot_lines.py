@@ -4,20 +4,32 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable
-from typing import Any
 
 from dva_sim.console.robots.latencies import KEPT, Latencies
 from dva_sim.console.robots.robot_windows import WHEEL
+from dva_sim.console.wire.rows import (
+    EmergencyShown,
+    FaultsShown,
+    LatencyFigures,
+    RobotLine,
+    RobotRow,
+)
+from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Applied, DriveLog, Sent
 
-Line = dict[str, Any]
 _EMERGENCY = b"<EmergencyMsg>"
-_NO_FAULTS = {"processing_s": None, "replies": False, "freeze": False, "camera": False}
+_NO_FAULTS: FaultsShown = {
+    "processing_s": None,
+    "replies": False,
+    "freeze": False,
+    "camera": False,
+}
 
 
-def about(radius: float) -> Line:
+def about(radius: float) -> ThingBody:
     """What the pictures of a robot are drawn by, as far as a recording tells: its radius [m]."""
     return {
+        "radius_m": radius,
         "wheel_radius_m": round(WHEEL * radius, 3),
         "corners_m": [],
         "steering": "free",
@@ -52,7 +64,7 @@ class RobotLines:
             and _EMERGENCY in sent.payload
         ]
 
-    def line(self, row: Line, speed: float, turn_rate: float, now: float) -> Line:
+    def line(self, row: RobotRow, speed: float, turn_rate: float, now: float) -> RobotLine:
         """The windows at a moment.
 
         Args:
@@ -85,11 +97,11 @@ class RobotLines:
             "sensors": [],
         }
 
-    def _emergency(self, now: float) -> Line | None:
+    def _emergency(self, now: float) -> EmergencyShown | None:
         past = [told for told in self._emergencies if told[0] <= now]
         return {"at_ms": round(1000 * past[-1][0]), "by": past[-1][1]} if past else None
 
-    def _one_way(self, now: float) -> Line | None:
+    def _one_way(self, now: float) -> LatencyFigures | None:
         """How long commands were under way, of the newest that had taken effect by then."""
         end = bisect_right(self._applied, now, key=lambda one: one.time)
         figures = Latencies()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dva_sim.console.wire.records import ShelfEntry, ShelfLine
 from dva_sim.experiments.execution.kept_recordings import FOLDER, badness, rows_of
 from dva_sim.experiments.report.report import PAGE
 from dva_sim.experiments.results.results import MANIFEST, Results
@@ -15,7 +16,6 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.writing import SUFFIX
 from dva_sim.simulation.labels import factor_name, measure_called
 
-Line = dict[str, Any]
 Row = Mapping[str, Any]
 MOST = 2000  # recordings in the list
 MOST_MEASURES = 4  # beside the one that answers the study
@@ -73,7 +73,7 @@ class Shelf:
             raise ConfigError(f"there is no recording {name!r} here", self.folder)
         return self._kept[name].path
 
-    def line(self) -> Line:
+    def line(self) -> ShelfLine:
         """What pages show of it."""
         measures = [measure_called(name) for name in self._measures]
         return {
@@ -87,7 +87,7 @@ class Shelf:
             "recordings": [self._told(one) for one in self._kept.values()],
         }
 
-    def _told(self, one: _Kept) -> Line:
+    def _told(self, one: _Kept) -> ShelfEntry:
         row = one.row or {}
         return {
             "name": one.path.name,

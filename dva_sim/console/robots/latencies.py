@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Any
+
+from dva_sim.console.wire.rows import LatencyFigures
 
 KEPT = 1000  # of the newest times
 
@@ -21,16 +22,22 @@ class Latencies:
         self._times.append(seconds)
         self._count += 1
 
-    def line(self) -> dict[str, Any] | None:
+    def line(self) -> LatencyFigures | None:
         """The figures in milliseconds, of the newest `KEPT`; None without any."""
         if not self._times:
             return None
         ordered = sorted(self._times)
         last = len(ordered) - 1
-        figures = {
-            "last_ms": self._times[-1],
-            "median_ms": 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]),
-            "p95_ms": ordered[max(0, math.ceil(0.95 * len(ordered)) - 1)],
-            "largest_ms": ordered[-1],
+        median = 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2])
+        p95 = ordered[max(0, math.ceil(0.95 * len(ordered)) - 1)]
+        return {
+            "last_ms": _ms(self._times[-1]),
+            "median_ms": _ms(median),
+            "p95_ms": _ms(p95),
+            "largest_ms": _ms(ordered[-1]),
+            "count": self._count,
         }
-        return {name: round(1000 * s, 1) for name, s in figures.items()} | {"count": self._count}
+
+
+def _ms(seconds: float) -> float:
+    return round(1000 * seconds, 1)

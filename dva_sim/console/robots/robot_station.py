@@ -5,14 +5,13 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 from contextlib import closing
-from typing import Any
 
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.asking.refusal import Refused
+from dva_sim.console.wire.rows import StationShown
 from dva_sim.network.sockets import PORT_TRIES, NetworkError, SocketNetwork
 from dva_sim.protocol import messages as m
 
-Line = dict[str, Any]
 Then = Callable[[bool, str], object]
 OFF, REGISTERED, LISTENING = "off", "registered", "listening"
 
@@ -43,7 +42,7 @@ class OwnStation:
         robot.device.silent = True
         robot.device.address = self._own_address()
 
-    def line(self) -> Line:
+    def line(self) -> StationShown:
         """See `RobotStation`."""
         return {
             "state": self.state,

@@ -10,21 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.latencies import Latencies
+from dva_sim.console.wire.rows import EmergencyShown, RobotLine, SensorShown, StationShown
+from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.tap import Exchange
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.worlds.drives import ThreeWay
-
-Line = dict[str, Any]
 
 WHEEL = 1 / 3  # radius of a wheel, as a share of that of the footprint; assumed, for the picture
 SENSING = 1.0  # from one look at the sensors to the next [s]
@@ -33,7 +33,7 @@ SENSING = 1.0  # from one look at the sensors to the next [s]
 class RobotStation(Protocol):
     """How far a robot has come: off, registered, listening."""
 
-    def line(self) -> Line:
+    def line(self) -> StationShown:
         """State, the address at which it listens, and that of the DVA."""
 
 
@@ -47,7 +47,7 @@ class AlwaysListening:
     def __init__(self, robot: RobotAgent) -> None:
         self._robot = robot
 
-    def line(self) -> Line:
+    def line(self) -> StationShown:
         """See `RobotStation`."""
         device = self._robot.device
         state = "listening" if self._robot.body.powered else "off"
@@ -76,27 +76,30 @@ class RobotWindow:
     faults: RobotFaults
     hand: ManualControl
     number: int | None = None
-    emergency: Line | None = None
+    emergency: EmergencyShown | None = None
     notice: str = ""
     one_way: Latencies = field(default_factory=Latencies)
     loop: Latencies = field(default_factory=Latencies)
     replies: Latencies = field(default_factory=Latencies)
     newest: int = 0  # of the messages that it has heard
     over: float = -1.0  # the newest emergency after which it was ordered anew [s]
-    _sensed: tuple[float, list[Line]] = field(default_factory=lambda: (-math.inf, []))
+    _sensed: tuple[float, list[SensorShown]] = field(default_factory=lambda: (-math.inf, []))
 
-    def sensors(self, now: float) -> list[Line]:
+    def sensors(self, now: float) -> list[SensorShown]:
         """Newest values of its sensors, looked at once a second."""
         if now - self._sensed[0] >= SENSING or now < self._sensed[0]:
             self._sensed = now, [*self._read(now)]
         return self._sensed[1]
 
-    def _read(self, now: float) -> Iterator[Line]:
+    def _read(self, now: float) -> Iterator[SensorShown]:
         for name, port in self.robot.sensors.items():
-            values = port.read(now)
-            shown = {"least": min(values)} if len(values) > 3 else {"values": list(values)}
-            stuck = name in self.faults.stuck
-            yield {"name": name, "unit": port.unit, "stuck": stuck, **(shown if values else {})}
+            values, stuck = port.read(now), name in self.faults.stuck
+            shown: SensorShown = {"name": name, "unit": port.unit, "stuck": stuck}
+            if len(values) > 3:
+                shown["least"] = min(values)
+            elif values:
+                shown["values"] = list(values)
+            yield shown
 
 
 class RobotWindows:
@@ -129,16 +132,15 @@ class RobotWindows:
             for id_tag, robot in robots.items()
         }
 
-    def about(self, id_tag: str) -> Line:
+    def about(self, id_tag: str) -> ThingBody:
         """What does not change of a robot, for the scene: what its pictures are drawn by."""
         spec, motors = self.by_id[id_tag].robot.body.spec, self.by_id[id_tag].robot.body.motors
-        told: Line = {
+        return {
             "wheel_radius_m": round(WHEEL * spec.radius, 3),
             "corners_m": [list(corner) for corner in spec.corners],
             "steering": "three_way" if isinstance(motors, ThreeWay) else "free",
             "sensors": list(self.by_id[id_tag].robot.sensors),
         }
-        return told
 
     def set_usual(self, id_tag: str, seconds: float) -> None:
         """A message usually takes a robot's computer so long from now on [s]."""
@@ -184,7 +186,9 @@ class RobotWindows:
                 window.notice = f"manual control has ended: {why}"
                 window.robot.device.tell(window.notice, "mode")
 
-    def lines(self, watched: Iterable[str], stands: Callable[[RobotAgent], str]) -> Iterator[Line]:
+    def lines(
+        self, watched: Iterable[str], stands: Callable[[RobotAgent], str]
+    ) -> Iterator[RobotLine]:
         """A line for each robot that somebody looks at.
 
         Args:
@@ -194,7 +198,9 @@ class RobotWindows:
         for id_tag in watched:
             yield self._line(id_tag, self.by_id[id_tag], stands)
 
-    def _line(self, id_tag: str, window: RobotWindow, stands: Callable[[RobotAgent], str]) -> Line:
+    def _line(
+        self, id_tag: str, window: RobotWindow, stands: Callable[[RobotAgent], str]
+    ) -> RobotLine:
         robot, now = window.robot, window.robot.device.clock.now
         point, body, faults = robot.set_point, robot.body, window.faults
         in_force = now < point.until

@@ -11,6 +11,7 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.running.link import changed, with_link
 from dva_sim.console.running.real_links import TITLE
 from dva_sim.console.wire.arguments import LINK_LIMITS
+from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import Stage
@@ -33,7 +34,7 @@ class LinkSliders:
         self._set_usual = set_usual
         self._wanted: dict[str, float] = {}
 
-    def line(self) -> dict[str, Any]:
+    def line(self) -> LinkShown:
         """What it is like, for pages."""
         link, run = self.link, self._run
         processing = self._wanted.get("processing_s", mean_processing_s(run.scenario))

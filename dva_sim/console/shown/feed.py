@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from dva_sim.agents.people.bystander import SAFE
 from dva_sim.agents.people.person_guard import PersonGuard
@@ -12,13 +11,16 @@ from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.stands import why_stands
 from dva_sim.console.running.played_run import PlayedRun
+from dva_sim.console.shown.things import Things, camera_shown
+from dva_sim.console.wire.events import EventFacts, StoryLine
+from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
+from dva_sim.console.wire.scenes import StoryShown, ThingBody
 from dva_sim.core.event_status import state_since
 from dva_sim.core.events import FINAL, Event, EventBook
-from dva_sim.kernel.recorder import Moment
+from dva_sim.kernel.recorder import Moment, Recorder
 from dva_sim.live.parts import Rate
 from dva_sim.worlds.site import Site
 
-Line = dict[str, Any]
 SEVERITIES = ((0.75, "critical"), (0.5, "high"), (0.25, "medium"), (0.0, "low"))
 KEPT_EVENTS = 50  # of those that are over
 
@@ -31,14 +33,14 @@ class Feed:
         book: Events of its DVA, if there is one here.
 
     Attributes:
-        things: Everybody, with the number that other lines call them by.
-        numbers: Those numbers, by id or name.
+        things: Everybody.
+        numbers: By which lines call them, by id or name.
     """
 
     def __init__(self, run: PlayedRun, book: EventBook | None = None) -> None:
         self._run, self._book = run, book or EventBook()
-        self.things: list[Line] = []
-        self.numbers: dict[str, int] = {}
+        self.things = Things()
+        self.numbers = self.things.numbers
         self._rates: dict[str, Rate] = {}
         self._commands_hz: dict[str, float] = {}
         self._rated = -math.inf
@@ -50,48 +52,28 @@ class Feed:
         return round(self._run.clock.now * 1000)
 
     def _number_all(self) -> None:
-        camera = self._run.scenario.camera
+        camera = camera_shown(self._run.scenario.camera)
         for robot in self._run.field.robots.values():
             spec = robot.body.spec
-            self._number(
-                robot.device.id_tag,
-                robot.device.label,
-                "robot",
-                radius_m=spec.radius,
-                max_speed_mps=spec.max_speed,
-                max_turn_rate_radps=spec.max_turn_rate,
-                camera={
-                    "field_of_view_deg": camera.field_of_view_deg,
-                    "range_m": camera.range_m,
-                    "rate_hz": camera.rate_hz,
-                    "frame_bytes": camera.frame_bytes,
-                },
-            )
+            body: ThingBody = {
+                "radius_m": spec.radius,
+                "max_speed_mps": spec.max_speed,
+                "max_turn_rate_radps": spec.max_turn_rate,
+                "camera": camera,
+            }
+            self.things.add(robot.device.id_tag, robot.device.label, "robot", body)
         for name, who in self._run.field.people():
             device = getattr(who, "device", None)
             kind = "bystander" if device is None else "guard"
             id_tag = name if device is None else device.id_tag
-            played = {"person": True} if isinstance(who, PersonGuard) else {}
-            self._number(id_tag, name, kind, radius_m=who.walking.body.radius, **played)
-
-    def _number(self, id_tag: str, label: str, kind: str, **more: Any) -> None:
-        number = len(self.things)
-        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
-        self.numbers[id_tag] = self.numbers[label] = number
-
-    def add(self, id_tag: str, label: str, kind: str) -> None:
-        """Somebody without a place: an operator, a seat, the DVA."""
-        self._number(id_tag, label, kind)
-
-    def add_other(self, id_tag: str, label: str, kind: str, more: Line) -> None:
-        """Somebody who is none of the scenario's, and may be called as one of them."""
-        number = len(self.things)
-        self.things.append({"i": number, "id": id_tag, "label": label, "kind": kind, **more})
-        self.numbers[id_tag] = number
+            walks: ThingBody = {"radius_m": who.walking.body.radius}
+            if isinstance(who, PersonGuard):
+                walks["person"] = True
+            self.things.add(id_tag, name, kind, walks)
 
     # --- where everybody is ----------------------------------------------------------------
 
-    def positions(self) -> Line:
+    def positions(self) -> PlacesLine:
         """Who has a place; who has left the site has none."""
         field = self._run.field
         field.world.advance_to(self._run.clock.now)
@@ -114,7 +96,7 @@ class Feed:
 
     # --- how they are ----------------------------------------------------------------------
 
-    def robots(self, held_by_lag: bool) -> list[Line]:
+    def robots(self, held_by_lag: bool) -> list[RobotRow]:
         """A row for each robot."""
         now = self._run.clock.now
         if now - self._rated >= 1.0:
@@ -124,7 +106,7 @@ class Feed:
                 self._commands_hz[id_tag] = round(rate.of(robot.applied, now), 1)
         return [self._robot(robot, held_by_lag) for robot in self._run.field.robots.values()]
 
-    def _robot(self, robot: RobotAgent, held_by_lag: bool) -> Line:
+    def _robot(self, robot: RobotAgent, held_by_lag: bool) -> RobotRow:
         run, id_tag = self._run, robot.device.id_tag
         now, (holder, held_for) = run.clock.now, robot.holder
         mode, point = robot.controller.mode, robot.set_point
@@ -154,7 +136,7 @@ class Feed:
         """The name of the pattern by which a robot is driven next, or now."""
         return self._run.stage.pattern_names.get(robot, self._run.scenario.pattern)
 
-    def people(self) -> list[Line]:
+    def people(self) -> list[DoingShown]:
         """What those on foot are doing."""
         return [
             {"i": self.numbers[name], "doing": who.activity}
@@ -163,28 +145,34 @@ class Feed:
 
     # --- what happens ----------------------------------------------------------------------
 
-    def events(self) -> Line:
+    def events(self) -> list[EventFacts]:
         """All that are open, and the last that are over."""
         book = self._book
         over = list(book.closed.values())[-KEPT_EVENTS:]
-        return {
-            "k": "events",
-            "t": self.now_ms,
-            "events": [
-                event_line(event, self._run.stage.site, self._run.stage.labels)
-                for event in (*over, *book.open.values())
-            ],
-        }
+        return [
+            event_facts(event, self._run.stage.site, self._run.stage.labels)
+            for event in (*over, *book.open.values())
+        ]
 
-    def story(self) -> Iterator[Line]:
+    def story(self) -> Iterator[StoryLine]:
         """What was told since the last time; it is forgotten then."""
-        recorder = self._run.recorder
-        moments, recorder.timeline = recorder.timeline, list[Moment]()
-        for time, who, what, kind in moments:
-            yield {"k": "story", "t": round(1000 * time), "who": who, "what": what, "kind": kind}
+        return story_of(self._run.recorder)
 
 
-def event_line(event: Event, site: Site, labels: Mapping[str, str]) -> Line:
+def story_of(recorder: Recorder) -> Iterator[StoryLine]:
+    """What a recorder was told since the last time; it is forgotten then."""
+    moments, recorder.timeline = recorder.timeline, list[Moment]()
+    for moment in moments:
+        yield {"k": "story", **moment_shown(moment)}
+
+
+def moment_shown(moment: Moment) -> StoryShown:
+    """A moment of a story."""
+    time, who, what, kind = moment
+    return {"t": round(1000 * time), "who": who, "what": what, "kind": kind}
+
+
+def event_facts(event: Event, site: Site, labels: Mapping[str, str]) -> EventFacts:
     """How an event stands; labels by id."""
     where = event.position
     x, y = site.frame.to_xy(where.latitude, where.longitude)

@@ -6,15 +6,14 @@ import base64
 import math
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
+from dva_sim.console.wire.events import FieldShown, HazardShown, HazardsLine
 from dva_sim.simulation.full.hazards import RunHazard
 from dva_sim.worlds.hazards import QUANTITIES, Surroundings
 from dva_sim.worlds.site import Site
 
-Line = dict[str, Any]
 MOST_CELLS = 20_000  # of one field
 SMALLEST_CELL = 0.5  # side [m]
 SHARE = 0.05  # of a core that sampling may take: it is done so much the rarer
@@ -45,12 +44,12 @@ class HazardFeed:
         self._cell = max(SMALLEST_CELL, math.ceil(10 * math.sqrt(area / MOST_CELLS)) / 10)
         kinds = {what for i in incidents if not i.false_alarm for what in i.hazard.shows}
         self._kinds = [kind for kind in QUANTITIES if kind in kinds]
-        self._fields: list[Line] = []
+        self._fields: list[FieldShown] = []
         self._next = 0.0
 
-    def line(self, now_ms: int) -> Line:
+    def line(self, now_ms: int) -> HazardsLine:
         """Where they are now."""
-        now, hazards = now_ms / 1000.0, []
+        now, hazards = now_ms / 1000.0, list[HazardShown]()
         for number, incident in enumerate(self._incidents):
             if not incident.is_there(now):
                 continue
@@ -68,7 +67,7 @@ class HazardFeed:
             )
         return {"k": "hazards", "t": now_ms, "hazards": hazards, "fields": self._sampled(now)}
 
-    def _sampled(self, now: float) -> list[Line]:
+    def _sampled(self, now: float) -> list[FieldShown]:
         """The fields, no more often than their cost allows."""
         begun = time.perf_counter()
         if begun >= self._next:
@@ -80,7 +79,7 @@ class HazardFeed:
             self._next = begun + took / SHARE
         return self._fields
 
-    def _field(self, kind: str, now: float) -> Line | None:
+    def _field(self, kind: str, now: float) -> FieldShown | None:
         values, extent, unit = self._surroundings.raster(kind, now, self._cell)
         cells = np.clip(values * (255.0 / FULL[kind]), 0.0, 255.0).round().astype(np.uint8)
         if not cells.any():

@@ -19,11 +19,11 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from dva_sim.console.wire.limits import LOG_BATCH, LOG_BYTES
+from dva_sim.console.wire.records import ExchangesLine
 from dva_sim.network.messaging import Transport
 from dva_sim.network.tap import Exchange, Tap
 from dva_sim.protocol.schema import MAX_BYTES
 
-Line = dict[str, Any]
 Take = Callable[[Exchange], object]
 
 CUT: Final = MAX_BYTES + 1  # enough of a message to show that it is too long [B]
@@ -61,7 +61,7 @@ class MessageLog:
             del taps[self._node]
             self._waiting.clear()
 
-    def batch(self) -> Line | None:
+    def batch(self) -> ExchangesLine | None:
         """What is new, the newest where that is too much; None if there is nothing."""
         if not self._waiting:
             return None
@@ -133,7 +133,7 @@ class Logs:
         for log in self._logs.values():
             self._apply(log)
 
-    def batches(self) -> list[Line]:
+    def batches(self) -> list[ExchangesLine]:
         """What there is to be told now."""
         found = (log.batch() for log in self._logs.values())
         return [line for line in found if line is not None]

@@ -12,6 +12,15 @@ from shapely.geometry import mapping
 
 from dva_sim.console.running.lag import LIMIT
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
+from dva_sim.console.wire.scenes import (
+    LegendEntry,
+    LinkShown,
+    PatternShown,
+    RasterShown,
+    SceneLine,
+    SiteShown,
+    ThingShown,
+)
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.recordings.pictures import colours
 from dva_sim.simulation.full.hazards import RunHazard
@@ -20,8 +29,6 @@ from dva_sim.worlds.maps import OCCUPIED
 from dva_sim.worlds.site import Site
 from dva_sim.worlds.site_export import features_of
 from dva_sim.worlds.tints import floor_tint
-
-Line = dict[str, Any]
 
 MOST_FEATURES = 20_000
 RULES = {
@@ -35,11 +42,12 @@ def scene_of(
     scenario: Scenario,
     site: Site,
     incidents: Sequence[RunHazard],
-    things: list[Line],
+    things: list[ThingShown],
+    link: LinkShown,
     *,
     name: str,
     seed: int,
-) -> Line:
+) -> SceneLine:
     """The first line that a page gets.
 
     Args:
@@ -47,6 +55,7 @@ def scene_of(
         site: Where.
         incidents: Its hazards.
         things: Everybody, with their numbers.
+        link: How messages travel.
         name: Of the scenario.
         seed: Of the run.
     """
@@ -66,10 +75,11 @@ def scene_of(
         "lag_limit_s": LIMIT,
         "rules": RULES,
         "legend": legend(incidents),
+        "link": link,
     }
 
 
-def patterns_of(own: str) -> list[Line]:
+def patterns_of(own: str) -> list[PatternShown]:
     """All that may be chosen: the shipped ones, and the scenario's."""
     names = dict.fromkeys([*PATTERNS, own])
     kinds = {name: PATTERNS.get(name) for name in names}
@@ -85,10 +95,10 @@ def patterns_of(own: str) -> list[Line]:
     ]
 
 
-def site_of(site: Site) -> Line:
+def site_of(site: Site) -> SiteShown:
     """The plan of a site, in metres and as GeoJSON in degrees."""
     tints: dict[str, str] = {}
-    told: Line = {
+    told: SiteShown = {
         "name": site.name,
         "extent_m": _rounded(site.extent),
         "origin": {
@@ -116,7 +126,7 @@ def site_of(site: Site) -> Line:
     return told
 
 
-def raster_of(site: Site) -> Line:
+def raster_of(site: Site) -> RasterShown:
     """Which cells of a bare map are taken, one bit each, row 0 to the south."""
     grid = site.grid
     taken = grid.cells == OCCUPIED
@@ -132,7 +142,7 @@ def raster_of(site: Site) -> Line:
     }
 
 
-def geojson_of(site: Site) -> Line:
+def geojson_of(site: Site) -> dict[str, Any]:
     """Everything that is drawn on a site, with longitude and latitude."""
     features = []
     for feature in features_of(site):
@@ -144,7 +154,7 @@ def geojson_of(site: Site) -> Line:
     return {"type": "FeatureCollection", "features": features}
 
 
-def _to_degrees(site: Site, shape: Any) -> Line:
+def _to_degrees(site: Site, shape: Any) -> dict[str, Any]:
     def convert(points: Any) -> Any:
         degrees = np.array([site.frame.to_latlon(x, y) for x, y in points.tolist()])
         return degrees[:, ::-1].round(8)
@@ -154,9 +164,9 @@ def _to_degrees(site: Site, shape: Any) -> Line:
     return dict(mapping(shapely.LineString(there) if ring else there))
 
 
-def legend(incidents: Sequence[RunHazard]) -> list[Line]:
+def legend(incidents: Sequence[RunHazard]) -> list[LegendEntry]:
     """What the colours and marks of a map mean."""
-    kinds = [
+    kinds: list[LegendEntry] = [
         {"kind": kind, "mode": mode, "colour": colour}
         for kind, modes in (
             (colours.ROBOT, colours.ROBOT_MODES),
@@ -164,9 +174,11 @@ def legend(incidents: Sequence[RunHazard]) -> list[Line]:
         )
         for mode, colour in modes.items()
     ]
-    bodies = [{"kind": kind, "colour": colour} for kind, colour in colours.KINDS.items()]
+    bodies: list[LegendEntry] = [
+        {"kind": kind, "colour": colour} for kind, colour in colours.KINDS.items()
+    ]
     hazards = {i.kind: i.hazard for i in incidents}
-    marks = [
+    marks: list[LegendEntry] = [
         {"kind": kind, "title": hazard.title, "colour": hazard.colour, "mark": hazard.mark}
         for kind, hazard in hazards.items()
     ]
@@ -176,7 +188,9 @@ def legend(incidents: Sequence[RunHazard]) -> list[Line]:
         "water": colours.WATER,
         "heat": colours.FIRE,
     }
-    shown = [{"kind": kind, "field": True, "colour": colour} for kind, colour in fields.items()]
+    shown: list[LegendEntry] = [
+        {"kind": kind, "field": True, "colour": colour} for kind, colour in fields.items()
+    ]
     return [*bodies, *kinds, *marks, *shown]
 
 

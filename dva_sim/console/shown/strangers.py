@@ -5,31 +5,39 @@ Of them is shown what the DVA knows: that they are there, where, and in which mo
 
 from __future__ import annotations
 
-import math
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.console.shown.feed import Feed
+from dva_sim.console.shown.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
+from dva_sim.console.wire.rows import RobotRow
 from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
 from dva_sim.kernel.labels import distinct
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import kind_of
 
-Line = dict[str, Any]
 MOST: Final = 64
-UNKNOWN_ROBOT: Final = {"radius_m": 0.3, "max_speed_mps": 0.5, "max_turn_rate_radps": math.pi / 6}
-UNKNOWN_GUARD: Final = {"radius_m": 0.25, "person": True}
 
 
-def row_of_stranger(number: int, mode: str, **known: Any) -> Line:
+def row_of_stranger(number: int, mode: str) -> RobotRow:
     """A robot of which little is known; what is not is null."""
-    unknown = dict.fromkeys(
-        (
-            *("pattern", "battery", "holder", "holder_label", "session_age_s", "watchdog_left_s"),
-            *("set_speed_mps", "set_turn_rate_radps", "queue", "lost", "commands_hz"),
-            *("refused", "timeouts"),
-        )
-    )
-    return {"i": number, "mode": mode, "stands": "", **unknown, **known}
+    return {
+        "i": number,
+        "mode": mode,
+        "stands": "",
+        "pattern": None,
+        "battery": None,
+        "holder": None,
+        "holder_label": None,
+        "session_age_s": None,
+        "watchdog_left_s": None,
+        "set_speed_mps": None,
+        "set_turn_rate_radps": None,
+        "queue": None,
+        "lost": None,
+        "commands_hz": None,
+        "refused": None,
+        "timeouts": None,
+    }
 
 
 class Strangers:
@@ -63,9 +71,9 @@ class Strangers:
     def _meet(self, entry: DeviceEntry) -> None:
         device, is_robot = entry.device, entry.kind == ROBOT
         self._known[device.id_tag] = "robot" if is_robot else "guard"
-        more = UNKNOWN_ROBOT if is_robot else UNKNOWN_GUARD
+        body = UNKNOWN_ROBOT if is_robot else {**UNKNOWN_PERSON, "person": True}
         label = distinct(device.label, device.id_tag, self._run.stage.labels.values())
-        self._feed.add_other(device.id_tag, label, self._known[device.id_tag], more)
+        self._feed.things.add_stranger(device.id_tag, label, self._known[device.id_tag], body)
 
     def positions(self) -> list[list[int]]:
         """Of those who have said where they are."""
@@ -76,7 +84,7 @@ class Strangers:
                 rows.append([self._feed.numbers[id_tag], round(100 * x), round(100 * y), 0, 0])
         return rows
 
-    def robots(self) -> list[Line]:
+    def robots(self) -> list[RobotRow]:
         """A row for each robot."""
         return [
             row_of_stranger(self._feed.numbers[id_tag], entry.mode)

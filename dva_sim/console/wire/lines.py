@@ -1,10 +1,91 @@
-"""Lines that are told to pages, by their kinds."""
+"""The lines that are told to pages, each kind declared once.
 
-from __future__ import annotations
+A line has a kind `k`, and most have a time `t` of the world's clock [ms]. Lengths are in metres and
+angles in radians, unless a name says otherwise. What is null is unknown; what may be left out says
+so. Pages know the same types (`static/js/lines.js`) by their names without `Line` and `Shown`.
+"""
 
-from typing import Final
+from typing import Final, Protocol, TypeAlias
 
+from dva_sim.console.wire.events import (
+    AlarmsLine,
+    AuditLine,
+    ControlLine,
+    EventsLine,
+    HazardsLine,
+    StoryLine,
+    ToldLine,
+)
+from dva_sim.console.wire.pages import (
+    LogLine,
+    MovedLine,
+    OtherSeatLine,
+    PongLine,
+    SnapLine,
+    YouLine,
+)
+from dva_sim.console.wire.records import ByeLine, ExchangesLine, PicturesLine, ShelfLine
+from dva_sim.console.wire.rows import DevicesLine, PlacesLine, RobotLine, RowsLine
+from dva_sim.console.wire.scenes import EmptySceneLine, SceneLine
+from dva_sim.console.wire.seats import DoneLine, GuardLine, SeatLine
 from dva_sim.serving.pipes import LineKinds
+
+# What a console tells the web process.
+Told: TypeAlias = (
+    SceneLine
+    | EmptySceneLine
+    | PlacesLine
+    | RowsLine
+    | RobotLine
+    | DevicesLine
+    | HazardsLine
+    | EventsLine
+    | ControlLine
+    | AlarmsLine
+    | AuditLine
+    | StoryLine
+    | ToldLine
+    | SeatLine
+    | GuardLine
+    | ExchangesLine
+    | ShelfLine
+    | PicturesLine
+    | DoneLine
+    | ByeLine
+)
+# What that tells pages, with a number `s`.
+ToPage: TypeAlias = (
+    SnapLine
+    | MovedLine
+    | RowsLine
+    | RobotLine
+    | DevicesLine
+    | HazardsLine
+    | EventsLine
+    | ControlLine
+    | AlarmsLine
+    | AuditLine
+    | StoryLine
+    | ToldLine
+    | SeatLine
+    | OtherSeatLine
+    | GuardLine
+    | LogLine
+    | ShelfLine
+    | PicturesLine
+    | DoneLine
+    | ByeLine
+    | YouLine
+    | PongLine
+)
+
+
+class Tell(Protocol):
+    """Takes lines for pages, and a key for those of which the newest counts."""
+
+    def __call__(self, line: Told, key: object = "", /) -> object:
+        """Take one."""
+
 
 KINDS: Final = LineKinds(
     newest=frozenset({"pos", "seat", "rows", "hazards", "events", "devices", "told"}),

@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import dataclass
 
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.shown.feed import Feed
+from dva_sim.console.wire.scenes import OrderShown
+from dva_sim.console.wire.seats import DriveShown, InputHeard, PhoneShown, SeatLine
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.run import Run
 
-Line = dict[str, Any]
 PHASES = ("driving", "starting", "stopping", "asking", "held")  # the first that holds is told
+
+
+@dataclass
+class ActedInput:
+    """The newest command that has taken effect on a robot: its age, and the input behind it."""
+
+    age_ms: float | None = None
+    loop_ms: float | None = None
+    input: InputHeard | None = None
+
+
+_NOTHING, _NO_DRIVE = ActedInput(), DriveLog("", "", 0, 0.0)
 
 
 class SeatLines:
@@ -39,7 +52,7 @@ class SeatLines:
     ) -> None:
         self._run, self._feed, self._persons, self._client_of = run, feed, persons, client_of
         self._phones = phones
-        self._acted: dict[str, Line] = {}  # by robot: of the newest command that has taken effect
+        self._acted: dict[str, ActedInput] = {}  # of the newest command in force, by robot
 
     def applied(self, drive: DriveLog) -> None:
         """A command has taken effect: which input was behind it?"""
@@ -47,12 +60,12 @@ class SeatLines:
         if held is None or not drive.applied:
             return
         command = drive.applied[-1]
-        acted = self._acted.setdefault(drive.robot, {})
-        acted["age_ms"] = round(1000 * (command.time - command.issued), 1)
+        acted = self._acted.setdefault(drive.robot, ActedInput())
+        acted.age_ms = round(1000 * (command.time - command.issued), 1)
         given = held.acted(command.issued, command.sample_age)
         if given is not None:
-            acted["input"] = {"n": given.number, "at_ms": round(1000 * time.time(), 1)}
-            acted["loop_ms"] = round(1000 * (command.time - given.time), 1)
+            acted.input = {"n": given.number, "at_ms": round(1000 * time.time(), 1)}
+            acted.loop_ms = round(1000 * (command.time - given.time), 1)
 
     def _held(self, drive: DriveLog) -> HeldRobot | None:
         for person in self._persons.values():
@@ -61,29 +74,38 @@ class SeatLines:
                 return held
         return None
 
-    def waiting_order(self) -> Line | None:
+    def waiting_order(self) -> OrderShown | None:
         """An order for a seat in which nobody sits yet."""
         persons = self._persons.values()
         orders = [p.order for p in persons if p.order is not None and not p.attended]
         return self._order(orders[0]) if orders else None
 
-    def lines(self) -> Iterator[tuple[str, Line]]:
-        """A line for each client that sits somewhere."""
+    def lines(self) -> Iterator[tuple[str, SeatLine]]:
+        """A line for each client that sits somewhere, and for phones not registered yet."""
         for number, client in self._client_of.items():
-            yield client, self._line(client, self._persons[number]) | self._phone(client)
+            yield client, self._line(client, self._persons[number])
         for client in self._phones.keys() - self._client_of.values():
-            yield client, self._of_nobody(client) | self._phone(client)
+            yield client, self.free(client, self._phone(client))
 
-    def _phone(self, client: str) -> Line:
+    def _phone(self, client: str) -> PhoneShown | None:
         phone = self._phones.get(client)
-        return {"phone": None if phone is None else phone.line(time.monotonic())}
+        return None if phone is None else phone.line(time.monotonic())
 
-    def _of_nobody(self, client: str) -> Line:
-        """Of a phone that has not registered yet."""
-        line = {"k": "seat", "t": self._feed.now_ms, "seat": client, "label": ""}
-        return line | {"phase": "free", "order": None, "alert": "", "drives": []}
+    def free(self, client: str, phone: PhoneShown | None = None) -> SeatLine:
+        """The line of a client that sits nowhere."""
+        return {
+            "k": "seat",
+            "t": self._feed.now_ms,
+            "seat": client,
+            "label": "",
+            "phase": "free",
+            "order": None,
+            "alert": "",
+            "drives": [],
+            "phone": phone,
+        }
 
-    def _line(self, client: str, person: PersonAgent) -> Line:
+    def _line(self, client: str, person: PersonAgent) -> SeatLine:
         held = list(person.robots.values())
         phases = {each.phase for each in held}
         return {
@@ -95,9 +117,10 @@ class SeatLines:
             "order": None if person.order is None else self._order(person.order),
             "alert": person.alert or person.device.dva_alert,
             "drives": [self._drive(each) for each in held],
+            "phone": self._phone(client),
         }
 
-    def _order(self, order: m.Order) -> Line:
+    def _order(self, order: m.Order) -> OrderShown:
         where = order.position
         x, y = self._run.stage.site.frame.to_xy(where.latitude, where.longitude)
         return {
@@ -109,12 +132,13 @@ class SeatLines:
             "room": self._run.stage.site.room_at(x, y),
         }
 
-    def _drive(self, held: HeldRobot) -> Line:
-        run, log = self._run, held.log
+    def _drive(self, held: HeldRobot) -> DriveShown:
+        run, log = self._run, held.log or _NO_DRIVE
         robot, reach = run.field.robots.get(held.robot), run.stage.reach(held.robot)
-        acted = self._acted.get(held.robot, {})
-        frame = held.frame
-        told: Line = {
+        acted = self._acted.get(held.robot, _NOTHING)
+        frame, trips, is_over = held.frame, log.round_trips, log.ended is not None
+        command = log.commands[-1][1:] if log.commands and not is_over else (0.0, 0.0)
+        return {
             "i": self._feed.numbers.get(held.robot),  # of a robot from elsewhere there is none
             "pattern": self._feed.pattern_of(held.robot),
             "phase": held.phase,
@@ -124,39 +148,17 @@ class SeatLines:
                 round(held.last.speed * reach.speed, 3),
                 round(held.last.turn * reach.turn_rate, 3),
             ],
-            "command": [0.0, 0.0],
-            "command_age_ms": acted.get("age_ms"),
+            "command": [round(number, 3) for number in command],
+            "command_age_ms": acted.age_ms,
             "picture_ms": None if frame is None else round(1000 * frame.captured),
             "picture_arrived_ms": None if frame is None else round(1000 * held.arrived),
-            "loop_ms": acted.get("loop_ms"),
-            "input": acted.get("input"),
+            "loop_ms": acted.loop_ms,
+            "input": acted.input,
+            "sent": log.sent,
+            "answered": len(trips),
+            "timeouts": log.timeouts,
+            "refused": sum(log.refused.values()),
+            "superseded": log.superseded,
+            "round_trip_ms": round(1000 * trips[-1], 1) if trips else None,
+            "outcome": log.outcome if is_over else None,
         }
-        return told | (_counts(log) if log is not None else _NONE)
-
-
-_NONE: Line = {
-    "sent": 0,
-    "answered": 0,
-    "timeouts": 0,
-    "refused": 0,
-    "superseded": 0,
-    "round_trip_ms": None,
-    "outcome": None,
-}
-
-
-def _counts(log: DriveLog) -> Line:
-    """How the commands of a drive fared."""
-    trips = log.round_trips
-    counts: Line = {
-        "sent": log.sent,
-        "answered": len(trips),
-        "timeouts": log.timeouts,
-        "refused": sum(log.refused.values()),
-        "superseded": log.superseded,
-        "round_trip_ms": round(1000 * trips[-1], 1) if trips else None,
-        "outcome": log.outcome if log.ended is not None else None,
-    }
-    if log.commands and log.ended is None:
-        counts["command"] = [round(number, 3) for number in log.commands[-1][1:]]
-    return counts

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.cameras.lines import Show, contained_line
 from dva_sim.cameras.screens import Screens
 from dva_sim.console.audit.audited import Audited
 from dva_sim.console.dva.dva_pages import DvaPages
@@ -23,15 +23,17 @@ from dva_sim.console.running.sliders import LinkSliders
 from dva_sim.console.shown.feed import Feed
 from dva_sim.console.shown.fields import HazardFeed
 from dva_sim.console.shown.logs import Logs
+from dva_sim.console.shown.news import News, clock_shown
 from dva_sim.console.shown.scene import scene_of
 from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.wire.events import EventShown
 from dva_sim.console.wire.limits import LOG_PERIOD
+from dva_sim.console.wire.lines import Tell
+from dva_sim.console.wire.rows import RobotRow, RowsLine
 from dva_sim.console.world.seat_lines import SeatLines
 from dva_sim.network.realtime import PacedClock
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.scenario import Scenario
-
-Line = dict[str, Any]
 
 # From one line to the next, real time [s].
 POSITIONS, WINDOWS, ROWS, HAZARDS, DEVICES, TIDY = 0.1, 0.1, 0.5, 1.0, 1.0, 1.0
@@ -65,13 +67,15 @@ class ToldWorld:
     guards: PlayedGuards
     dva: DvaPages
     audited: Audited | None
-    tell: Callable[..., object]
-    show: Callable[..., object]
+    tell: Tell
+    show: Show
     dropped: Callable[[], int]
 
     def __init__(self) -> None:
-        self._newest: dict[str, Any] = {}
-        self._events: list[Line] = []
+        self._news = News(lambda: self.tell)
+        self._modes: list[object] = []
+        self._events: list[EventShown] = []
+        self._contained: dict[int, float] = {}
 
     def show_scene(self) -> None:
         """Tell whoever draws, from the beginning, what there is to be seen."""
@@ -94,41 +98,31 @@ class ToldWorld:
         """Tell what does not change, but for where the DVA listens."""
         run = self.run
         scene = scene_of(
-            *(self.scenario, run.stage.site, run.field.incidents, self.feed.things),
+            *(self.scenario, run.stage.site, run.field.incidents),
+            *(self.feed.things.all, self.sliders.line()),
             name=self.name,
             seed=self.seed,
         )
-        scene["link"] = self.sliders.line()
-        scene |= {"dva_address": self.phones.address, "phone": self.phones.offer()}
+        scene["dva_address"], scene["phone"] = self.phones.address, self.phones.offer()
         self.tell(scene)
 
     def _tell_audit(self) -> None:
         if self.audited is not None:
-            self._tell_new(self.audited.keeper.line(self.feed.now_ms), but="t")
-
-    def clock_line(self) -> Line:
-        """How time goes by."""
-        return {
-            "factor": self.clock.factor,
-            "paused": self.clock.paused,
-            "lag_s": round(self.lag.newest, 3),
-            "given_up_s": round(self.clock.given_up, 2),
-            "held_by_lag": self.lag.held,
-        }
+            self._news.tell(self.audited.keeper.line(self.feed.now_ms))
 
     def _tell_positions(self) -> None:
         line = self.feed.positions()
         line["p"] += self.strangers.positions()
-        self._tell_new(line, but="t")
+        self._news.tell(line)
 
     def _tell_rows(self) -> None:
         if self.strangers.come():
             self.tell_scene()
         self.lag.measured(time.monotonic(), self.clock.worst_lag())
-        rows: Line = {
+        rows: RowsLine = {
             "k": "rows",
             "t": self.feed.now_ms,
-            "clock": self.clock_line(),
+            "clock": clock_shown(self.clock, self.lag),
             "link": self.sliders.line(),
             "dropped": self.dropped(),
             "server": self.dva.port.line(),
@@ -147,7 +141,7 @@ class ToldWorld:
             return why_stands(robot, self.clock.now, self.lag.held)
 
         for line in self.windows.lines(self.screens.watched, stands):
-            self._tell_new(line, but="t", key=str(line["i"]))
+            self._news.tell(line, line["i"])
 
     def _tell_devices(self) -> None:
         line = self.dva.devices(self.feed.now_ms)
@@ -159,14 +153,11 @@ class ToldWorld:
             self.tell(line)
 
     def _tell_hazards(self) -> None:
-        self._tell_new(self.hazards.line(self.feed.now_ms), but="t")
+        self._news.tell(self.hazards.line(self.feed.now_ms))
         for number, when in self.run.field.contained.items():
-            self._tell_once("contain", number, round(1000 * when))
-
-    def _tell_once(self, kind: str, number: int, when: int) -> None:
-        if self._newest.get(f"{kind} {number}") != when:
-            self._newest[f"{kind} {number}"] = when
-            self.show({"k": kind, "t": when, "n": number})
+            if self._contained.get(number) != when:
+                self._contained[number] = when
+                self.show(contained_line(number, when))
 
     def _tell_news(self) -> None:
         """Events, story and seats, as soon as they change; rows when a mode or holder does."""
@@ -174,44 +165,36 @@ class ToldWorld:
         for line in self.feed.story():
             self.tell(line)
         robots = self.run.field.robots.values()
-        modes = [(robot.controller.mode, robot.holder[0]) for robot in robots]
-        if self._newest.get("modes") != modes:
-            self._newest["modes"] = modes
+        modes: list[object] = [(robot.controller.mode, robot.holder[0]) for robot in robots]
+        if self._modes != modes:
+            self._modes = modes
             self._tell_rows()
         self._tell_seats()
         self._tell_audit()
 
     def _tell_events(self) -> None:
         """Events with what was decided on them, and who decides."""
-        line = self.feed.events()
-        told = self.rooms.listener
-        self._events = line["events"] = [
-            event | about_event(told.events, told.told_at, event["number"])
-            for event in line["events"]
+        told, now_ms = self.rooms.listener, self.feed.now_ms
+        self._events = [
+            {**event, **about_event(told.events, told.told_at, event["number"])}
+            for event in self.feed.events()
         ]
-        self._tell_new(line, but="t")
-        self._tell_new(self.rooms.line(self.feed.now_ms), but="t")
+        self._news.tell({"k": "events", "t": now_ms, "events": self._events})
+        self._news.tell(self.rooms.line(now_ms))
 
-    def _tell_alarms(self, robots: list[Line]) -> None:
-        self._tell_new(self.alarms.look(self._events, robots, self.feed.now_ms), but="t")
+    def _tell_alarms(self, robots: list[RobotRow]) -> None:
+        self._news.tell(self.alarms.look(self._events, robots, self.feed.now_ms))
 
     def _tell_seats(self) -> None:
-        for client, line in (*self.seat_lines.lines(), *self.guards.lines()):
-            self._tell_new(line, but="t", key=client)
-
-    def _tell_new(self, line: Line, but: str, key: str = "") -> None:
-        """Tell a line unless nothing in it has changed, its time apart."""
-        said = {name: value for name, value in line.items() if name != but}
-        place = f"{line['k']} {key}"
-        if self._newest.get(place) != said:
-            self._newest[place] = said
-            self.tell(line, key)
+        for client, line in self.seat_lines.lines():
+            self._news.tell(line, client)
+        for client, played in self.guards.lines():
+            self._news.tell(played, client)
 
     def free_seat(self, client: str) -> None:
         """A client sits nowhere any more, and is told so."""
-        empty = {"k": "seat", "t": self.feed.now_ms, "seat": client, "phase": "free"}
-        self.tell(empty | {"order": None, "alert": "", "drives": [], "phone": None}, client)
-        self._newest.pop(f"seat {client}", None)
+        self.tell(self.seat_lines.free(client), client)
+        self._news.forget("seat", client)
 
     def tell_now(self) -> None:
         """Something has changed that nobody shall wait for."""

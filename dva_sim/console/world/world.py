@@ -6,7 +6,7 @@ One thread does everything, and waits for nobody: lines to other processes go in
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -15,6 +15,7 @@ from dva_sim.agents.observation import Cameras
 from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
+from dva_sim.cameras.lines import FrameLine, Show, contained_line, scene_line
 from dva_sim.cameras.screens import Screens, camera_url, topic_of
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited, name_of_page
@@ -32,6 +33,7 @@ from dva_sim.console.shown.feed import Feed
 from dva_sim.console.shown.fields import HazardFeed
 from dva_sim.console.shown.logs import Logs
 from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.wire.lines import Tell
 from dva_sim.console.world.seat_lines import SeatLines
 from dva_sim.console.world.telling import ToldWorld
 from dva_sim.kernel.errors import DvaSimError
@@ -40,9 +42,6 @@ from dva_sim.recordings.audit_log import AuditRow, plain_row
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.simulation.scenario import Scenario, phone_profile
-
-Line = dict[str, Any]
-Tell = Callable[..., object]
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
@@ -99,7 +98,7 @@ class ConsoleWorld(ToldWorld):
             raise
         self.feed, self.lag = Feed(self.run, self.run.dva.desk.book), LagRule()
         self.tell: Tell = lambda *_: None
-        self.show: Tell = lambda *_: None
+        self.show: Show = lambda *_: None
         self.windows = self._windows()
         self.sliders = LinkSliders(self.run, self.windows.set_usual)
         self.dropped: Callable[[], int] = lambda: 0
@@ -114,7 +113,7 @@ class ConsoleWorld(ToldWorld):
         self.client_of: dict[int, str] = {}
         for number in range(max(PEOPLE, len(self.run.persons))):
             self.person(number)
-        self.feed.add(DVA, "dva", "dva")
+        self.feed.things.add(DVA, "dva", "dva")
         if self.sockets is not None:
             self.sockets.join("console", SCREEN)
         self.screens = Screens(
@@ -155,7 +154,7 @@ class ConsoleWorld(ToldWorld):
         about = self.feed.numbers, run.stage.labels
         windows = RobotWindows(recorder, run.field.robots, *about, recorder.sent_at, lost)
         for id_tag in run.field.robots:
-            self.feed.things[self.feed.numbers[id_tag]] |= windows.about(id_tag)
+            self.feed.things.learn(id_tag, windows.about(id_tag))
         return windows
 
     def deafen(self, robot: str, on: bool) -> None:
@@ -178,9 +177,9 @@ class ConsoleWorld(ToldWorld):
     def show_scene(self) -> None:
         """Tell whoever draws, from the beginning, what there is to be seen."""
         scenario = self.scenario.model_dump(mode="json")
-        self.show({"k": "scene", "t": 0, "scenario": scenario, "seed": self.seed})
+        self.show(scene_line(scenario, self.seed))
         for number, when in self.run.field.contained.items():
-            self.show({"k": "contain", "t": round(1000 * when), "n": number})
+            self.show(contained_line(number, when))
 
     def note(self, text: str) -> None:
         """Something of the console itself has gone wrong that people should know of."""
@@ -212,7 +211,7 @@ class ConsoleWorld(ToldWorld):
 
     def _named(self, device: str) -> str:
         """The name of a device by its id, or of things by their numbers."""
-        names = {str(thing["i"]): thing["label"] for thing in self.feed.things}
+        names = {str(thing["i"]): thing["label"] for thing in self.feed.things.all}
         found = [names.get(one, one) for one in device.split(", ")] if device else []
         return self.run.stage.labels.get(device, ", ".join(found))
 
@@ -235,7 +234,7 @@ class ConsoleWorld(ToldWorld):
             device.register()
             for robot in self.run.field.robots:
                 device.connect(robot)  # an emergency does not wait for a connection
-            self.feed.add(device.id_tag, device.label, "operator")
+            self.feed.things.add(device.id_tag, device.label, "operator")
             self._persons[place] = person
         return self._persons[number]
 
@@ -265,7 +264,7 @@ class ConsoleWorld(ToldWorld):
         devices = self.run.stage.devices
         return next((device.id_tag for device in devices if device.label == label), None)
 
-    def _show_frame(self, line: Line, robot: int) -> None:
+    def _show_frame(self, line: FrameLine, robot: int) -> None:
         self.show(line, robot)
 
     def _watch_robot(self, held: HeldRobot) -> None:
@@ -289,7 +288,7 @@ class ConsoleWorld(ToldWorld):
 
     # --- the link --------------------------------------------------------------------------
 
-    def change_link(self, given: Line) -> str:
+    def change_link(self, given: Mapping[str, Any]) -> str:
         """Change the link of all robots; what is changed, in words.
 
         Raises:

@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 
 import pytest
+from helpers.console.declared_lines import checked
 from helpers.dva.permissions import confirmation
 from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
@@ -33,7 +34,7 @@ class Bench:
         options = RobotOptions(changes=("request.timeout_s=0.3",))
         self.world = RobotWorld(options.read(), clock=PacedClock())
         self.lines = []
-        self.world.tell = lambda line, key="": self.lines.append(line)
+        self.world.tell = lambda line, key="": self.lines.append(checked(line))
         self.desk = RobotDesk(self.world)
         self.world.begin()
         self.world.clock.go()

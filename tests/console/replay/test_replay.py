@@ -6,8 +6,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from helpers.console.declared_lines import checked
 from recordings.runs import drill, evacuation
 
+from dva_sim.cameras.lines import PaintersLine
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.moments import decided_on, event_at
 from dva_sim.console.replay.player import NOBODY, Player
@@ -48,6 +50,7 @@ class Told:
         self.player.tell, self.player.show = self._take, self._show
 
     def _take(self, line, key=None):
+        line = checked(line)
         self.lines[line["k"]] = line
         if line["k"] == "log":
             self.logs.append(line)
@@ -55,7 +58,7 @@ class Told:
             self.answers.append(line)
 
     def _show(self, line, key=None):
-        self.shown.append(line)
+        self.shown.append(checked(line, PaintersLine))
 
     def ask(self, what, number="a", **more):
         self.player.take({"do": what, "id": number, "client": "c", **more})
@@ -152,10 +155,10 @@ def test_a_robot_that_is_driven_shows_who_drives_and_how(recorded):
 def test_a_driver_sees_the_picture_that_had_come_by_then(recorded):
     drive = next(d for d in drill().recorder.drives if len(d.frames) > 2)
     shown = drive.frames[2]
-    frame = recorded.frame(drive.robot, shown.time + 0.001)
+    frame = recorded.frame(drive.robot, 1, shown.time + 0.001)
     assert frame["captured_ms"] == round(1000 * shown.captured)
     assert frame["t"] > frame["captured_ms"]
-    before = recorded.frame(drive.robot, drive.frames[0].time - 0.001)
+    before = recorded.frame(drive.robot, 1, drive.frames[0].time - 0.001)
     assert before is None or before["captured_ms"] < frame["captured_ms"]
 
 

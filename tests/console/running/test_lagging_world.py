@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from helpers.console.declared_lines import checked
 from helpers.processes.patience import becomes
 
 from dva_sim.agents.robot.controller import Mode
@@ -17,7 +18,7 @@ pytestmark = pytest.mark.system
 def world():
     made = ConsoleWorld(build(load("hands-on")), "hands-on", 1)
     made.lines = []
-    made.tell = lambda line, key="": made.lines.append(line)
+    made.tell = lambda line, key="": made.lines.append(checked(line))
     made.actions = Actions(made)
     made.begin()
     made.clock.go()

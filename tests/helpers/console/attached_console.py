@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.console.declared_lines import checked
 from helpers.console.simulated_phone import FIRE, PhonePage
 
 from dva_sim.console.attached.actions import AttachedActions
@@ -48,7 +49,7 @@ class AttachedPage:
         self.keeper = AuditKeeper(audit, lambda: world.world.clock.now, {})
         self.pages = AttachedPages(self.system, self.keeper)
         self.lines: list[dict[str, Any]] = []
-        self.pages.tell = lambda line, _="": self.lines.append(line)
+        self.pages.tell = lambda line, _="": self.lines.append(checked(line))
         self.actions = AttachedActions(self.pages)
         self.pages.begin()
         world.world.clock.every(0.05, self.keeper.take)

@@ -5,6 +5,9 @@ Over modelled links without real time: pulses come by virtual time, so that noth
 
 import time
 
+from helpers.console.declared_lines import checked
+
+from dva_sim.cameras.lines import PaintersLine
 from dva_sim.console.people.actions import Actions
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.clock import US
@@ -57,8 +60,8 @@ class Page:
         if sockets is None:
             monkeypatch.setattr(time, "monotonic", lambda: self.world.clock.now)
         self.lines, self.frames, self.client = [], [], client
-        self.world.tell = lambda line, key="": self.lines.append(line)
-        self.world.show = lambda line, key="": self.frames.append(line)
+        self.world.tell = lambda line, key="": self.lines.append(checked(line))
+        self.world.show = lambda line, key="": self.frames.append(checked(line, PaintersLine))
         self.actions = Actions(self.world)
         self.world.begin()
         self.wanted, self._count = None, 0

@@ -1,0 +1,169 @@
+"""Hazards, events, what is decided on them, alarms, and the story."""
+
+from typing import Literal
+
+from typing_extensions import TypedDict
+
+from dva_sim.console.wire.scenes import LabelledMoment, RasterShown, StoryShown
+
+
+class HazardShown(TypedDict):
+    """A hazard on the map."""
+
+    n: int
+    kind: str
+    x_m: float
+    y_m: float
+    radius_m: float
+    severity: float
+    contained: bool
+
+
+class FieldScale(TypedDict):
+    """The quantity that a full cell stands for."""
+
+    value: float
+    unit: str
+
+
+class FieldShown(RasterShown):
+    """What hazards make of the air or the floor."""
+
+    kind: str
+    full: FieldScale
+
+
+class HazardsLine(TypedDict):
+    """Where hazards are, and how far they reach."""
+
+    k: Literal["hazards"]
+    t: int
+    hazards: list[HazardShown]
+    fields: list[FieldShown]
+
+
+class DecidedShown(LabelledMoment):
+    """The newest decision on an event."""
+
+    action: str
+    reason: str
+
+
+class EventDecisions(TypedDict):
+    """What people and the policy have decided on an event."""
+
+    decisions: int | None
+    acknowledged: LabelledMoment | None
+    decided: DecidedShown | None
+    note: str | None
+
+
+class EventFacts(TypedDict):
+    """How an event stands."""
+
+    number: int
+    kind: str
+    x_m: float
+    y_m: float
+    latitude_deg: float
+    longitude_deg: float
+    room: str | None
+    severity: str
+    severity_value: float
+    state: str
+    over: bool
+    since_ms: int
+    reported_ms: int
+    assigned: list[str]
+
+
+class EventShown(EventFacts, EventDecisions):
+    """An event, and what was decided on it."""
+
+
+class EventsLine(TypedDict):
+    """All events that are open, and the last that are over."""
+
+    k: Literal["events"]
+    t: int
+    events: list[EventShown]
+
+
+class DispatchShown(TypedDict):
+    """How orders are given."""
+
+    mode: str
+    decide_within_s: float
+    switched: LabelledMoment | None
+
+
+class RoomEntry(TypedDict):
+    """A control room."""
+
+    label: str
+    role: str
+    client: str
+
+
+class ControlLine(TypedDict):
+    """How orders are given, and who decides."""
+
+    k: Literal["control"]
+    t: int
+    dispatch: DispatchShown | None
+    rooms: list[RoomEntry]
+
+
+class AlarmRow(TypedDict):
+    """A row of the list of alarms."""
+
+    key: str
+    priority: str
+    state: str
+    text: str
+    place: str
+    count: int
+    event: int | None
+    since_ms: int
+    is_new: bool
+    seen_by: str
+    left_s: int | None
+    shelved_by: str
+
+
+class AlarmsLine(TypedDict):
+    """The alarms, and how many there were lately."""
+
+    k: Literal["alarms"]
+    t: int
+    alarms: list[AlarmRow]
+    shelved: list[AlarmRow]
+    flood: bool
+    rate: int
+    left_out: int
+
+
+class AuditLine(TypedDict):
+    """How the audit log stands."""
+
+    k: Literal["audit"]
+    t: int
+    rows: int
+    hash: str
+    problem: str
+    lasting: bool
+    file: str
+
+
+class StoryLine(StoryShown):
+    """Something has happened."""
+
+    k: Literal["story"]
+
+
+class ToldLine(TypedDict):
+    """All that has happened up to a moment of a recording."""
+
+    k: Literal["told"]
+    t: int
+    lines: list[StoryShown]

@@ -1,0 +1,63 @@
+"""Logs of messages, recordings, and the end."""
+
+from typing import Any, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+
+class ExchangesLine(TypedDict):
+    """What a device was asked: see `shown/logs.py`; `anew`: forget what was told before."""
+
+    k: Literal["log"]
+    log: str
+    lines: list[list[Any]]
+    anew: NotRequired[bool]
+
+
+class ShelfEntry(TypedDict):
+    """A recording that can be played."""
+
+    name: str
+    bytes: int
+    part: str
+    person: int | None
+    trial: int | None
+    levels: list[Any]
+    values: list[Any]
+
+
+class MeasureShown(TypedDict):
+    """A column of the list of recordings."""
+
+    title: str
+    unit: str
+
+
+class ShelfLine(TypedDict):
+    """The recordings that can be played."""
+
+    k: Literal["shelf"]
+    folder: str
+    question: str
+    report: bool
+    factors: list[str]
+    measures: list[MeasureShown]
+    worst_by: str
+    recordings: list[ShelfEntry]
+
+
+class PicturesLine(TypedDict):
+    """Whether there are pictures, and why not."""
+
+    k: Literal["pictures"]
+    ok: bool
+    text: str
+    t: NotRequired[int]
+
+
+class ByeLine(TypedDict):
+    """It is over."""
+
+    k: Literal["bye"]
+    why: str
+    t: NotRequired[int]

@@ -1,0 +1,190 @@
+"""Where everybody is, and how time, link, robots and devices are."""
+
+from typing import Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from dva_sim.console.wire.scenes import LinkShown, OrderShown, Place
+
+
+class PlacesLine(TypedDict):
+    """Where everybody is."""
+
+    k: Literal["pos"]
+    t: int
+    p: list[Place]
+
+
+class ClockShown(TypedDict):
+    """How time goes by."""
+
+    factor: float
+    paused: bool
+    lag_s: float
+    given_up_s: float
+    held_by_lag: bool
+    jumps: NotRequired[int]
+
+
+class ServerShown(TypedDict):
+    """Where the DVA listens, and whether; `role`: what it lets this console do."""
+
+    listens: bool
+    address: str
+    port: int | None
+    modelled: bool
+    own: NotRequired[bool]
+    role: NotRequired[str]
+
+
+class RobotRow(TypedDict):
+    """How a robot stands."""
+
+    i: int
+    mode: str
+    stands: str
+    pattern: str | None
+    battery: float | None
+    holder: str | None
+    holder_label: str | None
+    session_age_s: float | None
+    watchdog_left_s: float | None
+    set_speed_mps: float | None
+    set_turn_rate_radps: float | None
+    queue: int | None
+    lost: int | None
+    commands_hz: float | None
+    refused: int | None
+    timeouts: int | None
+    by_hand: NotRequired[bool]
+    camera: NotRequired[str | None]
+    sensors: NotRequired[list[str]]
+
+
+class DoingShown(TypedDict):
+    """What somebody on foot is doing."""
+
+    i: int
+    doing: str
+
+
+class RowsLine(TypedDict):
+    """How time, link, robots and people are."""
+
+    k: Literal["rows"]
+    t: int
+    clock: ClockShown
+    link: LinkShown | None
+    dropped: int
+    robots: list[RobotRow]
+    people: list[DoingShown]
+    order: OrderShown | None
+    server: NotRequired[ServerShown]
+
+
+class LatencyFigures(TypedDict):
+    """How late messages of a kind are."""
+
+    last_ms: float
+    median_ms: float
+    p95_ms: float
+    largest_ms: float
+    count: int
+
+
+class SensorShown(TypedDict):
+    """A sensor, with its values or the least of many; neither: it has none."""
+
+    name: str
+    unit: str
+    stuck: bool
+    values: NotRequired[list[float]]
+    least: NotRequired[float]
+
+
+class StationShown(TypedDict):
+    """How far a robot has come: off, registered, listening."""
+
+    state: str
+    address: str | None
+    dva: str | None
+    problem: str
+    asking: NotRequired[bool]
+    by_hand: NotRequired[bool]
+
+
+class FaultsShown(TypedDict):
+    """What is wrong with a robot."""
+
+    processing_s: float | None
+    replies: bool
+    freeze: bool
+    camera: bool
+
+
+class EmergencyShown(TypedDict):
+    """An emergency stop that a robot has heard."""
+
+    at_ms: int
+    by: str
+
+
+class RobotLine(TypedDict):
+    """What the windows of a robot show."""
+
+    k: Literal["robot"]
+    t: int
+    i: int
+    station: StationShown
+    mode: str
+    hand: int | None
+    holder: str | None
+    stands: str
+    link_lost: bool
+    notice: str
+    emergency: EmergencyShown | None
+    speed_mps: float | None
+    turn_rate_radps: float | None
+    now_mps: float
+    now_radps: float
+    watchdog_left_s: float | None
+    one_way: LatencyFigures | None
+    loop: LatencyFigures | None
+    replies: LatencyFigures | None
+    faults: FaultsShown
+    sensors: list[SensorShown]
+
+
+class DeviceRow(TypedDict):
+    """A device, as the DVA knows it."""
+
+    id: str
+    label: str
+    type: str
+    address: str
+    doing: str | None
+    heard_s: float | None
+    silent: bool
+    beats_hz: float
+    link: str | None
+    fake: bool
+    round_trip_s: float | None
+    commands_hz: float | None
+    refused: int | None
+    picture_age_s: float | None
+    holder: str | None
+    holder_label: str | None
+    level: str | None
+    ends_s: float | None
+    holder_known: NotRequired[bool]
+    revocable: NotRequired[bool]
+    camera: NotRequired[str | None]
+    sensors: NotRequired[list[str]]
+
+
+class DevicesLine(TypedDict):
+    """All devices."""
+
+    k: Literal["devices"]
+    t: int
+    devices: list[DeviceRow]
