@@ -21,7 +21,7 @@ from dva_sim.console.events.decisions import about_event, dispatch_shown
 from dva_sim.console.running.lag import LagRule
 from dva_sim.console.shown.feed import story_of
 from dva_sim.console.shown.news import News, clock_shown
-from dva_sim.console.wire.events import EventShown
+from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import DoingShown, RobotRow, ServerShown
 from dva_sim.core.registry import ROBOT
@@ -170,7 +170,7 @@ class AttachedPages:
         for line in story_of(system.recorder):
             self.tell(line)
 
-    def _events(self) -> list[EventShown]:
+    def _events(self) -> list[SiteEventShown]:
         system, agent = self.system, self.system.agent
         labels = {i: told.device.label for i, told in system.told.devices.items()}
         return [

@@ -12,7 +12,7 @@ from typing import Any, Final, Protocol
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.events.alarms import AlarmCondition, Alarms
-from dva_sim.console.wire.events import AlarmsLine, EventShown
+from dva_sim.console.wire.events import AlarmsLine, SiteEventShown
 from dva_sim.console.wire.rows import RobotRow
 from dva_sim.core.registry import GUARD, ROBOT
 from dva_sim.kernel.recorder import Breach
@@ -86,7 +86,7 @@ class AlarmDesk:
         self._since: dict[str, int] = {}
 
     def look(
-        self, events: Sequence[EventShown], robots: Sequence[RobotRow], now_ms: int
+        self, events: Sequence[SiteEventShown], robots: Sequence[RobotRow], now_ms: int
     ) -> AlarmsLine:
         """Look at what pages are told, and tell the alarms."""
         found = [*_of_events(events, now_ms), *self._lost(robots), *self._nobody(events)]
@@ -131,7 +131,7 @@ class AlarmDesk:
             key, since = f"rule {breach.rule} {breach.who}", max(1, round(1000 * breach.time))
             yield AlarmCondition(key, "safety rule broken", "critical", "", text, since)
 
-    def _nobody(self, events: Iterable[EventShown]) -> Iterator[AlarmCondition]:
+    def _nobody(self, events: Iterable[SiteEventShown]) -> Iterator[AlarmCondition]:
         """Events wait, and nobody is free to go."""
         waits = sum(1 for event in events if event["state"] == "pending")
         if waits and not self._facts.is_somebody_free():
@@ -175,7 +175,7 @@ class AlarmDesk:
             self.alarms.unshelve(key, self._clock())
 
 
-def _of_events(events: Iterable[EventShown], now_ms: int) -> Iterator[AlarmCondition]:
+def _of_events(events: Iterable[SiteEventShown], now_ms: int) -> Iterator[AlarmCondition]:
     """What is open, and what has just been escalated."""
     for event in events:
         number, kind = event["number"], event["kind"].replace("_", " ")

@@ -26,9 +26,9 @@ from dva_sim.console.shown.feed import event_facts, moment_shown
 from dva_sim.console.shown.fields import HazardFeed
 from dva_sim.console.shown.scene import scene_of
 from dva_sim.console.shown.things import UNKNOWN_PERSON, Things, camera_shown
-from dva_sim.console.wire.events import EventShown, EventsLine, HazardsLine, ToldLine
-from dva_sim.console.wire.rows import DevicesLine, DoingShown, PlacesLine, RobotLine, RobotRow
-from dva_sim.console.wire.scenes import LinkShown, SceneLine, StoryShown, ThingBody
+from dva_sim.console.wire.events import EventsLine, HazardsLine, SiteEventShown, ToldLine
+from dva_sim.console.wire.rows import DevicesLine, DoingShown, PlacesLine, RobotRow, RobotWindowLine
+from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.recordings.reading import Opened, RecordedHazard
@@ -141,7 +141,7 @@ class RecordedRun:
         }
         return line
 
-    def _marks(self) -> list[StoryShown]:
+    def _marks(self) -> list[Happened]:
         """Moments to jump to, in order; of too many, evenly chosen ones."""
         timeline = self.playback.recorder.timeline
         marks = [moment for moment in timeline if moment.kind in MARKED]
@@ -194,7 +194,7 @@ class RecordedRun:
             "timeouts": 0,
         }
 
-    def window(self, id_tag: str, now: float) -> RobotLine:
+    def window(self, id_tag: str, now: float) -> RobotWindowLine:
         """What the windows of a robot show."""
         if id_tag not in self._windows:
             playback = self.playback
@@ -248,7 +248,7 @@ class RecordedRun:
         playback = self.playback
         site, labels = playback.site, playback.labels
         known = (event_at(event, now) for event in self.playback.events)
-        lines: list[EventShown] = [
+        lines: list[SiteEventShown] = [
             {
                 **event_facts(event, site, labels),
                 **decided_on(playback.facts, event.number, now),

@@ -11,8 +11,8 @@ from dva_sim.console.wire.rows import (
     EmergencyShown,
     FaultsShown,
     LatencyFigures,
-    RobotLine,
     RobotRow,
+    RobotWindowLine,
 )
 from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Applied, DriveLog, Sent
@@ -64,7 +64,7 @@ class RobotLines:
             and _EMERGENCY in sent.payload
         ]
 
-    def line(self, row: RobotRow, speed: float, turn_rate: float, now: float) -> RobotLine:
+    def line(self, row: RobotRow, speed: float, turn_rate: float, now: float) -> RobotWindowLine:
         """The windows at a moment.
 
         Args:

@@ -17,7 +17,7 @@ from dva_sim.agents.robot.faults import RobotFaults
 from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.latencies import Latencies
-from dva_sim.console.wire.rows import EmergencyShown, RobotLine, SensorShown, StationShown
+from dva_sim.console.wire.rows import EmergencyShown, RobotWindowLine, SensorShown, StationShown
 from dva_sim.console.wire.scenes import ThingBody
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.tap import Exchange
@@ -188,7 +188,7 @@ class RobotWindows:
 
     def lines(
         self, watched: Iterable[str], stands: Callable[[RobotAgent], str]
-    ) -> Iterator[RobotLine]:
+    ) -> Iterator[RobotWindowLine]:
         """A line for each robot that somebody looks at.
 
         Args:
@@ -200,7 +200,7 @@ class RobotWindows:
 
     def _line(
         self, id_tag: str, window: RobotWindow, stands: Callable[[RobotAgent], str]
-    ) -> RobotLine:
+    ) -> RobotWindowLine:
         robot, now = window.robot, window.robot.device.clock.now
         point, body, faults = robot.set_point, robot.body, window.faults
         in_force = now < point.until

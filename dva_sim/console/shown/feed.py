@@ -14,7 +14,7 @@ from dva_sim.console.running.played_run import PlayedRun
 from dva_sim.console.shown.things import Things, camera_shown
 from dva_sim.console.wire.events import EventFacts, StoryLine
 from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
-from dva_sim.console.wire.scenes import StoryShown, ThingBody
+from dva_sim.console.wire.scenes import Happened, ThingBody
 from dva_sim.core.event_status import state_since
 from dva_sim.core.events import FINAL, Event, EventBook
 from dva_sim.kernel.recorder import Moment, Recorder
@@ -166,7 +166,7 @@ def story_of(recorder: Recorder) -> Iterator[StoryLine]:
         yield {"k": "story", **moment_shown(moment)}
 
 
-def moment_shown(moment: Moment) -> StoryShown:
+def moment_shown(moment: Moment) -> Happened:
     """A moment of a story."""
     time, who, what, kind = moment
     return {"t": round(1000 * time), "who": who, "what": what, "kind": kind}

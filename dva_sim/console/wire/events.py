@@ -4,7 +4,7 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from dva_sim.console.wire.scenes import LabelledMoment, RasterShown, StoryShown
+from dva_sim.console.wire.scenes import Happened, LabelledMoment, RasterShown
 
 
 class HazardShown(TypedDict):
@@ -77,7 +77,7 @@ class EventFacts(TypedDict):
     assigned: list[str]
 
 
-class EventShown(EventFacts, EventDecisions):
+class SiteEventShown(EventFacts, EventDecisions):
     """An event, and what was decided on it."""
 
 
@@ -86,7 +86,7 @@ class EventsLine(TypedDict):
 
     k: Literal["events"]
     t: int
-    events: list[EventShown]
+    events: list[SiteEventShown]
 
 
 class DispatchShown(TypedDict):
@@ -155,7 +155,7 @@ class AuditLine(TypedDict):
     file: str
 
 
-class StoryLine(StoryShown):
+class StoryLine(Happened):
     """Something has happened."""
 
     k: Literal["story"]
@@ -166,4 +166,4 @@ class ToldLine(TypedDict):
 
     k: Literal["told"]
     t: int
-    lines: list[StoryShown]
+    lines: list[Happened]

@@ -2,19 +2,23 @@
 
     python -m dva_sim.console.wire.generated
 
-writes `static/js/declared.js` (how long an answer is waited for, and limits) and, in a clone, the
-table of actions in `docs/console.md`.
+writes `static/js/declared.js` (how long an answer is waited for, and limits), `static/js/lines.js`
+(the types of all lines that pages are told) and prints the table of actions in `docs/console.md`.
 """
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Final
+from textwrap import wrap
+from typing import Any, Final, Literal, NotRequired, get_args, get_origin, get_type_hints
+
+from typing_extensions import is_typeddict
 
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS, MOST_PORT
 from dva_sim.console.wire.kinds import hints_of, words_of
+from dva_sim.console.wire.lines import ToPage
 
 STATIC: Final = Path(__file__).parent.parent / "static"
 GRACE: Final = 5.0  # the web process has answered before a page gives up [s]
@@ -45,7 +49,68 @@ def javascript() -> str:
     )
 
 
-FILES: Final = {"js/declared.js": javascript}
+def line_types() -> str:
+    """The types of all lines that pages are told, and of their parts."""
+    found: dict[type, str] = {}
+    for one in get_args(ToPage):
+        _declare(one, found)
+    told = " | ".join(map(name_of, get_args(ToPage)))
+    union = _typedef("A line that a page is told.", f"({told}) & {{s?: number}}", "ToPage")
+    head = "// Written by dva_sim/console/wire/generated.py.\n"
+    return head + "".join((*found.values(), union)) + "export {};\n"
+
+
+def name_of(declared: type) -> str:
+    """What pages call a declared type."""
+    return declared.__name__.removesuffix("Line").removesuffix("Shown")
+
+
+def _declare(declared: type, found: dict[type, str]) -> None:
+    """Add a type behind all that it is made of."""
+    if declared in found:
+        return
+    hints = get_type_hints(declared, include_extras=True)
+    fields = []
+    for name, hint in hints.items():
+        optional = name not in declared.__required_keys__  # type: ignore[attr-defined]
+        inner = get_args(hint)[0] if get_origin(hint) is NotRequired else hint
+        fields.append(f"{name}{'?' if optional else ''}: {_in_javascript(inner, found)}")
+    about = (declared.__doc__ or "").strip().split("\n")[0]
+    about = "" if about.startswith("dict(") else about  # which its own docstring is
+    found[declared] = _typedef(about, f"{{{', '.join(fields)}}}", name_of(declared))
+
+
+def _typedef(about: str, type_: str, name: str) -> str:
+    told = f"@typedef {{{type_}}} {name}".replace(": ", ":~")  # a key and its type stay together
+    wrapped = wrap(told, 96, subsequent_indent="  ", break_on_hyphens=False)
+    lines = [*([about] if about else []), *(line.replace(":~", ": ") for line in wrapped)]
+    return "/**\n" + "".join(f" * {line}\n" for line in lines) + " */\n"
+
+
+_PLAIN: Final = {int: "number", float: "number", str: "string", bool: "boolean", Any: "any"}
+
+
+def _in_javascript(hint: Any, found: dict[type, str]) -> str:
+    """A type as pages write it."""
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    if hint in (None, type(None)):
+        return "null"
+    if is_typeddict(hint):
+        _declare(hint, found)
+        return name_of(hint)
+    inner = get_args(hint)
+    if get_origin(hint) is Literal:
+        return " | ".join(f"'{one}'" for one in inner)
+    if get_origin(hint) is dict:
+        return f"Record<string, {_in_javascript(inner[1], found)}>"
+    if get_origin(hint) is list:
+        of = _in_javascript(inner[0], found)
+        return f"({of})[]" if " | " in of else f"{of}[]"
+    return " | ".join(_in_javascript(one, found) for one in inner)
+
+
+FILES: Final = {"js/declared.js": javascript, "js/lines.js": line_types}
 
 
 def table() -> str:

@@ -25,7 +25,7 @@ from dva_sim.console.wire.pages import (
     YouLine,
 )
 from dva_sim.console.wire.records import ByeLine, ExchangesLine, PicturesLine, ShelfLine
-from dva_sim.console.wire.rows import DevicesLine, PlacesLine, RobotLine, RowsLine
+from dva_sim.console.wire.rows import DevicesLine, PlacesLine, RobotWindowLine, RowsLine
 from dva_sim.console.wire.scenes import EmptySceneLine, SceneLine
 from dva_sim.console.wire.seats import DoneLine, GuardLine, SeatLine
 from dva_sim.serving.pipes import LineKinds
@@ -36,7 +36,7 @@ Told: TypeAlias = (
     | EmptySceneLine
     | PlacesLine
     | RowsLine
-    | RobotLine
+    | RobotWindowLine
     | DevicesLine
     | HazardsLine
     | EventsLine
@@ -58,7 +58,7 @@ ToPage: TypeAlias = (
     SnapLine
     | MovedLine
     | RowsLine
-    | RobotLine
+    | RobotWindowLine
     | DevicesLine
     | HazardsLine
     | EventsLine

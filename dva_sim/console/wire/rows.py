@@ -129,7 +129,7 @@ class EmergencyShown(TypedDict):
     by: str
 
 
-class RobotLine(TypedDict):
+class RobotWindowLine(TypedDict):
     """What the windows of a robot show."""
 
     k: Literal["robot"]

@@ -157,7 +157,7 @@ class PhoneOffer(TypedDict):
     limits: PhoneLimits
 
 
-class StoryShown(TypedDict):
+class Happened(TypedDict):
     """Something that happened."""
 
     t: int
@@ -172,7 +172,7 @@ class ReplayAbout(TypedDict):
     name: str
     duration_ms: int
     whole: bool
-    marks: list[StoryShown]
+    marks: list[Happened]
     audit: bool
 
 

@@ -26,7 +26,7 @@ from dva_sim.console.shown.logs import Logs
 from dva_sim.console.shown.news import News, clock_shown
 from dva_sim.console.shown.scene import scene_of
 from dva_sim.console.shown.strangers import Strangers
-from dva_sim.console.wire.events import EventShown
+from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import RobotRow, RowsLine
@@ -74,7 +74,7 @@ class ToldWorld:
     def __init__(self) -> None:
         self._news = News(lambda: self.tell)
         self._modes: list[object] = []
-        self._events: list[EventShown] = []
+        self._events: list[SiteEventShown] = []
         self._contained: dict[int, float] = {}
 
     def show_scene(self) -> None:

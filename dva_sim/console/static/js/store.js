@@ -2,46 +2,46 @@
 import { computed, signal } from '../vendor/preact.js';
 import { Tracks } from './map/tracks.js';
 
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').Scene | null>} */
+/** @type {import('../vendor/preact.js').Signal<import('./lines.js').Scene | null>} */
 export const scene = signal(null);
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').Rows | null>} */
+/** @type {import('../vendor/preact.js').Signal<import('./lines.js').Rows | null>} */
 export const rows = signal(null);
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').Hazards>} */
+/** @type {import('../vendor/preact.js').Signal<Pick<import('./lines.js').Hazards, 'hazards' | 'fields'>>} */
 export const hazards = signal({ hazards: [], fields: [] });
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').SiteEvent[]>} */
+/** @type {import('../vendor/preact.js').Signal<import('./lines.js').SiteEvent[]>} */
 export const events = signal([]);
 /**
  * What the DVA knows of each device, while a page shows it.
- * @type {import('../vendor/preact.js').Signal<any[]>}
+ * @type {import('../vendor/preact.js').Signal<import('./lines.js').DeviceRow[]>}
  */
 export const devices = signal([]);
-/** @type {import('../vendor/preact.js').Signal<{t: number, who: string, what: string}[]>} */
+/** @type {import('../vendor/preact.js').Signal<import('./lines.js').Happened[]>} */
 export const story = signal([]);
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').Seat | null>} */
+/** @type {import('../vendor/preact.js').Signal<import('./lines.js').Seat | null>} */
 export const seat = signal(null);
 /**
  * What the windows of robots show, of those that the page looks at.
- * @type {import('../vendor/preact.js').Signal<Map<number, import('./types.js').RobotWindow>>}
+ * @type {import('../vendor/preact.js').Signal<Map<number, import('./lines.js').RobotWindow>>}
  */
 export const windows = signal(new Map());
 /**
  * What the guard knows whom this page stands for.
- * @type {import('../vendor/preact.js').Signal<import('./types.js').Guard | null>}
+ * @type {import('../vendor/preact.js').Signal<import('./lines.js').Guard | null>}
  */
 export const guard = signal(null);
 /**
  * How orders are given, and who decides: what control rooms share.
- * @type {import('../vendor/preact.js').Signal<import('./types.js').Control | null>}
+ * @type {import('../vendor/preact.js').Signal<import('./lines.js').Control | null>}
  */
 export const control = signal(null);
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').AlarmList>} */
-export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0 });
+/** @type {import('../vendor/preact.js').Signal<Omit<import('./lines.js').Alarms, 'k' | 't'>>} */
+export const alarmList = signal({ alarms: [], shelved: [], flood: false, rate: 0, left_out: 0 });
 /**
  * How the audit log stands; its rows are asked for.
- * @type {import('../vendor/preact.js').Signal<import('./types.js').AuditState | null>}
+ * @type {import('../vendor/preact.js').Signal<import('./lines.js').Audit | null>}
  */
 export const audit = signal(null);
-/** @type {import('../vendor/preact.js').Signal<import('./types.js').You | null>} */
+/** @type {import('../vendor/preact.js').Signal<import('./lines.js').You | null>} */
 export const you = signal(null);
 /** @type {import('../vendor/preact.js').Signal<import('./types.js').Selection>} */
 export const selection = signal(null);
@@ -56,16 +56,16 @@ export const notice = signal('');
 
 /**
  * The recordings that can be chosen, if any can.
- * @type {import('../vendor/preact.js').Signal<import('./types.js').Shelf | null>}
+ * @type {import('../vendor/preact.js').Signal<import('./lines.js').Shelf | null>}
  */
 export const shelf = signal(null);
 
 /** Where everything that moves is; not a signal, for it is drawn, not rendered. */
 export const tracks = new Tracks();
 
-export const clock = computed(
-  () => rows.value?.clock ?? { factor: 1, paused: false, lag_s: 0, held_by_lag: false },
-);
+/** @type {import('./lines.js').Clock} */
+const USUAL = { factor: 1, paused: false, lag_s: 0, given_up_s: 0, held_by_lag: false };
+export const clock = computed(() => rows.value?.clock ?? USUAL);
 export const link = computed(() => rows.value?.link ?? scene.value?.link ?? null);
 /** Whether the link is that of a study, with sliders, and not one of sockets. */
 export const isModelled = computed(() => (link.value?.kind ?? 'modelled') === 'modelled');
@@ -114,12 +114,12 @@ const doings = computed(
   () => new Map((rows.value?.people ?? []).map((person) => [person.i, person.doing])),
 );
 
-/** @param {number} i */
+/** @param {number | null} i */
 export const thingAt = (i) => scene.value?.things.find((thing) => thing.i === i);
 /** @param {string} label */
 export const thingNamed = (label) => scene.value?.things.find((thing) => thing.label === label);
-/** @param {number} i */
-export const rowOf = (i) => robotRows.value.get(i);
+/** @param {number | null} i */
+export const rowOf = (i) => (i === null ? undefined : robotRows.value.get(i));
 /** @param {number} i */
 export const doingOf = (i) => doings.value.get(i) ?? '';
 /** @param {number} i */

@@ -9,7 +9,7 @@ import { play } from './mjpeg.js';
 const OLD_PERIODS = 2;
 const HATCHED_S = 2;
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 export function CameraPicture({ robot }) {
   const canvas = useRef(/** @type {HTMLCanvasElement | null} */ (null));
   const [trouble, tell] = useState('');
@@ -31,7 +31,7 @@ export function CameraPicture({ robot }) {
   </figure>`;
 }
 
-/** @param {{robot: import('../types.js').Thing, trouble: string}} props */
+/** @param {{robot: import('../lines.js').Thing, trouble: string}} props */
 function Age({ robot, trouble }) {
   useEvery(100);
   const age = pictureAge(robot.i) / 1000;

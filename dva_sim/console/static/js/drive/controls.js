@@ -7,7 +7,7 @@ import { gamepad } from './gamepad.js';
 import { held, interrupted, wish } from './hold.js';
 import { Stick } from './stick.js';
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** @param {{robots: Thing[]}} props */
 export function Controls({ robots }) {

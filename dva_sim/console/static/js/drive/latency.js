@@ -11,7 +11,7 @@ import { pictureAge } from './drawn.js';
 const SAMPLE_MS = 200;
 const DASHES = [undefined, [6, 3]];
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 const KINDS = /** @type {{title: string, hint: string, none: string, read: (i: number) => number | null}[]} */ ([
   {

@@ -6,7 +6,7 @@ import { chooseRobots, driven } from '../shell/route.js';
 import { ModeMark } from '../ui/icon.js';
 import { useEvery } from '../ui/every.js';
 
-/** @param {{robot: import('../types.js').Thing, place: number}} props */
+/** @param {{robot: import('../lines.js').Thing, place: number}} props */
 export function RobotHead({ robot, place }) {
   void rows.value;
   return html`<div class="robot-head">
@@ -24,7 +24,7 @@ export function RobotHead({ robot, place }) {
 /** Whether the person sits: other robots only after the release. */
 const isHeld = () => Boolean(seat.value?.drives.length);
 
-/** @param {{robot: import('../types.js').Thing, place: number}} props */
+/** @param {{robot: import('../lines.js').Thing, place: number}} props */
 function RobotSelect({ robot, place }) {
   const change = (/** @type {any} */ event) => {
     const labels = driven.peek().map((one) => one.label);
@@ -40,7 +40,7 @@ function RobotSelect({ robot, place }) {
     </select></label>`;
 }
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 function BesideButton({ robot }) {
   const other = robots.value.find((one) => one.i !== robot.i);
   if (!other) return null;
@@ -53,7 +53,7 @@ let heardAt = 0;
 /** @type {unknown} */
 let heardRows = null;
 
-/** How long it would go on without a word. @param {{robot: import('../types.js').Thing}} props */
+/** How long it would go on without a word. @param {{robot: import('../lines.js').Thing}} props */
 function Watchdog({ robot }) {
   useEvery(100);
   if (rows.value !== heardRows) [heardRows, heardAt] = [rows.value, performance.now()];
@@ -64,7 +64,7 @@ function Watchdog({ robot }) {
     <meter min="0" max="3" value=${left} aria-label=${`Watchdog of ${robot.label}`}></meter>watchdog ${left.toFixed(1)} s</span>`;
 }
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 function Stands({ robot }) {
   const row = rowOf(robot.i);
   const drive = driveOf(robot.i);

@@ -9,7 +9,7 @@ import { ageText } from '../ui/words.js';
 
 const SHELF_S = 900;
 
-/** @typedef {import('../types.js').AlarmRow} AlarmRow */
+/** @typedef {import('../lines.js').AlarmRow} AlarmRow */
 
 /** The list, and what is shelved. */
 export function AlarmList() {

@@ -11,7 +11,7 @@ import { ageText, capital, plain } from '../ui/words.js';
 import { assignTo, nearestGuard, nearestRobot, ProposalPanel } from './proposal.js';
 import { inHand, reason } from './shared.js';
 
-/** @typedef {import('../types.js').SiteEvent} SiteEvent */
+/** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 
 /** The panel. */
 export function EventPanel() {

@@ -10,7 +10,7 @@ import { ageText, capital, plain } from '../ui/words.js';
 import { assignTo, chosen } from './proposal.js';
 import { inHand } from './shared.js';
 
-/** @typedef {import('../types.js').SiteEvent} SiteEvent */
+/** @typedef {import('../lines.js').SiteEvent} SiteEvent */
 
 const HEADS = ['No.', 'What', 'Where', 'State', 'For', 'Who', 'Seen by', 'To do'];
 const ASIDE = ['Where', 'For', 'Seen by']; // left out where there is little room: the panel has them

@@ -6,8 +6,8 @@ import { isOpen } from '../map/shown.js';
 import { secondsText } from '../ui/words.js';
 import { reason } from './shared.js';
 
-/** @typedef {import('../types.js').SiteEvent} SiteEvent */
-/** @typedef {import('../types.js').Proposal} Proposal */
+/** @typedef {import('../lines.js').SiteEvent} SiteEvent */
+/** @typedef {import('../lines.js').Proposal} Proposal */
 
 const AGAIN_MS = 4000;
 const SOON_MS = 500; // where it could not be asked, as while the page connects
@@ -29,7 +29,7 @@ export const nearestGuard = computed(() => first((who) => !who.robot));
 /** The robot that would be there first. */
 export const nearestRobot = computed(() => first((who) => who.robot));
 
-/** @param {(who: import('../types.js').Candidate) => boolean} fits */
+/** @param {(who: import('../lines.js').Candidate) => boolean} fits */
 const first = (fits) => known.value?.candidates.find((who) => who.free && fits(who))?.label ?? '';
 
 /**
@@ -68,7 +68,7 @@ export function ProposalPanel({ event }) {
     </fieldset></section>`;
 }
 
-/** @param {{who: import('../types.js').Candidate}} props */
+/** @param {{who: import('../lines.js').Candidate}} props */
 function Candidate({ who }) {
   return html`<label class=${who.can ? 'candidate' : 'candidate cannot'}>
     <input type="radio" name="candidate" value=${who.label} checked=${chosen.value === who.label}

@@ -61,7 +61,7 @@ function Join() {
     )}</div>`;
 }
 
-/** @param {{me: import('../types.js').Guard}} props */
+/** @param {{me: import('../lines.js').Guard}} props */
 function Field({ me }) {
   const [placing, place] = useState(false);
   useEffect(() => follow(), []);
@@ -97,7 +97,7 @@ function goals() {
 /** The way there, on the map. */
 const ways = () => (guard.peek()?.order?.way_m ? [/** @type {any} */ (guard.peek()?.order).way_m] : []);
 
-/** @param {{me: import('../types.js').Guard}} props */
+/** @param {{me: import('../lines.js').Guard}} props */
 function Own({ me }) {
   useEvery(1000);
   const at = tracks.last(me.guard);
@@ -114,7 +114,7 @@ const SAYINGS = /** @type {[string, string][]} */ ([
   ['contained', 'Contained'],
 ]);
 
-/** The order in hand, and what can be said of it. @param {{me: import('../types.js').Guard}} props */
+/** The order in hand, and what can be said of it. @param {{me: import('../lines.js').Guard}} props */
 function OrderCard({ me }) {
   const [why, write] = useState('');
   const [declining, decline] = useState(false);
@@ -161,7 +161,7 @@ function OrderCard({ me }) {
   </section>`;
 }
 
-/** For oneself; pressed once more, it is over. @param {{me: import('../types.js').Guard}} props */
+/** For oneself; pressed once more, it is over. @param {{me: import('../lines.js').Guard}} props */
 function Help({ me }) {
   const asked = me.doing === 'needs help';
   return html`<button type="button" class="big help-me" disabled=${!maySteer.value} aria-pressed=${asked}

@@ -10,7 +10,7 @@ const pairs = (/** @type {string[]} */ names) =>
 const KINDS = pairs(['fire', 'gas_leak', 'flood']);
 const SEVERITIES = pairs(['low', 'medium', 'high', 'critical']);
 
-/** @param {{me: import('../types.js').Guard}} props */
+/** @param {{me: import('../lines.js').Guard}} props */
 export function Report({ me }) {
   const [kind, setKind] = useState('fire');
   const [severity, setSeverity] = useState('medium');

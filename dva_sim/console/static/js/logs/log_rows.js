@@ -19,7 +19,7 @@ export function rowsOf(name) {
 
 /**
  * A line of a log has come.
- * @param {{log: string, first: boolean, missed: number, lines: any[]}} line
+ * @param {import('../lines.js').Log} line
  */
 export function hearLog(line) {
   const known = rowsOf(line.log);

@@ -22,17 +22,17 @@ export const modeColour = (mode) => MODE_COLOURS[mode] ?? 'idle';
 
 /**
  * Diameter on the map [px]: true to scale, but never too small to see.
- * @param {import('../types.js').Thing} thing
+ * @param {import('../lines.js').Thing} thing
  * @param {number} scale
  */
 export function sizeOf(thing, scale) {
-  return Math.max(2 * LARGER * thing.radius_m * scale, LEAST_PX[thing.kind] ?? 9);
+  return Math.max(2 * LARGER * (thing.radius_m ?? 0) * scale, LEAST_PX[thing.kind] ?? 9);
 }
 
 /**
  * @typedef {{ctx: CanvasRenderingContext2D, affine: import('./view.js').Affine,
  *   colours: Record<string, string>}} Pen
- * @typedef {{thing: import('../types.js').Thing, left: number, top: number,
+ * @typedef {{thing: import('../lines.js').Thing, left: number, top: number,
  *   heading: number, size: number}} Body
  */
 

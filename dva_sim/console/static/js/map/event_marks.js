@@ -13,7 +13,7 @@ export const EVENT_UP_PX = 22;
 
 /**
  * @param {Pen} pen
- * @param {import('../types.js').SiteEvent} event
+ * @param {import('../lines.js').SiteEvent} event
  */
 export function drawEvent(pen, event) {
   const { ctx, affine, colours: palette } = pen;

@@ -12,12 +12,12 @@ const ORDER = ['water', 'gas', 'heat', 'smoke'];
 
 export class Fields {
   constructor() {
-    /** @type {{field: import('../types.js').Field, picture: HTMLCanvasElement}[]} */
+    /** @type {{field: import('../lines.js').Field, picture: HTMLCanvasElement}[]} */
     this.pictures = [];
   }
 
   /**
-   * @param {import('../types.js').Field[]} fields
+   * @param {import('../lines.js').Field[]} fields
    * @param {Record<string, string>} colours
    */
   update(fields, colours) {
@@ -47,7 +47,7 @@ export class Fields {
 }
 
 /**
- * @param {import('../types.js').Field} field
+ * @param {import('../lines.js').Field} field
  * @param {Record<string, string>} colours
  */
 function paint(field, colours) {

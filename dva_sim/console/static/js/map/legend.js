@@ -50,6 +50,6 @@ function Fullest() {
   return html`<p>Fullest tint: ${fields.map(fullest).join('; ')}</p>`;
 }
 
-/** @param {import('../types.js').Field} field */
+/** @param {import('../lines.js').Field} field */
 const fullest = ({ kind, full }) =>
   `${plain(kind)} ${typeof full === 'object' ? `${full.value} ${full.unit}` : full}`;

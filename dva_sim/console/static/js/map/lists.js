@@ -7,8 +7,8 @@ import { useEvery } from '../ui/every.js';
 import { ageText, capital, percentText, plain } from '../ui/words.js';
 import { eventsInOrder, isOpen, roomOf } from './shown.js';
 
-/** @typedef {import('../types.js').SiteEvent} SiteEvent */
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').SiteEvent} SiteEvent */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** All of them. */
 export function Lists() {

@@ -48,7 +48,7 @@ export function MapBox(props) {
 
 /**
  * @param {HTMLElement} element
- * @param {import('../types.js').Scene} plan
+ * @param {import('../lines.js').Scene} plan
  * @param {{cones: () => number[], keyboard: boolean,
  *   goals: () => import('../types.js').Goal[], ways: () => number[][][],
  *   onPlace: {current: ((x: number, y: number) => void) | undefined}}} options

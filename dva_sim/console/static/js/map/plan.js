@@ -11,7 +11,7 @@ const LEAST_PX = 30;
  * The plan as paths, to be made once for each scene.
  */
 export class Plan {
-  /** @param {import('../types.js').Site} site */
+  /** @param {import('../lines.js').Site} site */
   constructor(site) {
     this.site = site;
     const rooms = [...site.rooms].sort((a, b) => Number(b.outdoor) - Number(a.outdoor));
@@ -109,7 +109,7 @@ export class Plan {
    * @param {Record<string, string>} colours
    */
   drawRaster(ctx, colours) {
-    const raster = /** @type {import('../types.js').Raster} */ (this.site.raster);
+    const raster = /** @type {import('../lines.js').Raster} */ (this.site.raster);
     const picture = this.picture?.(colours);
     if (!picture) return;
     ctx.save();
@@ -173,7 +173,7 @@ function darker(colour) {
 
 /**
  * The cells of a bare map, painted once for each theme.
- * @param {import('../types.js').Raster} raster
+ * @param {import('../lines.js').Raster} raster
  */
 function rasterPicture(raster) {
   const bits = Uint8Array.from(atob(raster.cells), (c) => c.charCodeAt(0));
@@ -189,7 +189,7 @@ function rasterPicture(raster) {
 }
 
 /**
- * @param {import('../types.js').Raster} raster
+ * @param {import('../lines.js').Raster} raster
  * @param {Uint8Array} bits
  * @param {Record<string, string>} colours
  */

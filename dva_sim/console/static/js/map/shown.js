@@ -4,7 +4,7 @@ import { events, scene, tracks } from '../store.js';
 const CLOSED = new Set(['contained', 'refuted', 'expired']);
 const RANKS = ['critical', 'high', 'medium', 'low'];
 
-/** @param {import('../types.js').SiteEvent} event */
+/** @param {import('../lines.js').SiteEvent} event */
 export const isOpen = (event) => !(event.over ?? CLOSED.has(event.state));
 
 /** Open ones first, then the most severe, then the oldest. */
@@ -53,7 +53,7 @@ export function roomAt(x, y) {
 
 /**
  * Where something is, in words.
- * @param {{x_m: number, y_m: number, room?: string}} what
+ * @param {{x_m: number, y_m: number, room?: string | null}} what
  */
 export function placeOf(what) {
   const room = what.room || roomAt(what.x_m, what.y_m);

@@ -67,10 +67,10 @@ export class Tracks {
 
   /**
    * The last place heard of.
-   * @param {number} i
+   * @param {number | null} i
    */
   last(i) {
-    return this.all.get(i) ?? null;
+    return (i !== null && this.all.get(i)) || null;
   }
 }
 

@@ -35,7 +35,7 @@ export async function act(what, more = {}) {
  * @param {Action} what
  * @param {object} [more]
  * @param {string} [id] by which the world knows a repeated request
- * @returns {Promise<import('../types.js').Done>} without an id if no answer came
+ * @returns {Promise<import('../types.js').Answer>} without an id if no answer came
  */
 export async function ask(what, more = {}, id = newId()) {
   if (ENDS.includes(what)) forget();
@@ -50,10 +50,10 @@ export async function ask(what, more = {}, id = newId()) {
   );
   const done = await answer;
   window.clearTimeout(timer);
-  return /** @type {import('../types.js').Done} */ (done);
+  return /** @type {import('../types.js').Answer} */ (done);
 }
 
-/** @param {import('../types.js').Done} done */
+/** @param {import('../types.js').Answer} done */
 function told(done) {
   notice.value = done.ok ? '' : done.text;
   return done;
@@ -62,7 +62,7 @@ function told(done) {
 /**
  * End the waiting for an answer.
  * @param {string} id
- * @param {import('../types.js').Done} done
+ * @param {import('../types.js').Answer} done
  */
 export function settle(id, done) {
   waiting.get(id)?.(done);

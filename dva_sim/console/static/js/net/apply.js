@@ -12,13 +12,12 @@ import { hear, hearAnything } from './world_time.js';
 
 const STORY_KEPT = 200;
 
-/** @type {Record<string, (line: any) => void>} */
+/**
+ * @typedef {import('../lines.js').ToPage} ToPage
+ * @type {{[Kind in ToPage['k']]?: (line: Extract<ToPage, {k: Kind}>) => void}}
+ */
 const LINES = {
   snap,
-  pos: (line) => {
-    tracks.put(line.p, performance.now());
-    tracks.keep(new Set(line.p.map((/** @type {number[]} */ row) => row[0])));
-  },
   d: (line) => {
     tracks.put(line.p, performance.now());
     tracks.drop(line.gone ?? []);
@@ -37,13 +36,13 @@ const LINES = {
   shelf: (line) => (shelf.value = line),
   story: (line) => (story.value = [...story.value, line].slice(-STORY_KEPT)),
   seat: (line) => {
-    if (isMine(line)) seat.value = line;
+    if ('drives' in line && line.seat === you.value?.client) seat.value = line;
   },
   guard: (line) => {
     if (line.seat === you.value?.client) guard.value = line.label ? line : null;
   },
   you: (line) => {
-    you.value = { client: line.client, key: line.key, role: line.role };
+    you.value = line;
     rememberKey(line.key);
   },
   pictures: (line) => (pictures.value = line.ok ? '' : line.text),
@@ -55,30 +54,32 @@ const LINES = {
 
 /**
  * Take note of a line.
- * @param {any} line
+ * @param {ToPage} line
  */
 export function apply(line) {
-  if (typeof line.t === 'number') hear(line.t);
+  if ('t' in line && typeof line.t === 'number') hear(line.t);
   else hearAnything();
-  batch(() => LINES[line.k]?.(line));
+  batch(() => take(line));
 }
 
-/** @param {any} line */
-function isMine(line) {
-  return Array.isArray(line.drives) && (!line.seat || line.seat === you.value?.client);
+/** @param {ToPage} line */
+function take(line) {
+  const does = /** @type {((line: ToPage) => void) | undefined} */ (LINES[line.k]);
+  does?.(line);
 }
 
-/** @param {any} line */
+/** @param {import('../lines.js').Snap} line */
 function snap(line) {
   if (line.scene) scene.value = line.scene;
   story.value = [];
   seat.value = null;
   guard.value = null;
   windows.value = new Map();
-  const { pos, story: told, ...others } = line.state ?? {};
-  if (pos) LINES.pos({ p: pos });
-  if (told) story.value = told.slice(-STORY_KEPT);
-  for (const part of Object.values(others)) {
-    for (const inner of Array.isArray(part) ? part : [part]) LINES[inner?.k]?.(inner);
+  const { pos, story: told, story_from: _, seats: __, ...others } = line.state;
+  if (pos) {
+    tracks.put(pos, performance.now());
+    tracks.keep(new Set(pos.map((row) => row[0])));
   }
+  if (told) story.value = told.slice(-STORY_KEPT);
+  for (const newest of Object.values(others)) take(newest);
 }

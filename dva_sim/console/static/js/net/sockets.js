@@ -72,7 +72,7 @@ export function connect() {
 /** Whether nobody has said yet that the world has ended. */
 const isAlive = () => ['open', 'connecting', 'lost'].includes(connection.value);
 
-/** @param {any} line */
+/** @param {import('../lines.js').ToPage} line */
 function receive(line) {
   if (typeof line.s === 'number') {
     if (line.k !== 'snap' && !Number.isNaN(count) && line.s !== count + 1) resync();

@@ -14,7 +14,7 @@ const MOST_LINES = 4;
 const MOST_ROWS = 50;
 const DASHES = [undefined, [6, 3], [2, 3], [10, 3, 2, 3]];
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** The page. */
 export function NetworkPage() {

@@ -3,7 +3,7 @@ import { html } from '../../vendor/preact.js';
 import { maySteer, rowOf, rows, scene } from '../store.js';
 import { act } from '../net/actions.js';
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 export function PatternSelect({ robot }) {
   void rows.value;
   const now = rowOf(robot.i)?.pattern ?? '';

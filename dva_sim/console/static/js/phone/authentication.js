@@ -18,7 +18,7 @@ const HOST = /^[A-Za-z0-9._:-]{1,64}$/;
 
 /** The screen. */
 export function AuthenticationScreen() {
-  const [devices, know] = useState(/** @type {import('../types.js').Device[] | null} */ (null));
+  const [devices, know] = useState(/** @type {import('../lines.js').Device[] | null} */ (null));
   if (!mayDrive.value) {
     return html`<p>This address may only look. Scan the code that the console shows for phones.</p>`;
   }
@@ -126,7 +126,7 @@ function AsOperator() {
 }
 
 /**
- * @param {{devices: import('../types.js').Device[] | null, know: (all: any) => void, off: boolean}} props
+ * @param {{devices: import('../lines.js').Device[] | null, know: (all: any) => void, off: boolean}} props
  */
 function DeviceList({ devices, know, off }) {
   const ask = async () => {
@@ -147,18 +147,18 @@ function DeviceList({ devices, know, off }) {
   </li>`;
 }
 
-/** @param {import('../types.js').Device[]} devices */
+/** @param {import('../lines.js').Device[]} devices */
 function robotsFirst(devices) {
-  const isRobot = (/** @type {import('../types.js').Device} */ one) => Number(one.type === 'Robot');
+  const isRobot = (/** @type {import('../lines.js').Device} */ one) => Number(one.type === 'Robot');
   return [...devices].sort(
     (a, b) => isRobot(b) - isRobot(a) || a.label.localeCompare(b.label, 'en', { numeric: true }),
   );
 }
 
-/** As the founding document writes it. @param {import('../types.js').Device} device */
+/** As the founding document writes it. @param {import('../lines.js').Device} device */
 const entry = ({ type, label, address, id }) => `${type} = ${label}@${address}(${id})`;
 
-/** @param {{devices: import('../types.js').Device[] | null, off: boolean}} props */
+/** @param {{devices: import('../lines.js').Device[] | null, off: boolean}} props */
 function Permission({ devices, off }) {
   const { device, level } = choices.value;
   const unlisted = off || !devices?.some((one) => one.id === device);

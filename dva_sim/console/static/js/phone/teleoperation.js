@@ -33,7 +33,7 @@ export function TeleoperationScreen() {
   return html`<${Cockpit} one=${one} />`;
 }
 
-/** @param {{one: import('../types.js').Thing}} props */
+/** @param {{one: import('../lines.js').Thing}} props */
 function Cockpit({ one }) {
   const handlers = useMemo(swipes, []);
   useEffect(() => {
@@ -60,7 +60,7 @@ function Cockpit({ one }) {
 
 /**
  * Radius and speed as the app has them, and how late it all is.
- * @param {{one: import('../types.js').Thing}} props
+ * @param {{one: import('../lines.js').Thing}} props
  */
 function Figures({ one }) {
   const drive = seat.value?.drives.find((each) => (each.i ?? -1) === one.i);
@@ -90,7 +90,7 @@ function Waiting({ what }) {
   return waited < TELLING_S ? what : `${what} No answer for ${waited} s.`;
 }
 
-/** What to do next, or why the robot stands. @param {{one: import('../types.js').Thing}} props */
+/** What to do next, or why the robot stands. @param {{one: import('../lines.js').Thing}} props */
 function Hint({ one }) {
   void rows.value;
   if (clock.value.paused) return 'The world is paused.';

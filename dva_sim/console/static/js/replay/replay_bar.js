@@ -28,7 +28,7 @@ export function ReplayBar() {
 /** @param {number} ms */
 const seek = (ms) => act('seek', { t_ms: Math.max(0, Math.round(ms)) });
 
-/** @param {{now: number, marks: import('../types.js').Mark[]}} props */
+/** @param {{now: number, marks: import('../lines.js').Happened[]}} props */
 function Buttons({ now, marks }) {
   const { paused } = clock.value;
   const before = marks.filter((mark) => mark.t < now - SLACK_MS).at(-1);
@@ -43,7 +43,7 @@ function Buttons({ now, marks }) {
   </div>`;
 }
 
-/** @param {{about: import('../types.js').ReplayAbout, now: number}} props */
+/** @param {{about: import('../lines.js').ReplayAbout, now: number}} props */
 function Scrubber({ about, now }) {
   const whole = about.duration_ms || 1;
   return html`<div class="scrubber">

@@ -3,7 +3,7 @@ import { html } from '../../vendor/preact.js';
 import { maySteerReplay, replay, shelf } from '../store.js';
 import { act } from '../net/actions.js';
 
-/** @typedef {import('../types.js').ShelfEntry} ShelfEntry */
+/** @typedef {import('../lines.js').ShelfEntry} ShelfEntry */
 
 /** The page. */
 export function ShelfPage() {

@@ -13,7 +13,7 @@ const KNOBS = /** @type {[string, string, string][]} */ ([
   ['camera', 'Lose the camera', 'It takes no pictures.'],
 ]);
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** @param {{robot: Thing}} props */
 export function Faults({ robot }) {
@@ -41,7 +41,7 @@ function Knob({ name, hint, on, ask }) {
 /**
  * What was asked for is shown until the world says the same, or refuses.
  * @param {boolean} told
- * @param {(wanted: boolean) => Promise<import('../types.js').Done>} ask
+ * @param {(wanted: boolean) => Promise<import('../types.js').Answer>} ask
  * @returns {[boolean, (wanted: boolean) => void]}
  */
 function useAsked(told, ask) {

@@ -10,7 +10,7 @@ import { Stick } from '../drive/stick.js';
 import { Station } from './station.js';
 import { isInHand, myHand, windowOf } from './window.js';
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** @param {{robot: Thing}} props */
 export function ManualControl({ robot }) {

@@ -9,7 +9,7 @@ import { windowOf } from './window.js';
 
 const SAMPLE_MS = 250;
 
-/** @typedef {import('../types.js').RobotWindow} RobotWindow */
+/** @typedef {import('../lines.js').RobotWindow} RobotWindow */
 
 const KINDS = /** @type {[keyof RobotWindow, string, string][]} */ ([
   ['one_way', 'Client to robot', 'one way, of whoever drives from this program; of others no two clocks agree'],
@@ -32,7 +32,7 @@ export function latencyText(shown) {
   return `${found.name.toLowerCase()}: last ${msText(last)}, median ${msText(median)}, p95 ${msText(p95)}, largest ${msText(largest)}`;
 }
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 export function RobotLatency({ robot }) {
   const shown = windowOf(robot.i);
   const history = useMemo(() => new History(KINDS.length, 70), [robot.i]);

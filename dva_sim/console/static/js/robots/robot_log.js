@@ -10,7 +10,7 @@ const TELEOPERATION = ['StartTeleOp', 'SetTeleOp', 'StopTeleOp', 'EmergencyMsg']
 const NEAR_PX = 40;
 const SHOWN = 300;
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 export function RobotLog({ robot }) {
   const [all, showAll] = useState(false);
   const rows = useLog(robot.label, { publications: true });

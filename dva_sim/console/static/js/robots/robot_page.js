@@ -15,7 +15,7 @@ import { SideView } from './side_view.js';
 import { TopView } from './top_view.js';
 import { shownMode, windowOf } from './window.js';
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** @param {{robot: Thing}} props */
 export function RobotPage({ robot }) {

@@ -36,7 +36,7 @@ function List() {
     </div></main>`;
 }
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 function Row({ robot }) {
   const row = rowOf(robot.i);
   const mode = shownMode(robot.i);

@@ -5,7 +5,7 @@ import { windowOf } from './window.js';
 
 const UNITS = /** @type {Record<string, string>} */ ({ degC: '°C', 1: '', 'kW/m2': 'kW/m²' });
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 export function Sensors({ robot }) {
   const sensors = windowOf(robot.i)?.sensors ?? [];
   return html`<section class="panel" aria-label="Sensors"><h2>Sensors</h2>
@@ -15,7 +15,7 @@ export function Sensors({ robot }) {
   </section>`;
 }
 
-/** @param {import('../types.js').SensorShown} sensor */
+/** @param {import('../lines.js').Sensor} sensor */
 function valueText({ name, unit, values, least }) {
   const told = UNITS[unit] ?? unit;
   if (least !== undefined) return `nearest ${least.toFixed(2)} ${told}`;

@@ -4,7 +4,7 @@ import { fixed, windowOf } from './window.js';
 
 const TURN = 360;
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** @param {{robot: Thing}} props */
 export function SideView({ robot }) {
@@ -35,7 +35,7 @@ const CAR = 'M24 76q-2-16 12-20l30-6 22-18h34l20 20 30 6q8 4 6 18z';
 export const isModelCar = (robot) => robot.steering === 'three_way';
 
 /** @param {Thing} robot */
-const duty = (robot) => Math.round((100 * (windowOf(robot.i)?.speed_mps ?? 0)) / robot.max_speed_mps);
+const duty = (robot) => Math.round((100 * (windowOf(robot.i)?.speed_mps ?? 0)) / (robot.max_speed_mps ?? Infinity));
 
 const still = window.matchMedia('(prefers-reduced-motion: reduce)');
 

@@ -7,7 +7,7 @@ import { shownMode, windowOf } from './window.js';
 
 const STEPS = ['off', 'registered', 'listening'];
 
-/** @param {{robot: import('../types.js').Thing}} props */
+/** @param {{robot: import('../lines.js').Thing}} props */
 export function Station({ robot }) {
   const station = windowOf(robot.i)?.station;
   if (!station) return null;
@@ -20,7 +20,7 @@ export function Station({ robot }) {
     ${station.by_hand ? html`<${Steps} robot=${robot} station=${station} />` : html`<p class="soft">It registers and listens by itself, at ${station.address}.</p>`}`;
 }
 
-/** @param {{robot: import('../types.js').Thing, station: import('../types.js').StationShown}} props */
+/** @param {{robot: import('../lines.js').Thing, station: import('../lines.js').Station}} props */
 function Steps({ robot, station }) {
   const [dva, setDva] = useState(station.dva || '127.0.0.1:5600');
   const may = maySteer.value;
@@ -37,7 +37,7 @@ function Steps({ robot, station }) {
   </div>`;
 }
 
-/** @param {import('../types.js').StationShown} station */
+/** @param {import('../lines.js').Station} station */
 function stationText(station) {
   if (station.asking) return `Asking ${station.dva} …`;
   if (station.state === 'off') return `It is off: nobody can reach it. It will listen on ${station.address}.`;

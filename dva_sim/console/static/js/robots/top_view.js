@@ -6,7 +6,7 @@ import { degrees, fixed, side, windowOf } from './window.js';
 const MOST_DEG = 30;
 const CAR_DEG = 25; // how far a model car's wheels go, whatever is asked for
 
-/** @typedef {import('../types.js').Thing} Thing */
+/** @typedef {import('../lines.js').Thing} Thing */
 
 /** @param {{robot: Thing}} props */
 export function TopView({ robot }) {

@@ -5,7 +5,7 @@ import { rowOf, windows } from '../store.js';
 /** The number of the hand that this page has got last; whose a robot's hand is shows by that. */
 export const myHand = signal(/** @type {number | null} */ (null));
 
-/** @param {number} i @returns {import('../types.js').RobotWindow | undefined} */
+/** @param {number} i @returns {import('../lines.js').RobotWindow | undefined} */
 export const windowOf = (i) => windows.value.get(i);
 
 /** Whether a robot is in the hands of this page. @param {number} i */

@@ -11,7 +11,7 @@ const STILL_MPS = 0.02;
 const MOVED_M = 0.5; // somebody has driven the second robot away meanwhile
 
 /**
- * @typedef {{step: number, plan: import('../types.js').TourPlan | null, began: (number | null)[],
+ * @typedef {{step: number, plan: import('../lines.js').TourPlan | null, began: (number | null)[],
  *   took: (number | null)[]}} Progress
  */
 

@@ -1,0 +1,358 @@
+// Written by dva_sim/console/wire/generated.py.
+/**
+ * Where on earth a site lies.
+ * @typedef {{latitude_deg: number, longitude_deg: number}} Origin
+ */
+/**
+ * A room of a site.
+ * @typedef {{name: string, polygon_m: number[][], holes_m: number[][][], floor: string,
+ *   outdoor: boolean}} Room
+ */
+/**
+ * A grid whose row 0 lies to the south; its cells as base64.
+ * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
+ *   cells: string, heading_rad?: number}} Raster
+ */
+/**
+ * The plan of a site.
+ * @typedef {{name: string, extent_m: number[], origin: Origin, features: Record<string, any>,
+ *   rooms: Room[], walls_m: number[][], solids_m: number[][][], doors_m: number[][],
+ *   exits_m: number[][], raster?: Raster}} Site
+ */
+/**
+ * A robot's camera.
+ * @typedef {{field_of_view_deg: number, range_m: number, rate_hz: number, frame_bytes: number}}
+ *   Camera
+ */
+/**
+ * Somebody, with the number that other lines use.
+ * @typedef {{radius_m?: number, max_speed_mps?: number, max_turn_rate_radps?: number,
+ *   camera?: Camera, person?: boolean, wheel_radius_m?: number, corners_m?: number[][],
+ *   steering?: string, sensors?: string[], i: number, id: string, label: string, kind: string}}
+ *   Thing
+ */
+/**
+ * A messaging pattern that may be chosen.
+ * @typedef {{name: string, title: string, label: string, when_slow: string, answered: boolean}}
+ *   Pattern
+ */
+/**
+ * A colour or mark of a map.
+ * @typedef {{kind: string, colour: string, mode?: string, title?: string, mark?: string,
+ *   field?: boolean}} LegendEntry
+ */
+/**
+ * How messages travel; more of a link that is modelled.
+ * @typedef {{kind: 'modelled' | 'real' | 'attached', processing_s: number | null,
+ *   delay_s?: number, jitter_s?: number, jitter_wanted_s?: number, loss?: number,
+ *   rate_bps?: number | null, trace?: string | null, rate_trace?: string | null}} Link
+ */
+/**
+ * Between which numbers a calibration lies.
+ * @typedef {{step_mps2: number[], max_delay_s: number[]}} PhoneLimits
+ */
+/**
+ * What a phone may choose from.
+ * @typedef {{pipelines: Record<string, Record<string, any>>, filters: string[],
+ *   mappings: string[], speed_step_mps2: number, turn_step_mps2: number, max_delay_s: number,
+ *   limits: PhoneLimits}} PhoneOffer
+ */
+/**
+ * Something that happened.
+ * @typedef {{t: number, who: string, what: string, kind: string}} Happened
+ */
+/**
+ * A recording that is played.
+ * @typedef {{name: string, duration_ms: number, whole: boolean, marks: Happened[],
+ *   audit: boolean}} ReplayAbout
+ */
+/**
+ * What does not change while something is shown.
+ * @typedef {{scenario: string, title: string, seed: number | null, site: Site, things: Thing[],
+ *   patterns: Pattern[], link_limits: Record<string, number[]>, pace_limits: number[],
+ *   watchdog_s: number | null, stale_s: number | null, lag_limit_s: number, rules: Record<string,
+ *   string>, legend: LegendEntry[], link: Link, attached?: boolean, dva_address?: string,
+ *   pages?: string[], phone?: PhoneOffer, replay?: ReplayAbout}} Scene
+ */
+/**
+ * Something has happened.
+ * @typedef {{t: number, who: string, what: string, kind: string, k: 'story'}} Story
+ */
+/**
+ * An order for an operator.
+ * @typedef {{event: number, kind: string, robot: number | null, x_m: number, y_m: number,
+ *   room: string | null}} Order
+ */
+/**
+ * What everybody may know of a seat.
+ * @typedef {{k: 'seat', short: boolean, seat: string, label: string, phase: string, order: Order |
+ *   null, robots: (number | null)[]}} OtherSeat
+ */
+/**
+ * How time goes by.
+ * @typedef {{factor: number, paused: boolean, lag_s: number, given_up_s: number,
+ *   held_by_lag: boolean, jumps?: number}} Clock
+ */
+/**
+ * How a robot stands.
+ * @typedef {{i: number, mode: string, stands: string, pattern: string | null, battery: number |
+ *   null, holder: string | null, holder_label: string | null, session_age_s: number | null,
+ *   watchdog_left_s: number | null, set_speed_mps: number | null, set_turn_rate_radps: number |
+ *   null, queue: number | null, lost: number | null, commands_hz: number | null, refused: number |
+ *   null, timeouts: number | null, by_hand?: boolean, camera?: string | null, sensors?: string[]}}
+ *   RobotRow
+ */
+/**
+ * What somebody on foot is doing.
+ * @typedef {{i: number, doing: string}} Doing
+ */
+/**
+ * Where the DVA listens, and whether; `role`: what it lets this console do.
+ * @typedef {{listens: boolean, address: string, port: number | null, modelled: boolean,
+ *   own?: boolean, role?: string}} Server
+ */
+/**
+ * How time, link, robots and people are.
+ * @typedef {{k: 'rows', t: number, clock: Clock, link: Link | null, dropped: number,
+ *   robots: RobotRow[], people: Doing[], order: Order | null, server?: Server}} Rows
+ */
+/**
+ * A hazard on the map.
+ * @typedef {{n: number, kind: string, x_m: number, y_m: number, radius_m: number,
+ *   severity: number, contained: boolean}} Hazard
+ */
+/**
+ * The quantity that a full cell stands for.
+ * @typedef {{value: number, unit: string}} FieldScale
+ */
+/**
+ * What hazards make of the air or the floor.
+ * @typedef {{cell_m: number, x0_m: number, y0_m: number, columns: number, rows: number,
+ *   cells: string, heading_rad?: number, kind: string, full: FieldScale}} Field
+ */
+/**
+ * Where hazards are, and how far they reach.
+ * @typedef {{k: 'hazards', t: number, hazards: Hazard[], fields: Field[]}} Hazards
+ */
+/**
+ * Somebody, and when.
+ * @typedef {{label: string, at_ms: number}} LabelledMoment
+ */
+/**
+ * The newest decision on an event.
+ * @typedef {{label: string, at_ms: number, action: string, reason: string}} Decided
+ */
+/**
+ * An event, and what was decided on it.
+ * @typedef {{number: number, kind: string, x_m: number, y_m: number, latitude_deg: number,
+ *   longitude_deg: number, room: string | null, severity: string, severity_value: number,
+ *   state: string, over: boolean, since_ms: number, reported_ms: number, assigned: string[],
+ *   decisions: number | null, acknowledged: LabelledMoment | null, decided: Decided | null,
+ *   note: string | null}} SiteEvent
+ */
+/**
+ * All events that are open, and the last that are over.
+ * @typedef {{k: 'events', t: number, events: SiteEvent[]}} Events
+ */
+/**
+ * How orders are given.
+ * @typedef {{mode: string, decide_within_s: number, switched: LabelledMoment | null}} Dispatch
+ */
+/**
+ * A control room.
+ * @typedef {{label: string, role: string, client: string}} RoomEntry
+ */
+/**
+ * How orders are given, and who decides.
+ * @typedef {{k: 'control', t: number, dispatch: Dispatch | null, rooms: RoomEntry[]}} Control
+ */
+/**
+ * A row of the list of alarms.
+ * @typedef {{key: string, priority: string, state: string, text: string, place: string,
+ *   count: number, event: number | null, since_ms: number, is_new: boolean, seen_by: string,
+ *   left_s: number | null, shelved_by: string}} AlarmRow
+ */
+/**
+ * The alarms, and how many there were lately.
+ * @typedef {{k: 'alarms', t: number, alarms: AlarmRow[], shelved: AlarmRow[], flood: boolean,
+ *   rate: number, left_out: number}} Alarms
+ */
+/**
+ * How the audit log stands.
+ * @typedef {{k: 'audit', t: number, rows: number, hash: string, problem: string, lasting: boolean,
+ *   file: string}} Audit
+ */
+/**
+ * Whether there are pictures, and why not.
+ * @typedef {{k: 'pictures', ok: boolean, text: string, t?: number}} Pictures
+ */
+/**
+ * All that has happened up to a moment of a recording.
+ * @typedef {{k: 'told', t: number, lines: Happened[]}} Told
+ */
+/**
+ * A column of the list of recordings.
+ * @typedef {{title: string, unit: string}} Measure
+ */
+/**
+ * A recording that can be played.
+ * @typedef {{name: string, bytes: number, part: string, person: number | null, trial: number |
+ *   null, levels: any[], values: any[]}} ShelfEntry
+ */
+/**
+ * The recordings that can be played.
+ * @typedef {{k: 'shelf', folder: string, question: string, report: boolean, factors: string[],
+ *   measures: Measure[], worst_by: string, recordings: ShelfEntry[]}} Shelf
+ */
+/**
+ * The newest of everything.
+ * @typedef {{pos?: number[][], story?: Story[], story_from?: number, seats?: OtherSeat[],
+ *   rows?: Rows, hazards?: Hazards, events?: Events, control?: Control, alarms?: Alarms,
+ *   audit?: Audit, pictures?: Pictures, told?: Told, shelf?: Shelf}} SnapState
+ */
+/**
+ * All there is, for a page that begins.
+ * @typedef {{k: 'snap', t: number, scene: Scene | null, state: SnapState}} Snap
+ */
+/**
+ * Who has moved, and who has left the site.
+ * @typedef {{k: 'd', t: number, p: number[][], gone?: number[]}} Moved
+ */
+/**
+ * How far a robot has come: off, registered, listening.
+ * @typedef {{state: string, address: string | null, dva: string | null, problem: string,
+ *   asking?: boolean, by_hand?: boolean}} Station
+ */
+/**
+ * An emergency stop that a robot has heard.
+ * @typedef {{at_ms: number, by: string}} Emergency
+ */
+/**
+ * How late messages of a kind are.
+ * @typedef {{last_ms: number, median_ms: number, p95_ms: number, largest_ms: number,
+ *   count: number}} LatencyFigures
+ */
+/**
+ * What is wrong with a robot.
+ * @typedef {{processing_s: number | null, replies: boolean, freeze: boolean, camera: boolean}}
+ *   Faults
+ */
+/**
+ * A sensor, with its values or the least of many; neither: it has none.
+ * @typedef {{name: string, unit: string, stuck: boolean, values?: number[], least?: number}}
+ *   Sensor
+ */
+/**
+ * What the windows of a robot show.
+ * @typedef {{k: 'robot', t: number, i: number, station: Station, mode: string, hand: number |
+ *   null, holder: string | null, stands: string, link_lost: boolean, notice: string,
+ *   emergency: Emergency | null, speed_mps: number | null, turn_rate_radps: number | null,
+ *   now_mps: number, now_radps: number, watchdog_left_s: number | null, one_way: LatencyFigures |
+ *   null, loop: LatencyFigures | null, replies: LatencyFigures | null, faults: Faults,
+ *   sensors: Sensor[]}} RobotWindow
+ */
+/**
+ * A device, as the DVA knows it.
+ * @typedef {{id: string, label: string, type: string, address: string, doing: string | null,
+ *   heard_s: number | null, silent: boolean, beats_hz: number, link: string | null, fake: boolean,
+ *   round_trip_s: number | null, commands_hz: number | null, refused: number | null,
+ *   picture_age_s: number | null, holder: string | null, holder_label: string | null,
+ *   level: string | null, ends_s: number | null, holder_known?: boolean, revocable?: boolean,
+ *   camera?: string | null, sensors?: string[]}} DeviceRow
+ */
+/**
+ * All devices.
+ * @typedef {{k: 'devices', t: number, devices: DeviceRow[]}} Devices
+ */
+/**
+ * The input behind the newest command that took effect.
+ * @typedef {{n: number, at_ms: number}} InputHeard
+ */
+/**
+ * A robot in somebody's hands.
+ * @typedef {{i: number | null, pattern: string, phase: string, mode: string, session: number |
+ *   null, wanted: number[], command: number[], command_age_ms: number | null, picture_ms: number |
+ *   null, picture_arrived_ms: number | null, loop_ms: number | null, input: InputHeard | null,
+ *   sent: number, answered: number, timeouts: number, refused: number, superseded: number,
+ *   round_trip_ms: number | null, outcome: string | null}} Drive
+ */
+/**
+ * A phone in somebody's hand.
+ * @typedef {{id: string, label: string, address: string, registered: boolean, device: string |
+ *   null, level: string | null, calibrated: boolean, pipeline: string, filter: string | null,
+ *   mapping: string, radius_deg: number, speed_mps: number, reading: number[] | null,
+ *   sensor_hz: number | null, samples: number, samples_lost: number, attempts: number}} Phone
+ */
+/**
+ * What a page in a seat knows of its own drives.
+ * @typedef {{k: 'seat', t: number, seat: string, label: string, phase: string, order: Order |
+ *   null, alert: string, drives: Drive[], phone: Phone | null}} Seat
+ */
+/**
+ * An order for a guard.
+ * @typedef {{x_m: number, y_m: number, room: string | null, distance_m: number | null,
+ *   way_m: number[][], event: number, kind: string, task: string, answered: boolean}} GuardOrder
+ */
+/**
+ * What a page knows of the guard whom its person plays.
+ * @typedef {{k: 'guard', t: number, seat: string, guard: number | null, label: string,
+ *   doing: string, order: GuardOrder | null, alert: string}} Guard
+ */
+/**
+ * @typedef {{n: number, t: number, kind: string, payload: string, from: string,
+ *   from_label: string, to: string, to_label: string, session: string, code: number | null,
+ *   word: string, text: string, service_us: number | null, published: boolean}} LogEntry
+ */
+/**
+ * What is new of a log that a page looks at; `first`: what it has shown before is over.
+ * @typedef {{k: 'log', log: string, total: number, first: boolean, missed: number,
+ *   lines: LogEntry[]}} Log
+ */
+/**
+ * A device on the DVA's list.
+ * @typedef {{id: string, label: string, type: string, address: string}} Device
+ */
+/**
+ * A phone on the network of devices.
+ * @typedef {{id: string, label: string, address: string}} PhoneIdentity
+ */
+/**
+ * Somebody who could be sent to an event.
+ * @typedef {{label: string, robot: boolean, can: boolean, free: boolean, reason: string,
+ *   arrival_s: number | null}} Candidate
+ */
+/**
+ * What the policy would do about an event, and why.
+ * @typedef {{event: number, policy: string, reason: string, task: string | null, label: string,
+ *   arrival_s: number | null, decide_within_s: number | null, candidates: Candidate[]}} Proposal
+ */
+/**
+ * Two robots, and a goal for each.
+ * @typedef {{robots: number[], goals_m: number[][], radius_m: number, length_m: number,
+ *   side_rad: number}} TourPlan
+ */
+/**
+ * What became of an action.
+ * @typedef {{t?: number, late?: boolean, device?: string, devices?: Device[], event?: number,
+ *   hand?: number | null, outcome?: string, phone?: PhoneIdentity, proposal?: Proposal,
+ *   tour?: TourPlan, k: 'done', id: string | null, ok: boolean, text: string}} Done
+ */
+/**
+ * It is over.
+ * @typedef {{k: 'bye', why: string, t?: number}} Bye
+ */
+/**
+ * Who a page is.
+ * @typedef {{k: 'you', client: string, key: string, role: string}} You
+ */
+/**
+ * An answer to a ping, with the time of this machine [ms].
+ * @typedef {{k: 'pong', at: any, now: number}} Pong
+ */
+/**
+ * A line that a page is told.
+ * @typedef {(Snap | Moved | Rows | RobotWindow | Devices | Hazards | Events | Control | Alarms |
+ *   Audit | Story | Told | Seat | OtherSeat | Guard | Log | Shelf | Pictures | Done | Bye | You |
+ *   Pong) & {s?: number}} ToPage
+ */
+export {};
