@@ -6,34 +6,35 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from typer import Argument, Option
+from typer import Argument
 
-from dva_sim.cli.options import SCENARIOS, Overwrite, Quiet, RunSeed, Sets
+from dva_sim.cli.options import RUN, SCENARIOS, Overwrite, Quiet, asks, file, text
 from dva_sim.kernel.errors import ConfigError
 
+_FILE = "Keys of a link, or a scenario, whose link is taken; default: a fast one."
+_KEYS = Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)]
+_OUT = "Keep the counts: X.csv, or a folder for link.csv."
 
+
+@asks(
+    keys=(
+        Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)],
+        None,
+    ),
+    near=(text("Command at one end; when it ends, all ends.", metavar="CMD", of=str), ""),
+    far=(text("Command at the other end.", metavar="CMD", of=str), ""),
+    **RUN,
+    out=(file(_OUT, "-o", "--out", metavar="PATH"), None),
+    overwrite=(Overwrite, False),
+)
 def link(
-    file: Annotated[
-        str | None,
-        Argument(
-            metavar="LINK.yaml",
-            autocompletion=SCENARIOS,
-            help="Keys of a link, or a scenario, whose link is taken; default: a fast one.",
-        ),
-    ] = None,
-    near: Annotated[
-        str, Option(metavar="CMD", help="Command at one end; when it ends, all ends.")
-    ] = "",
-    far: Annotated[str, Option(metavar="CMD", help="Command at the other end.")] = "",
-    set_: Sets = None,
-    seed: RunSeed = 1,
-    out: Annotated[
-        Path | None,
-        Option(
-            "-o", "--out", metavar="PATH", help="Keep the counts: X.csv, or a folder for link.csv."
-        ),
-    ] = None,
-    overwrite: Overwrite = False,
+    keys: str | None,
+    near: str,
+    far: str,
+    seed: int,
+    set_: list[str] | None,
+    out: Path | None,
+    overwrite: bool,
     quiet: Quiet = False,
 ) -> None:
     """Run any two programs over a link you choose.
@@ -71,7 +72,7 @@ def link(
             raise ConfigError(f"{name} needs a command, such as {name} 'ping $DVA_LINK_NEAR'")
     pairs = tuple(set_ or ())
     try:
-        config = read_link(file, parse_changes(pairs), (NEAR, FAR))
+        config = read_link(keys, parse_changes(pairs), (NEAR, FAR))
     except ConfigError as error:
         raise set_by(pairs, error) from None
     links_of(config, seed)  # files that the link names are read before anything starts
@@ -79,7 +80,8 @@ def link(
     with LinkProcess(config, seed) as joined:
         outcome = run_pair(joined, near, far, link_counts.tell)
     if not quiet:
-        link_counts.tell_report(outcome.report)
-    for path, text in files.items():
-        link_counts.keep(path, text(outcome.report, seed))
+        for line in link_counts.in_words(outcome.report):
+            link_counts.tell(line)
+    for path, write in files.items():
+        link_counts.keep(path, write(outcome.report, seed))
     raise typer.Exit(outcome.code)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,7 @@ from typing import Any, Final
 from rich.console import Console
 from rich.markup import escape
 
-from dva_sim.cli.console import print_lines, warn
+from dva_sim.cli.console import print_lines
 from dva_sim.kernel.errors import ConfigError, DvaSimError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.kernel.whole_files import write_whole
@@ -53,17 +53,21 @@ def tell(line: str) -> None:
     print_lines([escape(line)], Console(stderr=True, highlight=False))
 
 
-def tell_report(report: LinkReport) -> None:
-    """Print what became of the packets, and whether the emulator was punctual."""
-    for name, way in _WAYS.items():
-        tell(f"{name}: {_in_words(getattr(report, way))}")
+def in_words(report: LinkReport, names: Sequence[str] = tuple(_WAYS)) -> list[str]:
+    """What became of the packets, and whether the emulator was punctual, in lines.
+
+    Args:
+        report: The counts.
+        names: Words for the way from the near end to the far one, and back.
+    """
+    ways = zip(names, _WAYS.values(), strict=True)
+    lines = [f"{name}: {_packets(getattr(report, way))}" for name, way in ways]
     late = _milliseconds(p50=report.late_p50_s, p99=report.late_p99_s, max=report.late_max_s)
-    tell(f"emulator late by: {late}")
-    if report.is_disturbed:
-        warn([_disturbed(report)], Console(stderr=True, highlight=False))
+    lines.append(f"emulator late by: {late}")
+    return [*lines, f"warning: {_disturbed(report)}"] if report.is_disturbed else lines
 
 
-def _in_words(way: DirectionReport) -> str:
+def _packets(way: DirectionReport) -> str:
     lost = way.lost_by_chance + way.lost_in_queue + way.lost_in_outage
     causes = f"chance {way.lost_by_chance}, queue {way.lost_in_queue}, outage {way.lost_in_outage}"
     waited = _milliseconds(p50=way.waited_p50_s, p95=way.waited_p95_s, max=way.waited_max_s)

@@ -13,6 +13,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from dva_sim.cli.link_counts import in_words
 from dva_sim.cli.verbosity import detail, is_verbose
 from dva_sim.core.registry import DETECTOR
 from dva_sim.kernel.errors import DvaSimError
@@ -145,7 +146,7 @@ def run_all(options: LiveOptions) -> None:
 
 def warn(console: Console, options: LiveOptions) -> None:
     """Say what does not go together, before anything starts."""
-    for told in contradictions(options.read(), live=True):
+    for told in contradictions(options.read(), live=not options.emulated):
         _print(console, f"warning: {told}")
 
 
@@ -226,6 +227,9 @@ def _conclude(console: Console, board: Board, summary: Summary, options: LiveOpt
         _print(console, f"  {name}: {count}")
     if summary.lost is None and options.records_run:
         _print(console, f"{options.record} written")
+    if summary.link is not None:
+        for line in in_words(summary.link, ("to the robots", "from the robots")):
+            _print(console, line)
     _print_rules(console, summary.verdicts)
     if summary.lost is not None:
         raise DvaSimError(summary.lost)

@@ -40,6 +40,10 @@ _LISTEN = "Address of this machine to listen on."
 _FOR = "How long; default: to the scenario's horizon, or until stopped with --only dva."
 _PICTURES = "Port of the robots' pictures (HTTP); default: 8764, with --keys none. 0: any."
 _SCENARIO = "A scenario by name or path; hands-on if none is named."
+_LINK = (
+    "Emulate a link to the robots: its keys, or a file of them; may be given again. "
+    "scenario: that of the scenario."
+)
 _CLOSED = "--keys FOLDER closes it"
 
 
@@ -122,11 +126,13 @@ def _show_replay(**asked: Any) -> None:
     overwrite=(Overwrite, False),
     state=(file("File that lets a killed DVA go on where it was."), None),
     duration=(seconds(_FOR, "--for"), None),
+    link=(text(_LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
     **RUN,
 )
 def live(
     only: str | None,
     number: int,
+    link: list[str] | None,
     set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -140,13 +146,15 @@ def live(
         dva-sim live drive-to-event  # a simulated person drives
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
+        dva-sim live drive-to-event --link delay_s=0.2 --link loss=0.02  # over a bad link
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
     from dva_sim.cli import exposure, live_screen  # late: start-up
-    from dva_sim.live.options import LiveOptions  # late: start-up
+    from dva_sim.live.options import LiveOptions, changes_by_link  # late: start-up
     from dva_sim.network.addresses import problem_of  # late: start-up
 
-    options = LiveOptions(changes=tuple(set_ or ()), **asked)
+    changes = (*(set_ or ()), *changes_by_link(link or ()))
+    options = LiveOptions(changes=changes, emulated=bool(link), **asked)
     dva, has_keys = options.dva, options.keys is not None
     at = dva if dva is not None and not problem_of(dva) and only in (None, "dva") else None
     listens = [] if at is None else [at.rpartition(":")[0]]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.live.open_files import check_room_for
 from dva_sim.network.addresses import check_address
+from dva_sim.network.emulator.forwarder import links_of
+from dva_sim.network.link.files import read_link
 from dva_sim.recordings.writing import SUFFIX, check_both, try_to_write
 from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
@@ -22,6 +25,8 @@ PATHS = ("keys", "record", "state")  # options that name files
 CAMERA_PORT = 8764  # of the robots' pictures; if it is taken, any that is free
 TRACED = {None: "*", "dva": "dva", "world": "robot-*", "operator": ""}  # by who is run alone
 OPERATORS = ("simulated", "scripted")
+LOCALHOST = "127.0.0.1"
+AS_IN_SCENARIO = "scenario"  # in place of keys of the emulated link
 
 
 @dataclass(frozen=True)
@@ -42,13 +47,14 @@ class LiveOptions:
         duration: How long the run lasts [s]; None: to the scenario's horizon.
         overwrite: What was recorded before may be replaced.
         camera_port: Port of the robots' pictures; None: the usual one, and with keys none.
+        emulated: The scenario's link is emulated between the robots and everybody else.
     """
 
     scenario: str
     changes: tuple[str, ...] = ()
     seed: int = 1
     operators: str = "simulated"
-    host: str = "127.0.0.1"
+    host: str = LOCALHOST
     dva: str | None = None
     port: int = 0
     keys: Path | None = None
@@ -57,6 +63,7 @@ class LiveOptions:
     duration: float | None = None
     overwrite: bool = False
     camera_port: int | None = None
+    emulated: bool = False
 
     @property
     def shows_pictures(self) -> bool:
@@ -106,6 +113,8 @@ class LiveOptions:
             DvaSimError: this process may open too few files for the team.
         """
         scenario, document = self.read(), load(self.scenario)
+        if self.emulated:
+            self._check_emulated(scenario, part)
         check_room_for(scenario.robot.count + scenario.guard.count + scenario.operator.count)
 
         def make(changes: Mapping[str, Any]) -> None:
@@ -119,6 +128,25 @@ class LiveOptions:
         if self.record is not None:
             self._check_record(self.record, part)
         return scenario
+
+    def _check_emulated(self, scenario: Scenario, part: str | None) -> None:
+        others = {
+            "--only": part is not None,
+            "--dva": self.dva is not None,
+            "--host": self.host != LOCALHOST,
+            "--camera-port": self.camera_port is not None,
+        }
+        if given := [name for name, is_given in others.items() if is_given]:
+            raise ConfigError(
+                f"{given[0]} cannot be given with --link, where all parts run in networks of "
+                "their own"
+            )
+        if scenario.link.partitions:
+            raise ConfigError(
+                "link.partitions: only on modelled links, since all robots share the emulated "
+                "one; link.outages are understood"
+            )
+        links_of(scenario.link, self.seed)
 
     def _check_record(self, record: Path, part: str | None) -> None:
         if self.records_run:
@@ -142,6 +170,31 @@ class LiveOptions:
             return build(document, changes)
         except ConfigError as error:
             raise set_by(self.changes, error) from None
+
+
+def changes_by_link(given: Sequence[str]) -> tuple[str, ...]:
+    """The changes of a scenario, `KEY=VALUE`, that give it the link that is to be emulated.
+
+    Args:
+        given: Keys of the link with new values, and at most one file of a link, which takes the
+            place of the scenario's; `scenario` is the scenario's own.
+
+    Raises:
+        ConfigError: it is not a valid link.
+    """
+    pairs = [text for text in given if "=" in text]
+    files = [text for text in given if "=" not in text and text != AS_IN_SCENARIO]
+    if len(files) > 1:
+        raise ConfigError(f"--link {files[1]}: a link is in one file, and {files[0]} is one")
+    try:
+        read_link(None, parse_changes(pairs), ())
+    except ConfigError as error:
+        raise ConfigError(f"--link {error.problem.removeprefix('--set ')}") from None
+    changes = [f"link.{pair}" for pair in pairs]
+    if files:
+        link = read_link(files[0], {}, ()).model_dump(mode="json", exclude_defaults=True)
+        changes = [f"link={json.dumps(link)}", *changes]
+    return tuple(changes)
 
 
 def trace_of(label: str) -> str:

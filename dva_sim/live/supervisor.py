@@ -12,12 +12,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import IO
+from typing import IO, Any
 
 from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import Report
 from dva_sim.live.recording import RunKeeping
+from dva_sim.network.emulator.forwarder import FAR, NEAR
+from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
+from dva_sim.network.emulator.report import LinkReport
 from dva_sim.simulation.full.verdicts import Verdict, broken_rules
 from dva_sim.simulation.scenario import Scenario
 
@@ -52,12 +55,14 @@ class Summary:
         latest: The last report of each part, by its name.
         lost: What was to be recorded and is not, in one line; None: nothing.
         verdicts: How the safety rules have fared.
+        link: The packets of the emulated link, if there was one.
     """
 
     why: str
     latest: dict[str, Report] = field(default_factory=dict)
     lost: str | None = None
     verdicts: list[Verdict] = field(default_factory=list)
+    link: LinkReport | None = None
 
 
 class Supervisor:
@@ -76,6 +81,8 @@ class Supervisor:
         self._interrupted = False
         self._settled_since: float | None = None
         self._keeping: RunKeeping | None = None
+        self._link: LinkProcess | None = None
+        self._packets: LinkReport | None = None
 
     def run(self) -> Summary:
         """Start everything, wait for the end, end everything.
@@ -93,7 +100,7 @@ class Supervisor:
             raise type(error)("; ".join(filter(None, told))) from None
         latest = {c.name: c.latest for c in self._children if c.latest}
         lost = keeping.finish()
-        return Summary(why, latest, lost, keeping.verdicts())
+        return Summary(why, latest, lost, keeping.verdicts(), self._packets)
 
     def _run(self, scenario: Scenario) -> str:
         limit = scenario.horizon_s if self._options.duration is None else self._options.duration
@@ -102,6 +109,9 @@ class Supervisor:
             for number in (signal.SIGINT, signal.SIGTERM)
         }
         try:
+            if self._options.emulated:
+                self._link = LinkProcess(scenario.link, self._options.seed)
+                self._link.begin()
             self._start("dva", "dva", self._options.dva, port=self._options.port)
             address = self._address_of_dva()
             if address is not None:
@@ -112,6 +122,7 @@ class Supervisor:
             return self._watch(limit)
         finally:
             self._end_all()
+            self._end_link()
             for number, handler in before.items():
                 signal.signal(number, handler)
 
@@ -123,14 +134,13 @@ class Supervisor:
         assert self._keeping is not None
         outlet = self._keeping.inlet()
         told = self._arguments(part, dva, number, port, outlet)
-        process = subprocess.Popen(
-            [sys.executable, "-m", "dva_sim.live", told],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C reaches us alone; we end the parts in good order
-            pass_fds=(outlet,),
-        )
+        words = [sys.executable, "-m", "dva_sim.live", told]
+        pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+        if self._link is None:
+            # In a new session Ctrl-C reaches us alone; we end the parts in good order.
+            process = subprocess.Popen(words, start_new_session=True, pass_fds=(outlet,), **pipes)
+        else:
+            process = self._link.start(_end_of(part), words, pass_fds=(outlet,), **pipes)
         os.close(outlet)
         child = _Child(name, process)
         self._children.append(child)
@@ -141,6 +151,8 @@ class Supervisor:
 
     def _arguments(self, part: str, dva: str | None, number: int, port: int, outlet: int) -> str:
         told = {**vars(self._options), "dva": dva, "port": port}
+        if self._link is not None:
+            told["host"] = ADDRESSES[_end_of(part)]
         for key in PATHS:
             told[key] = None if told[key] is None else str(told[key])
         about = {"part": part, "number": number, "epoch": self._epoch, "outlet": outlet}
@@ -185,10 +197,13 @@ class Supervisor:
 
         Raises:
             PartFailed: one of them is gone.
+            LinkEnded: the emulated link is gone.
             DvaSimError: what one of them was given is not as it should be.
         """
         self._read(LOOK)
         self._tell_broken_rules()
+        if self._link is not None and self._link.has_ended:
+            raise self._link.ended()
         for child in self._children:
             code = child.process.poll()
             if code is not None and code != 0 and not self._interrupted:
@@ -260,6 +275,17 @@ class Supervisor:
                 if stream is not None:
                     stream.close()
         self._selector.close()
+
+    def _end_link(self) -> None:
+        if self._link is not None:
+            with suppress(LinkEnded):
+                self._packets = self._link.report()
+            self._link.close()
+
+
+def _end_of(part: str) -> str:
+    """The end of an emulated link that a part is at: its robots are at the far one."""
+    return FAR if part == "world" else NEAR
 
 
 def _ports(first: int, scenario: Scenario) -> Iterator[int]:

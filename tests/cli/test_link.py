@@ -24,6 +24,7 @@ CALM = LinkReport(
     late_p99_s=0.002,
     late_max_s=0.0123456789,
 )
+OVERRUN = replace(CALM, overrun_packets=17)
 
 
 @pytest.mark.parametrize(
@@ -96,14 +97,13 @@ def test_a_table_has_a_row_for_each_direction_and_says_what_its_columns_mean(tmp
         link_counts.files_of(tmp_path / "counts", overwrite=False)
 
 
-def test_a_disturbed_run_is_marked_in_words_and_in_the_table(tmp_path, capsys):
+def test_a_disturbed_run_is_marked_in_words_and_in_the_table(tmp_path):
     path = tmp_path / "late.csv"
-    for late in (replace(CALM, late_p99_s=0.0062), replace(CALM, overrun_packets=17)):
-        link_counts.tell_report(late)
+    for late, word in ((replace(CALM, late_p99_s=0.0062), "6.2 ms"), (OVERRUN, "17 packets")):
+        there, _, _, warning = link_counts.in_words(late)
+        assert not unnamed(there, "near to far: 7 packets", "3 lost", "p95 200.0 ms")
+        assert not unnamed(warning, "disturbed", word)
         (text,) = link_counts.files_of(path, overwrite=True).values()
         link_counts.keep(path, text(late, 1))
         assert [line.split(",")[-2] for line in path.read_text().splitlines()[-2:]] == ["true"] * 2
-    told = capsys.readouterr().err
-    assert not unnamed(told, "near to far: 7 packets", "3 lost", "disturbed", "6.2 ms", "17")
-    link_counts.tell_report(CALM)
-    assert "disturbed" not in capsys.readouterr().err
+    assert len(link_counts.in_words(CALM)) == 3

@@ -111,6 +111,11 @@ class LinkProcess:
                 return LinkReport.from_json(said.decode())
         raise self.ended()
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether it has ended by itself."""
+        return self._process.poll() is not None
+
     def ended(self) -> LinkEnded:
         """Make the error of a link that has ended by itself."""
         code = self._process.wait(_PATIENCE_S)

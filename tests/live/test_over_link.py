@@ -1,0 +1,95 @@
+"""`dva-sim live --link`: robots behind an emulated link, real sockets on both sides of it."""
+
+import json
+import os
+import re
+import signal
+from pathlib import Path
+
+import pytest
+from helpers.network.emulated_link import need_link
+from helpers.processes.programs import wait_until
+from helpers.wording import unnamed
+
+from dva_sim.cli.program import call
+from dva_sim.live.options import LiveOptions, changes_by_link
+from dva_sim.network.link import LinkConfig
+from dva_sim.simulation.scenario import contradictions
+
+SCRIPTED = ("live", "drive-to-event", "--operators", "scripted")
+
+
+@pytest.mark.system
+def test_commands_and_replies_cross_the_emulated_link(programs):
+    need_link()
+    link = ("--link", "up.delay_s=0.05", "--link", "down.delay_s=0.1")
+    run = programs.start(*SCRIPTED, *link, "--set", "robot.processing_s=0")
+    run.wait_to_say("reports fire")
+    run.send(signal.SIGTERM)
+    assert run.ends() == 0, run.complained
+    assert unnamed(run.said, "DVA: 10.77.0.1:", "10.77.0.2:") == []
+    for way, delay in (("to", 50.0), ("from", 100.0)):
+        found = re.search(
+            rf"{way} the robots: (\d+) packets .* 0 lost .* p50 ([\d.]+) ms", run.said
+        )
+        assert found is not None
+        assert int(found[1]) > 20
+        assert float(found[2]) >= delay
+    assert programs.processes() == {}
+
+
+@pytest.mark.system
+def test_an_emulated_link_that_dies_ends_the_run_and_is_named(programs):
+    need_link()
+    run = programs.start(*SCRIPTED, "--link", "delay_s=0.01")
+    run.wait_to_say("DVA: 10.77.0.1:")
+    starts = next(p for p, command in programs.processes().items() if "emulator.start" in command)
+    os.kill(starts, signal.SIGKILL)
+    assert run.ends() == 3
+    assert unnamed(run.complained[-1], "emulated link has ended by itself") == []
+    wait_until(lambda: programs.processes() == {}, "all parts end")
+
+
+def test_the_link_becomes_that_of_the_scenario(tmp_path):
+    """Time-outs and recordings follow from it, as in virtual time."""
+    file = tmp_path / "bad.yaml"
+    file.write_text("delay_s: 0.2\ndelay_law: {law: gamma, sd_s: 0.05}\nup: {loss: 0.1}\n")
+    own = ("link.rate_bps=1e6",)
+    for given, delay, rate, loss in (
+        (["scenario"], 0.0, 1e6, 0.0),
+        (["delay_s=0.5", "up.loss=0.3"], 0.5, 1e6, 0.3),
+        ([str(file)], 0.2, LinkConfig().rate_bps, 0.1),
+        (["delay_s=0.4", str(file)], 0.4, LinkConfig().rate_bps, 0.1),
+    ):
+        options = LiveOptions("drive-to-event", (*own, *changes_by_link(given)), emulated=True)
+        link = options.check().link
+        assert (link.delay_s, link.rate_bps, link.toward("up").loss) == (delay, rate, loss)
+    law = '{"law": "gamma", "sd_s": 0.05}'
+    assert json.loads(law) == link.model_dump(exclude_defaults=True)["delay_law"]
+    assert not any("modelled" in told for told in contradictions(options.read()))
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["--link", "delay=1"], ("--link", "delay_s")),
+        (["--link", "none.yaml"], ("none.yaml",)),
+        (["--link", "a.yaml", "--link", "b.yaml"], ("a.yaml", "b.yaml")),
+        (["--link", "loss=0.1", "--only", "dva"], ("--only", "--link")),
+        (["--link", "loss=0.1", "--dva", "127.0.0.1:5600"], ("--dva", "--link")),
+        (["--link", "loss=0.1", "--host", "127.0.0.2"], ("--host", "--link")),
+        (["--link", "loss=0.1", "--camera-port", "0"], ("--camera-port", "--link")),
+        (["--link", "trace_up=none.trace"], ("none.trace",)),
+        (
+            ["--link", "scenario", "--set", "link.partitions=[{from_s: 0, for_s: 1}]"],
+            ("link.partitions", "link.outages"),
+        ),
+    ],
+)
+def test_what_cannot_be_emulated_is_refused_in_one_line(
+    words, names, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text("delay_s: 0.1\n")
+    assert call(["live", "drive-to-event", *words]) == 2
+    assert unnamed(capsys.readouterr().err, *names) == []
