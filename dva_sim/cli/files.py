@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
-from typer import Argument, Option
+from typer import Option
 
 from dva_sim.cli.options import (
     REQUIRED,
@@ -14,19 +14,27 @@ from dva_sim.cli.options import (
     Json,
     Quiet,
     Verbose,
+    argument,
     asks,
     count,
     file,
     flag,
     folder,
     one_of,
+    several,
     text,
 )
 from dva_sim.cli.verbosity import loudness, print_json
 from dva_sim.kernel.suggestions import either
 from dva_sim.testing.promises import TRIALS
 
-_TRIED = either(TRIALS)
+_FILES = (
+    "Messages, studies, scenarios, sites, plans, maps, agents, recordings, traces, audit logs; "
+    f"- reads a message. Or {either(TRIALS)}, and names of such or mine.py:Mine. "
+    "Or link: the emulated one."
+)
+_SCHEMAS = "message", "study", "scenario", "cases", "site", "agent"
+_EVIDENCE = "dispatch", "operators", "network"
 _RATE = "Of these commands."
 _UNIT = "Of the log of another app whose head does not say it."
 
@@ -38,17 +46,8 @@ def _listed(incomplete: str) -> list[str]:
     return one_of(*names.kinds())(incomplete)
 
 
-def list_(
-    kind: Annotated[
-        str | None,
-        Argument(
-            metavar="KIND",
-            autocompletion=_listed,
-            help="Only this kind, such as studies.",
-        ),
-    ] = None,
-    as_json: Json = False,
-) -> None:
+@asks(kind=(argument("Only this kind, such as studies.", "KIND", _listed, str | None), None))
+def list_(kind: str | None, as_json: Json = False) -> None:
     """Name all studies, scenarios, sites, agents and policies.
 
     There is a line for each name, with what it is.
@@ -84,22 +83,11 @@ def plugins(as_json: Json = False) -> None:
         names.tell(names.plugin_lines())
 
 
-def check(
-    files: Annotated[
-        list[str],
-        Argument(
-            metavar="FILE...",
-            help="Messages, studies, scenarios, sites, plans, maps, agents, recordings, traces, "
-            "audit logs; - reads a message. "
-            f"Or {_TRIED}, and names of such or mine.py:Mine. "
-            "Or link: the emulated one.",
-        ),
-    ],
-    set_: Annotated[
-        list[str] | None,
-        Option("--set", metavar="KEY=VALUE", help="An option of what is tried."),
-    ] = None,
-) -> None:
+@asks(
+    files=(argument(_FILES, "FILE...", of=list[str]), REQUIRED),
+    set_=(several("An option of what is tried.", "KEY=VALUE", "--set"), ()),
+)
+def check(files: list[str], set_: list[str]) -> None:
     """Tell of each file whether it is valid, and if not, where and why.
 
     Of what users bring, such as a policy or a robot: whether it keeps its promises. Of the emulated
@@ -114,11 +102,11 @@ def check(
     """
     from dva_sim.cli import checks  # late: start-up
 
-    raise typer.Exit(checks.check(files, set_ or []))
+    raise typer.Exit(checks.check(files, set_))
 
 
 @asks(
-    file=(Annotated[Path, Argument(metavar="FILE", help="Of a phone's motion.")], REQUIRED),
+    file=(argument("Of a phone's motion.", "FILE", of=Path), REQUIRED),
     commands=(flag("--commands", "Print the commands that its app made of it."), False),
     rate=(Annotated[float, Option(metavar="HZ", min=0.1, max=100.0, help=_RATE)], 10.0),
     part=(file("Write an accelerometer part that measures so.", "--part", metavar="OUT"), None),
@@ -152,16 +140,13 @@ def phone_log(
         phone_log.tell(file, as_json, unit)
 
 
-def schema(
-    kind: Annotated[
-        str,
-        Argument(
-            metavar="KIND",
-            autocompletion=one_of("message", "study", "scenario", "cases", "site", "agent"),
-            help="message, study, scenario, cases, site or agent.",
-        ),
-    ],
-) -> None:
+@asks(
+    kind=(
+        argument(f"{', '.join(_SCHEMAS[:-1])} or {_SCHEMAS[-1]}.", "KIND", one_of(*_SCHEMAS)),
+        REQUIRED,
+    )
+)
+def schema(kind: str) -> None:
     """Print the schema of a kind of file.
 
     It is XSD for messages, and JSON Schema for all others.
@@ -175,17 +160,7 @@ def schema(
 
 
 @asks(
-    what=(
-        Annotated[
-            str,
-            Argument(
-                metavar="WHAT",
-                autocompletion=one_of("dispatch", "operators", "network"),
-                help="dispatch, operators or network.",
-            ),
-        ],
-        "dispatch",
-    ),
+    what=(argument("dispatch, operators or network.", "WHAT", one_of(*_EVIDENCE)), "dispatch"),
     out=(folder("Write tables, figures and a page there.", "-o", "--out"), None),
     cases=(file("A file of cases, by name or path; not for operators.", of=str | None), None),
     strategy=(text("How operators drive; operators only."), None),

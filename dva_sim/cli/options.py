@@ -85,9 +85,9 @@ MOST_JOBS = 1024
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-def argument(help: str, metavar: str, completer: Completer | None = None) -> Any:
-    """A required argument, given by its position."""
-    return Annotated[str, Argument(metavar=metavar, autocompletion=completer, help=help)]
+def argument(help: str, metavar: str, completer: Completer | None = None, of: Any = str) -> Any:
+    """An argument, given by its position; required where it has no default."""
+    return Annotated[of, Argument(metavar=metavar, autocompletion=completer, help=help)]
 
 
 def text(help: str, *names: str, metavar: str = "NAME", of: Any = str | None) -> Any:
@@ -135,10 +135,7 @@ def folder(help: str, *names: str) -> Any:
 _JOBS = "How many processes; default: one for each core."
 Jobs = count(_JOBS, "-j", "--jobs", least=1, most=MOST_JOBS, of=int | None)
 RunSeed = count("The run's random seed.")
-ScenarioName = Annotated[
-    str,
-    Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help="A scenario by name or path."),
-]
+ScenarioName = argument("A scenario by name or path.", "SCENARIO", SCENARIOS)
 Sets = Annotated[
     list[str] | None,
     Option("--set", metavar="KEY=VALUE", help="Change a key; may be given again."),

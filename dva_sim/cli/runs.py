@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
-from typer import Argument
 
 from dva_sim import api
 from dva_sim.cli.options import (
@@ -20,6 +19,7 @@ from dva_sim.cli.options import (
     Quiet,
     ScenarioName,
     Verbose,
+    argument,
     asks,
     choice,
     count,
@@ -171,12 +171,7 @@ def live(
 
 
 @asks(
-    scenario=(
-        Annotated[
-            str | None, Argument(metavar="SCENARIO", autocompletion=SCENARIOS, help=_SCENARIO)
-        ],
-        None,
-    ),
+    scenario=(argument(_SCENARIO, "SCENARIO", SCENARIOS, str | None), None),
     port=PAGE["port"],
     host=PAGE["host"],
     links=(
@@ -273,12 +268,7 @@ def console(
 
 
 @asks(
-    profile=(
-        Annotated[
-            str, Argument(metavar="PROFILE", autocompletion=ROBOTS, help="A robot by name or path.")
-        ],
-        "servrobot",
-    ),
+    profile=(argument("A robot by name or path.", "PROFILE", ROBOTS), "servrobot"),
     dva=(
         text("Register there at once, and listen; else from the page.", metavar=_ADDRESS),
         None,
@@ -325,12 +315,11 @@ def _say_at_once(line: str) -> None:
     sys.stdout.flush()
 
 
-def keys(
-    folder: Annotated[Path, Argument(metavar="FOLDER", help="Where to put them.")],
-    names: Annotated[
-        list[str], Argument(metavar="NAME...", help="Devices (robot-1, an id), or scenarios.")
-    ],
-) -> None:
+@asks(
+    folder=(argument("Where to put them.", "FOLDER", of=Path), REQUIRED),
+    names=(argument("Devices (robot-1, an id), or scenarios.", "NAME...", of=list[str]), REQUIRED),
+)
+def keys(folder: Path, names: list[str]) -> None:
     """Make a pair of keys for each device that has none.
 
     Existing keys are kept. `dva-sim live --keys FOLDER` uses them.

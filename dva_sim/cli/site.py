@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from typer import Argument
-
-from dva_sim.cli.options import REQUIRED, SITES, asks, count, file, flag, several
+from dva_sim.cli.options import REQUIRED, SITES, argument, asks, count, file, flag, several
 from dva_sim.kernel.errors import ConfigError
 
 if TYPE_CHECKING:
     from dva_sim.worlds.site import Site
 
-_NAMED = Argument(
-    metavar="SITE", autocompletion=SITES, help="A site by name or path, or a ROS map by path."
-)
-_NAME = Annotated[str, _NAMED], REQUIRED
+_NAME = argument("A site by name or path, or a ROS map by path.", "SITE", SITES), REQUIRED
 _CHANGES = several("An option of a generated site.", "KEY=VALUE", "--set"), ()
 
 
