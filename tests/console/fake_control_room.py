@@ -9,6 +9,7 @@ from dva_sim.console.events.alarms import AlarmCondition, Alarms
 from dva_sim.recordings.audit_log import BEGIN, AuditEntry, AuditLog
 
 Line = dict[str, Any]
+UNDECIDED = {"decisions": 0, "acknowledged": None, "decided": None, "note": None}
 WHO = {"robot-2": 41.0, "robot-3": 58.0, "guard-1": 74.0}  # could go, and when they would be there
 
 
@@ -50,6 +51,7 @@ class ControlRoomDesk:
             "shelved": self.alarms.shelved(now),
             "flood": self.alarms.is_flood,
             "rate": self.alarms.rate(now),
+            "left_out": 0,
         }
         audit = {
             "k": "audit",
@@ -64,7 +66,7 @@ class ControlRoomDesk:
     def with_decisions(self, events: Line) -> Line:
         """The line of events, with what was decided and raised; their alarms are noted."""
         rows = [
-            row | {"decisions": 0, "acknowledged": None} | self.decided.get(row["number"], {})
+            row | UNDECIDED | self.decided.get(row["number"], {})
             for row in (*events["events"], *self.raised)
         ]
         self.alarms.update([self._condition(row) for row in rows], self.t)
@@ -120,7 +122,8 @@ class ControlRoomDesk:
         """Somebody has seen something."""
         number = 100 + len(self.raised)
         row: Line = {"number": number, "state": "pending", "since_ms": self.ms}
-        row |= {"reported_ms": self.ms, "assigned": [], "room": "somewhere"}
+        row |= {"reported_ms": self.ms, "assigned": [], "room": "somewhere", "over": False}
+        row |= {"latitude_deg": 38.66, "longitude_deg": -9.2, "severity_value": 0.5}
         self.raised.append(row | {k: asked[k] for k in ("kind", "severity", "x_m", "y_m")})
         self._write(self._who(asked), "raise", {"event": number})
         self.more = {"event": number}

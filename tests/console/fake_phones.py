@@ -13,6 +13,7 @@ OFFER = {
     "speed_step_mps2": 0.35,
     "turn_step_mps2": 0.12,
     "max_delay_s": 0.5,
+    "limits": {"step_mps2": [0.001, 100.0], "max_delay_s": [0.02, 5.0]},
 }
 FAST_DEG = 30.0
 

@@ -10,11 +10,12 @@ import numpy as np
 import shapely
 from fake_phones import DVA_ADDRESS, OFFER
 
-from dva_sim.console.shown.scene import site_of
+from dva_sim.console.shown.scene import RULES, patterns_of, site_of
 from dva_sim.worlds.site import Site, load_site
 
-PATTERNS = (("req-rep", "REQ/REP"), ("pub-sub", "PUB/SUB"), ("latest-wins", "PUB/SUB, latest wins"))
+PATTERN = "req-rep"
 LINK = {"delay_s": 0.05, "jitter_s": 0.01, "loss": 0.0, "rate_bps": 2e7, "processing_s": 0.05}
+MODELLED = {**LINK, "kind": "modelled", "trace": None}
 LIMITS = {
     "delay_s": [0, 5],
     "jitter_s": [0, 1],
@@ -39,7 +40,7 @@ class Walker:
         self.fast = 0.4 if kind == "robot" else 1.2
         self.wanted: tuple[float, float] | None = None  # speed, turn rate under a hand
         self.mode, self.battery = "Idle", float(rng.uniform(0.3, 1.0))
-        self.pattern = PATTERNS[0][0]
+        self.pattern = PATTERN
 
     def _place(self) -> tuple[float, float]:
         left, low, right, high = self._area.bounds
@@ -109,14 +110,15 @@ class Scene:
             "seed": 1,
             "site": site_of(self.site),
             "things": [self._thing(walker) for walker in self.all],
-            "patterns": [{"name": name, "title": title} for name, title in PATTERNS],
-            "link": LINK,
+            "patterns": patterns_of(PATTERN),
+            "link": MODELLED,
             "link_limits": LIMITS,
             "watchdog_s": 3.0,
             "stale_s": 1.0,
-            "rules": ["A robot without a command for 3 s stops."],
+            "rules": RULES,
             "legend": [],
             "lag_limit_s": 0.25,
+            "pace_limits": [1.0, 20.0],
             "dva_address": DVA_ADDRESS,
             "phone": OFFER,
         }
@@ -140,6 +142,7 @@ class Scene:
         }
         if is_robot:
             about["camera"] = {"field_of_view_deg": 70, "range_m": 12, "rate_hz": 10}
+            about["camera"]["frame_bytes"] = 6000
         if walker.kind == "guard":
             about["person"] = True
         return about
@@ -156,8 +159,8 @@ class Scene:
         (x1, y1), (x2, y2) = self.spots()
         hazards = [_hazard(1, "fire", x1, y1, min(2.5, 0.3 + t / 60))]
         hazards.append(_hazard(2, "gas_leak", x2, y2, min(3.0, 0.3 + t / 40)))
-        fields = [self._field("smoke", x1, y1, 2 + t / 10, "optical density 2 1/m")]
-        fields.append(self._field("gas", x2, y2, 2 + t / 15, "lower explosive limit"))
+        fields = [self._field("smoke", x1, y1, 2 + t / 10, 2.0, "1/m")]
+        fields.append(self._field("gas", x2, y2, 2 + t / 15, 1.0, "of the lower limit"))
         return {"k": "hazards", "hazards": hazards, "fields": fields}
 
     def spots(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -166,7 +169,9 @@ class Scene:
         low = xmin + 0.3 * (xmax - xmin), ymin + 0.4 * (ymax - ymin)
         return low, (xmin + 0.7 * (xmax - xmin), ymin + 0.6 * (ymax - ymin))
 
-    def _field(self, kind: str, x: float, y: float, size: float, full: str) -> dict[str, Any]:
+    def _field(
+        self, kind: str, x: float, y: float, size: float, full: float, unit: str
+    ) -> dict[str, Any]:
         xmin, ymin, xmax, ymax = self.site.extent
         cell = max(0.5, math.sqrt((xmax - xmin) * (ymax - ymin) / 8000))
         columns, rows = math.ceil((xmax - xmin) / cell), math.ceil((ymax - ymin) / cell)
@@ -181,7 +186,7 @@ class Scene:
             "columns": columns,
             "rows": rows,
             "cells": base64.b64encode(values.tobytes()).decode(),
-            "full": full,
+            "full": {"value": full, "unit": unit},
         }
 
     def events(self, t: float) -> dict[str, Any]:
@@ -207,6 +212,7 @@ class Scene:
             "severity": word,
             "severity_value": value,
             "state": ("pending", "assigned", "on_scene", "confirmed")[min(3, int(t / 15))],
+            "over": False,
             "since_ms": int(t // 15 * 15000),
             "reported_ms": 0 if n == 1 else 10000,
             "assigned": list(who),

@@ -26,11 +26,13 @@ from typing import Any
 from PIL import Image, ImageDraw
 
 sys.path[:0] = [str(Path(__file__).parents[2]), str(Path(__file__).parent)]
+sys.path.append(str(Path(__file__).parents[1]))
 
 from fake_control_room import ControlRoomDesk  # noqa: E402
 from fake_dva import FakeDva  # noqa: E402
 from fake_phones import FakePhone, PhoneDesk  # noqa: E402
-from fake_scene import LINK, Scene, Walker  # noqa: E402
+from fake_scene import LINK, MODELLED, Scene, Walker  # noqa: E402
+from helpers.console.declared_lines import checked  # noqa: E402
 
 from dva_sim.cameras.frames import ALIVE, Picture, pack  # noqa: E402
 
@@ -56,6 +58,7 @@ class Seat:
         return {
             "k": "seat",
             "seat": self.name,
+            "label": "",
             "phase": self.phase,
             "order": None,
             "alert": self.alert,
@@ -76,6 +79,8 @@ class Seat:
                     "superseded": 0,
                     "command_age_ms": round(age, 1),
                     "round_trip_ms": round(2 * age, 1),
+                    "outcome": None,
+                    "picture_arrived_ms": None,
                     "picture_ms": world.ms - round(1000 * world.link["delay_s"]),
                     "loop_ms": round(age + 30, 1),
                     "input": self.applied,
@@ -132,7 +137,9 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
 
     def say(self, line: dict[str, Any]) -> None:
         """Write a line, whatever that takes; the real world never waits here."""
-        line.setdefault("t", self.ms)
+        if line["k"] != "log":
+            line.setdefault("t", self.ms)
+        checked(line)
         self.socket.sendall(json.dumps(line, separators=(",", ":")).encode() + b"\n")
 
     def listen(self, wait: float) -> bool:
@@ -310,16 +317,17 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
 
     def rows(self) -> dict[str, Any]:
         holders = {robot.index: seat for seat in self.seats.values() for robot in seat.robots}
-        clock = {"factor": self.factor, "paused": self.paused, "lag_s": 0.004}
+        clock = {"factor": self.factor, "paused": self.paused, "lag_s": 0.004, "given_up_s": 0.0}
         return {
             "k": "rows",
             "t": self.ms,
             "clock": clock | {"held_by_lag": False},
-            "link": {**self.link, "kind": "modelled", "trace": None},
+            "link": {**MODELLED, **self.link},
             "dropped": 0,
             "server": self.dva.server(),
             "robots": [self._row(robot, holders.get(robot.index)) for robot in self.scene.robots],
             "people": [{"i": p.index, "doing": "walks"} for p in self.scene.people],
+            "order": None,
         }
 
     def _row(self, robot: Walker, seat: Seat | None) -> dict[str, Any]:
@@ -340,6 +348,7 @@ class FakeWorld(PhoneDesk, ControlRoomDesk):
             "lost": 0,
             "commands_hz": 10.0 if left is not None else 0.0,
             "refused": 0,
+            "timeouts": 0,
         }
 
     # --- time ----------------------------------------------------------------------------

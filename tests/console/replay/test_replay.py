@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from helpers.console.declared_lines import checked
+from helpers.console.declared_lines import at_page, checked
 from recordings.runs import drill, evacuation
 
 from dva_sim.cameras.lines import PaintersLine
@@ -46,12 +46,14 @@ class Told:
 
     def __init__(self, run, shelf=None):
         self.lines, self.shown, self.answers, self.logs = {}, [], [], []
+        self.told = []
         self.player = Player(run, shelf)
         self.player.tell, self.player.show = self._take, self._show
 
     def _take(self, line, key=None):
         line = checked(line)
         self.lines[line["k"]] = line
+        self.told.append(line)
         if line["k"] == "log":
             self.logs.append(line)
         if line["k"] == "done":
@@ -356,3 +358,14 @@ def test_the_rows_of_an_audit_log_are_those_of_the_recording_that_is_played(tmp_
     told.ask("open_recording", "2", name="b.mcap")
     assert rows_of(path) == []
     assert not told.lines["scene"]["replay"]["audit"]
+
+
+def test_what_a_page_gets_of_a_recording_is_as_declared(playing, recorded):
+    played = playing(recorded, None)
+    played.player.take({"do": "watch", "client": "c", "robots": [0]})
+    looked = {"logs": {"dva": True, "robot-1": False}, "tables": ["devices"]}
+    for t_ms in (20_000, 40_000):
+        played.ask("seek", str(t_ms), t_ms=t_ms)
+        played.player.take({"do": "look", "client": "c"} | looked)
+    told = {message["k"] for message in at_page(played.told, "c")}
+    assert told >= {"snap", "d", "rows", "robot", "log", "devices", "events", "told", "hazards"}

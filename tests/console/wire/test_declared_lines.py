@@ -1,7 +1,9 @@
 """Each line as it is declared: what a checker of them finds."""
 
 import pytest
-from helpers.console.declared_lines import checked
+from helpers.console.attached_console import attached
+from helpers.console.declared_lines import at_page, checked
+from helpers.console.simulated_phone import FIRE, PhonePage
 from pydantic import ValidationError
 
 from dva_sim.console.wire.lines import ToPage
@@ -40,3 +42,38 @@ def test_a_kind_that_nobody_declared_is_found(kind):
         checked({"k": kind})
     with pytest.raises((KeyError, ValidationError)):
         checked({"k": kind}, ToPage)
+
+
+def kinds(messages):
+    return {message["k"] for message in messages}
+
+
+def test_what_a_page_gets_of_a_world_is_as_declared(monkeypatch):
+    page = PhonePage(
+        monkeypatch, client="p1", events=FIRE, guard__kind={2: "person"}, bystander__count=1
+    )
+    page.actions.take({"client": "p1", "do": "watch", "robots": [0]})
+    looked = {"client": "p1", "do": "look", "logs": {"dva": True, "robot-1": False}}
+    page.actions.take(looked | {"tables": ["devices"]})
+    assert page.do("guard_join", client="g1", guard="guard-2")[0]
+    assert page.do("room_join", client="c1", name="ana", role="supervise")[0]
+    page.drives_by_tilt(then=2.0)
+    assert page.do("fault", robot=0, what="processing", on=True, seconds=0.5)[0]
+    assert page.ask("tour")["tour"]["robots"] == [0, 1]
+    page.let(1.0)
+    told = at_page(page.lines, "p1")
+    others = at_page(page.lines, "g1")
+    usual = {"snap", "d", "rows", "seat", "robot", "log", "devices", "events", "control", "story"}
+    assert usual | {"alarms", "hazards"} <= kinds(told)
+    assert {"snap", "guard", "seat"} <= kinds(others)
+    assert [one["robots"] for one in others if one.get("short")][-1] == [0]
+
+
+def test_what_a_page_gets_of_a_dva_elsewhere_is_as_declared(monkeypatch, tmp_path):
+    with attached(monkeypatch, tmp_path) as page:
+        assert page.ask("room_join", name="ana")["ok"]
+        page.actions.take({"client": "c1", "do": "look", "logs": {}, "tables": ["devices"]})
+        page.ask("event_acknowledge", event=1)
+        page.let(2.0)
+        told = kinds(at_page(page.lines, "c1"))
+    assert told >= {"snap", "rows", "devices", "events", "control", "alarms", "audit", "story"}

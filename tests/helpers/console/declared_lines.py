@@ -1,7 +1,7 @@
 """Lines of a console as they are declared: unknown, missing or of another type, a value fails."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any, Union, get_args, get_type_hints
 
@@ -9,6 +9,8 @@ from pydantic import TypeAdapter
 from typing_extensions import is_typeddict
 
 from dva_sim.cameras import lines as painted
+from dva_sim.console.web.feed import PageFeed
+from dva_sim.console.web.state import RunState
 from dva_sim.console.wire import events, lines, pages, records, rows, scenes, seats
 
 STRICT = {"extra": "forbid", "strict": True, "allow_inf_nan": False}
@@ -37,3 +39,21 @@ def checked(line: Mapping[str, Any], declared: Any = lines.Told) -> dict[str, An
     _adapter(declared, line["k"]).validate_json(text)
     arrived: dict[str, Any] = json.loads(text)
     return arrived
+
+
+def at_page(told: Iterable[Mapping[str, Any]], client: str) -> list[dict[str, Any]]:
+    """What the web process makes of lines for one page that looks at all there is."""
+    state, messages = RunState(), []
+    feed = PageFeed(state, client)
+    for line in told:
+        if line["k"] in ("done", "bye"):
+            continue
+        if state.take(line) == "scene":
+            labels = [thing["label"] for thing in line["things"][:1]]
+            feed.watches = frozenset(thing["i"] for thing in line["things"])
+            feed.looks.look({"dva": {}, **{label: {} for label in labels}}, ["devices"])
+        while (text := feed.next()) is not None:
+            message = json.loads(text)
+            assert message.pop("s") == len(messages) + 1
+            messages.append(checked(message, lines.ToPage))
+    return messages

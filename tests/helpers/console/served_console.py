@@ -20,14 +20,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
+from helpers.console.declared_lines import checked
 from helpers.processes.patience import PATIENCE_S
 from websockets.sync.client import ClientConnection, connect
 
 from dva_sim.cameras.frames import ALIVE, Picture, pack
+from dva_sim.console.wire.lines import ToPage
 
 HOSTILE = "<script>alert(1)</script>"
 LABELS = ("robot-1", "robot-2", HOSTILE, "robot-4", "robot-5")
 Line = dict[str, Any]
+OF_THE_WEB = ("you", "pong", "pictures", "bye", "d")  # lines that it makes itself
 
 
 class Answer(NamedTuple):
@@ -241,6 +244,8 @@ class Page:
         """The next message of some kinds."""
         while True:
             line: Line = json.loads(self.ws.recv(PATIENCE_S))
+            if line["k"] in OF_THE_WEB:
+                checked({key: value for key, value in line.items() if key != "s"}, ToPage)
             if line["k"] in kinds:
                 return line
 
