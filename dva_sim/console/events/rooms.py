@@ -7,15 +7,16 @@ DVA's own: another make of control room, or of DVA, can take either place.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Final
+from typing import Final, Unpack
 
 from dva_sim.agents.control_room.control_room import ControlRoomAgent
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import Said, unanswered
 from dva_sim.console.events.decisions import dispatch_shown
 from dva_sim.console.wire.events import ControlLine, RoomEntry
+from dva_sim.console.wire.limits import LONG
 from dva_sim.console.wire.seats import Answered
 from dva_sim.core.registry import FORGET_AFTER
 from dva_sim.core.roles import Roles
@@ -39,12 +40,24 @@ class ConsoleRoom:
         agent: At the DVA.
         role: What the person's address allows.
         registered: Whether the DVA knows it.
+        unanswered: What its person asked for, and was not answered yet.
     """
 
     number: int
     agent: ControlRoomAgent
     role: str
     registered: bool = False
+    unanswered: set[Said] = field(default_factory=set)
+
+    def until_answered(self, said: Said) -> Said:
+        """Keep an answer in mind: a room that is left stays until its person has it."""
+
+        def told(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
+            self.unanswered.discard(said)
+            said(ok, text, **more)
+
+        self.unanswered.add(said)
+        return told
 
     def is_called(self, name: str) -> bool:
         """Return True if that is the name which its person gave."""
@@ -150,11 +163,19 @@ class ConsoleRooms:
         return ConsoleRoom(number, agent, role)
 
     def leave(self, client: str) -> None:
-        """A page is gone for good, and its person decides no more."""
+        """A page is gone for good, or has another name; what it asked for is answered yet."""
         room = self.by_client.pop(client, None)
         if room is not None:
-            room.device.leave()
-            room.device.clock.call_after(RESTS, self._forget, room)
+            self._end(room, room.device.clock.now + LONG)
+
+    def _end(self, room: ConsoleRoom, latest: float) -> None:
+        """Let a device leave that nobody waits for, or only in vain."""
+        clock = room.device.clock
+        if room.unanswered and clock.now < latest:
+            clock.call_after(LOOK, self._end, room, latest)
+            return
+        room.device.leave()
+        clock.call_after(RESTS, self._forget, room)
 
     def _forget(self, room: ConsoleRoom) -> None:
         for peer in (room.device.dva, *self._run.field.robots):

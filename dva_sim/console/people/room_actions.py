@@ -52,18 +52,18 @@ class RoomActions:
         self._rooms.join(client, str(line.get("role", "look")), name, said)
 
     def _room(
-        self, client: str, line: Line, said: Said, then: Callable[[ConsoleRoom], object]
+        self, client: str, line: Line, said: Said, then: Callable[[ConsoleRoom, Said], object]
     ) -> None:
         """The control room of a page; it gets one with its first decision."""
         room = self._rooms.by_client.get(client)
         if room is not None and room.registered:
-            then(room)
+            then(room, room.until_answered(said))
             return
 
         def joined(ok: bool, text: str, /, **_: Any) -> None:
             room = self._rooms.by_client.get(client)
             if ok and room is not None:
-                then(room)
+                then(room, room.until_answered(said))
             else:
                 said(False, text)
 
@@ -78,7 +78,7 @@ class RoomActions:
         done: str,
         then: Callable[[m.Reply], Answered] | None = None,
     ) -> None:
-        self._room(client, line, said, lambda room: room.ask(body, said, done, then))
+        self._room(client, line, said, lambda room, told: room.ask(body, told, done, then))
 
     # --- events -----------------------------------------------------------------------------
 
@@ -138,8 +138,8 @@ class RoomActions:
         robot = self._robot(line["robot"])
         label, body = self._world.run.stage.labels[robot], inspection_of(status)
 
-        def send(room: ConsoleRoom) -> None:
-            send_on_mission(room.device, robot, label, body, said)
+        def send(room: ConsoleRoom, told: Said) -> None:
+            send_on_mission(room.device, robot, label, body, told)
 
         self._room(client, line, said, send)
 
@@ -148,10 +148,10 @@ class RoomActions:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
         robot, reason = self._robot(line["robot"]), line["reason"]
 
-        def begin(room: ConsoleRoom) -> None:
+        def begin(room: ConsoleRoom, told: Said) -> None:
             number = self._seats.sit(client)
             if number is None:
-                said(False, "all seats are taken")
+                told(False, "all seats are taken")
                 return
             seat = self._world.person(number)
             label = self._world.run.stage.labels[robot]
@@ -161,7 +161,7 @@ class RoomActions:
                 if not ok and not seat.robots:
                     self._seats.stand_up(client)
                     seat.attended = client in self._world.client_of.values()
-                said(ok, text, **more)
+                told(ok, text, **more)
 
             event = self._rooms.event_of(robot)
             Takeover(

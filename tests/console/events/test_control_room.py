@@ -69,6 +69,34 @@ def test_an_event_is_acknowledged_once_and_the_second_is_told_by_whom(room):
     assert "acknowledged by ana" in text
 
 
+@pytest.mark.parametrize(
+    ("what", "asked"),
+    [
+        ("event_acknowledge", {}),
+        ("event_note", {"text": "smoke"}),
+        ("mission", {"robot": 0}),
+        ("take_over", {"robot": 0, "reason": "closer"}),
+    ],
+)
+def test_what_is_under_way_is_answered_though_its_person_takes_another_name(room, what, asked):
+    taken = {"client": "a1", "role": "supervise"}
+    about = asked if what == "take_over" else {"event": 1, **asked}
+    room.actions.take({"id": "under way", "do": what, **taken, **about})
+    assert room.do("room_join", name="bea", role="supervise")[0]
+    room.until(lambda: any(line["id"] == "under way" for line in room.told("done")))
+
+    (line,) = (line for line in room.told("done") if line["id"] == "under way")
+    assert (line["ok"], "outcome" in line) == (True, False)
+    room.let(0.3)
+    assert [one["label"] for one in room.told("control")[-1]["rooms"]] == ["bea"]
+    room.until(lambda: left(room, "ana"))
+
+
+def left(one: PhonePage, label: str) -> bool:
+    """Whether a device has left."""
+    return all(d.silent for d in one.world.run.stage.devices if d.label == label)
+
+
 def test_who_is_sent_goes_and_what_the_policy_would_have_done_is_told(room):
     done, _ = room.do("event_proposal", event=1)
     assert done
