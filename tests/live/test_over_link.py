@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import signal
 from pathlib import Path
 
@@ -20,34 +19,25 @@ SCRIPTED = ("live", "drive-to-event", "--operators", "scripted")
 
 
 @pytest.mark.system
-def test_commands_and_replies_cross_the_emulated_link(programs):
+def test_what_robots_say_crosses_the_link_and_the_run_ends_with_it(programs):
+    """The detector's report is answered over the link, until that is killed."""
     need_link()
-    link = ("--link", "up.delay_s=0.05", "--link", "down.delay_s=0.1")
-    run = programs.start(*SCRIPTED, *link, "--set", "robot.processing_s=0")
-    run.wait_to_say("reports fire")
-    run.send(signal.SIGTERM)
-    assert run.ends() == 0, run.complained
-    assert unnamed(run.said, "DVA: 10.77.0.1:", "10.77.0.2:") == []
-    for way, delay in (("to", 50.0), ("from", 100.0)):
-        found = re.search(
-            rf"{way} the robots: (\d+) packets .* 0 lost .* p50 ([\d.]+) ms", run.said
-        )
-        assert found is not None
-        assert int(found[1]) > 20
-        assert float(found[2]) >= delay
-    assert programs.processes() == {}
-
-
-@pytest.mark.system
-def test_an_emulated_link_that_dies_ends_the_run_and_is_named(programs):
-    need_link()
-    run = programs.start(*SCRIPTED, "--link", "delay_s=0.01")
-    run.wait_to_say("DVA: 10.77.0.1:")
+    run = programs.start(*SCRIPTED, "--link", "up.delay_s=0.05", "--link", "down.delay_s=0.1")
+    run.wait_to_say("DVA: 10.77.0.1:", "http://10.77.0.2:", "reports fire")
     starts = next(p for p, command in programs.processes().items() if "emulator.start" in command)
     os.kill(starts, signal.SIGKILL)
     assert run.ends() == 3
     assert unnamed(run.complained[-1], "emulated link has ended by itself") == []
     wait_until(lambda: programs.processes() == {}, "all parts end")
+
+
+@pytest.mark.system
+def test_the_end_of_a_run_tells_what_became_of_the_packets(programs):
+    need_link()
+    run = programs.start(*SCRIPTED, "--link", "delay_s=0.05", "--for", "0.5")
+    assert run.ends() == 0, run.complained
+    assert unnamed(run.said, "to the robots: ", "from the robots: ", "emulator late by: ") == []
+    assert programs.processes() == {}
 
 
 def test_the_link_becomes_that_of_the_scenario(tmp_path):

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from types import FrameType
+from contextlib import suppress
 from typing import NoReturn
 
 from dva_sim.network.emulator import linux_calls
@@ -20,7 +20,8 @@ from dva_sim.network.emulator import linux_calls
 KILL_ALL = signal.SIGUSR1
 """Asks for an end of all processes of the program, at once."""
 
-_PASSED_ON = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+_PASSED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+_TAKEN = {*_PASSED_ON, KILL_ALL, signal.SIGCHLD}
 _NONE = "-"
 _BY_SIGNAL = 128  # exit codes of programs that a signal has ended, as shells give them
 
@@ -52,16 +53,19 @@ def main(parent: int, user: int, group: int, spaces: tuple[str, str], program: l
     linux_calls.die_with_parent(parent)
     linux_calls.separate_children()
     alive, writing = os.pipe()
-    signal.pthread_sigmask(signal.SIG_BLOCK, (*_PASSED_ON, KILL_ALL))
+    # Taken one by one from here on: none is missed between a look and a wait.
+    signal.pthread_sigmask(signal.SIG_BLOCK, _TAKEN)
     first = os.fork()
     if first == 0:
         os.close(writing)
         _wait_for_program(alive, user, group, program)
-    for number in _PASSED_ON:
-        signal.signal(number, lambda number, _: os.kill(first, number))
-    signal.signal(KILL_ALL, lambda *_: os.kill(first, signal.SIGKILL))
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, (*_PASSED_ON, KILL_ALL))
-    return _code_of(os.waitpid(first, 0)[1])
+    while (ended := os.waitpid(first, os.WNOHANG))[0] == 0:
+        number = signal.sigwait(_TAKEN)
+        if number == KILL_ALL:
+            os.kill(first, signal.SIGKILL)
+        elif number != signal.SIGCHLD:
+            os.kill(first, number)
+    return _code_of(ended[1])
 
 
 def _wait_for_program(alive: int, user: int, group: int, program: list[str]) -> NoReturn:
@@ -73,22 +77,22 @@ def _wait_for_program(alive: int, user: int, group: int, program: list[str]) -> 
         started = os.fork()
         if started == 0:
             _become(program, user, group)
-        for number in _PASSED_ON:
-            signal.signal(number, _pass_on)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, (*_PASSED_ON, KILL_ALL))
-        while (ended := os.wait())[0] != started:
-            pass
-        code = _code_of(ended[1])
+        while (status := _reap(started)) is None:
+            number = signal.sigwait(_TAKEN)
+            if number in _PASSED_ON:
+                with suppress(ProcessLookupError):
+                    os.kill(-1, number)  # to every process of this namespace but this one
+        code = _code_of(status)
     finally:
         os._exit(code)
 
 
-def _pass_on(number: int, frame: FrameType | None) -> None:
-    """Send a signal to every process of this namespace but this one."""
-    try:
-        os.kill(-1, number)
-    except ProcessLookupError:
-        return
+def _reap(program: int) -> int | None:
+    """Take leave of all processes that have ended; the status of the program if it has."""
+    while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+        if ended[0] == program:
+            return ended[1]
+    return None
 
 
 def _become(program: list[str], user: int, group: int) -> NoReturn:

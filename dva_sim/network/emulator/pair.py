@@ -137,16 +137,14 @@ def _caught_signals() -> Iterator[socket.socket]:
     """
     reads, writes = socket.socketpair()
     writes.setblocking(False)
-
-    def note(number: int, _: object) -> None:
-        with suppress(BlockingIOError):
-            writes.send(bytes([number]))
-
+    # A handler of Python's own may run too late: another thread may have got the signal.
+    woken = signal.set_wakeup_fd(writes.fileno())
     heard = [n for n in _SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, note) for number in heard}
+    before = {number: signal.signal(number, lambda *_: None) for number in heard}
     with reads, writes:
         try:
             yield reads
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
+            signal.set_wakeup_fd(woken)

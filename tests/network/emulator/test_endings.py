@@ -2,10 +2,8 @@
 
 import os
 import signal
-from collections.abc import Callable
 
 import pytest
-from helpers.network.emulated_link import children
 from helpers.processes.programs import Program, Programs, wait_until
 
 pytestmark = pytest.mark.system
@@ -26,31 +24,16 @@ def commands(programs: Programs) -> list[str]:
     return [command.strip() for command in programs.processes().values()]
 
 
-def interrupt(program: Program) -> None:
-    program.send(signal.SIGINT)
-
-
-def terminate(program: Program) -> None:
+def test_sigterm_ends_both_commands_and_their_daemons(programs):
+    program = begun(programs, "exec sleep 999", STUBBORN)
     program.send(signal.SIGTERM)
-
-
-@pytest.mark.parametrize(
-    ("end", "far", "code"),
-    [(interrupt, "exec sleep 998", 130), (terminate, STUBBORN, 143)],
-    ids=["Ctrl-C", "SIGTERM, which the far one ignores"],
-)
-def test_a_signal_ends_both_commands_and_their_daemons(
-    programs, end: Callable[[Program], None], far: str, code: int
-):
-    program = begun(programs, "exec sleep 999", far)
-    end(program)
-    assert program.ends() == code
+    assert program.ends() == 143
     assert commands(programs) == []
 
 
-def test_the_near_command_may_tidy_up_after_a_signal(programs):
+def test_ctrl_c_lets_the_near_command_tidy_up(programs):
     program = begun(programs, "trap 'echo tidy; exit 5' INT; while :; do sleep 0.05; done")
-    interrupt(program)
+    program.send(signal.SIGINT)
     assert program.ends() == 5
     assert program.said == "tidy\n"
     assert commands(programs) == []
@@ -58,7 +41,7 @@ def test_the_near_command_may_tidy_up_after_a_signal(programs):
 
 def test_a_second_signal_waits_for_nobody(programs):
     program = begun(programs, STUBBORN, STUBBORN)
-    interrupt(program)
+    program.send(signal.SIGINT)
     program.send(signal.SIGTERM)
     assert program.ends() == 137
     assert commands(programs) == []
@@ -87,10 +70,9 @@ def test_a_killed_emulator_ends_both_commands_and_is_named(programs):
     assert commands(programs) == []
 
 
-def test_a_command_that_cannot_start_is_told_with_its_exit_code(programs):
-    program = programs.start("link", "--near", "sleep 0.5", "--far", "no-such-command")
-    assert program.ends() == 0
+def test_commands_that_cannot_start_are_told_with_their_exit_codes(programs):
+    near = f"{DAEMON} sleep 0.3; no-such-command"
+    program = programs.start("link", "--near", near, "--far", "no-such-command")
+    assert program.ends() == 127
     assert "the far command has ended with exit code 127" in program.complained
-    assert programs.start("link", "--near", "no-such-command", "--far", DAEMON).ends() == 127
     assert commands(programs) == []
-    assert children(program.process.pid) == []
