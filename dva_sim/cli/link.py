@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import socket
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer import Argument
 
-from dva_sim.cli.options import RUN, SCENARIOS, Overwrite, Quiet, asks, file, text
+from dva_sim.cli.options import RUN, SCENARIOS, Overwrite, Quiet, asks, count, file, text
 from dva_sim.kernel.errors import ConfigError
 
 _FILE = "Keys of a link, or a scenario, whose link is taken; default: a fast one."
 _KEYS = Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)]
+_PUBLISH = "Port at the near end that 127.0.0.1 of this machine leads to, as for a page."
 _OUT = "Keep the counts: X.csv, or a folder for link.csv."
 
 
@@ -23,6 +26,7 @@ _OUT = "Keep the counts: X.csv, or a folder for link.csv."
     ),
     near=(text("Command at one end; when it ends, all ends.", metavar="CMD", of=str), ""),
     far=(text("Command at the other end.", metavar="CMD", of=str), ""),
+    publish=(count(_PUBLISH, metavar="PORT", least=1, most=65_535, of=list[int] | None), None),
     **RUN,
     out=(file(_OUT, "-o", "--out", metavar="PATH"), None),
     overwrite=(Overwrite, False),
@@ -31,6 +35,7 @@ def link(
     keys: str | None,
     near: str,
     far: str,
+    publish: list[int] | None,
     seed: int,
     set_: list[str] | None,
     out: Path | None,
@@ -40,9 +45,9 @@ def link(
     """Run any two programs over a link you choose.
 
     Each command runs in the shell, in a network of its own. The two networks are joined by an
-    emulated link, and by nothing else: no internet, no name server, and not this machine. Both
-    commands find the addresses of the two ends in DVA_LINK_NEAR and DVA_LINK_FAR. What they print
-    passes through.
+    emulated link, and by nothing else: no internet, no name server, and not this machine, but for
+    ports at the near end that are published. Both commands find the addresses of the two ends in
+    DVA_LINK_NEAR and DVA_LINK_FAR. What they print passes through.
 
     The link has the keys of a scenario's link: delay_s, jitter_s, loss, bursts, rate_bps,
     queue_packets, outages, trace_up and others. `up` holds what is different from near to far,
@@ -77,11 +82,20 @@ def link(
         raise set_by(pairs, error) from None
     links_of(config, seed)  # files that the link names are read before anything starts
     files = link_counts.files_of(out, overwrite)
-    with LinkProcess(config, seed) as joined:
-        outcome = run_pair(joined, near, far, link_counts.tell)
+    with ExitStack() as at_end:
+        ports = [at_end.enter_context(_listening(port)) for port in publish or ()]
+        joined = at_end.enter_context(LinkProcess(config, seed))
+        outcome = run_pair(joined, near, far, link_counts.tell, ports)
     if not quiet:
         for line in link_counts.in_words(outcome.report):
             link_counts.tell(line)
     for path, write in files.items():
         link_counts.keep(path, write(outcome.report, seed))
     raise typer.Exit(outcome.code)
+
+
+def _listening(port: int) -> socket.socket:
+    try:
+        return socket.create_server(("127.0.0.1", port))
+    except OSError as error:
+        raise ConfigError(f"--publish {port}: {error.strerror}") from None

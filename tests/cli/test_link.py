@@ -37,6 +37,7 @@ OVERRUN = replace(CALM, overrun_packets=17)
         (["--near", "a", "--far", "b", "--set", "trace_up=none.trace"], ("none.trace",)),
         (["none.yaml", "--near", "a", "--far", "b"], ("none.yaml",)),
         (["bad.yaml", "--near", "a", "--far", "b"], ("bad.yaml:2:3", "up.delay", "delay_s")),
+        (["--near", "a", "--far", "b", "--publish", "0"], ("--publish", "65535")),
         (["--near", "a", "--far", "b", "-o", "counts.txt"], ("counts.txt", ".csv")),
         (["--near", "a", "--far", "b", "-o", "kept.csv"], ("kept.csv", "--overwrite")),
         (["--near", "a", "--far", "b", "-o", "kept.csv/x.csv"], ("kept.csv",)),

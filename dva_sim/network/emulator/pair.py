@@ -13,10 +13,11 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 
+from dva_sim.network.emulator import publishing
 from dva_sim.network.emulator.enter import KILL_ALL
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.needs import EmulatorError
@@ -43,7 +44,13 @@ class PairOutcome:
     report: LinkReport
 
 
-def run_pair(link: LinkProcess, near: str, far: str, tell: Tell) -> PairOutcome:
+def run_pair(
+    link: LinkProcess,
+    near: str,
+    far: str,
+    tell: Tell,
+    published: Sequence[socket.socket] = (),
+) -> PairOutcome:
     """Run two commands by the shell until the near one ends, or a signal asks for the end.
 
     SIGINT, SIGTERM and SIGHUP go to both commands; a second one ends them at once.
@@ -53,6 +60,7 @@ def run_pair(link: LinkProcess, near: str, far: str, tell: Tell) -> PairOutcome:
         near: Command whose end is the end; it reads the standard input.
         far: Command that is ended then.
         tell: Takes a line that should be read at once.
+        published: Listening sockets of this machine, led to the same ports of the near end.
 
     Raises:
         EmulatorError: there is no shell.
@@ -62,6 +70,10 @@ def run_pair(link: LinkProcess, near: str, far: str, tell: Tell) -> PairOutcome:
         raise EmulatorError("the commands need a shell: there is no `sh` on the PATH")
     with ExitStack() as at_end:
         signals = at_end.enter_context(_caught_signals())
+        if published:
+            files = [listener.fileno() for listener in published]
+            leading = link.start(NEAR, publishing.words_of(published), pass_fds=files)
+            at_end.callback(_end, leading, 0.0)
         link.begin()
         commands = {}
         for end, command, stdin in ((FAR, far, subprocess.DEVNULL), (NEAR, near, None)):
