@@ -24,7 +24,7 @@ from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import LinkProcess
 from dva_sim.network.emulator.report import LinkReport
 
-GRACE_S = 2.0  # for a command to end by itself once a signal has asked it to
+GRACE_S = 5.0  # for a command to end by itself once a signal has asked it to
 _PATIENCE_S = 10.0  # for the kernel to end what does not
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 

@@ -4,7 +4,12 @@ import os
 import signal
 
 import pytest
+from helpers.network.emulated_link import children, need_link
 from helpers.processes.programs import Program, Programs, wait_until
+
+from dva_sim.network.emulator import pair
+from dva_sim.network.emulator.process import LinkProcess
+from dva_sim.network.link import LinkConfig
 
 pytestmark = pytest.mark.system
 
@@ -25,10 +30,19 @@ def commands(programs: Programs) -> list[str]:
 
 
 def test_sigterm_ends_both_commands_and_their_daemons(programs):
-    program = begun(programs, "exec sleep 999", STUBBORN)
+    program = begun(programs, "exec sleep 999")
     program.send(signal.SIGTERM)
     assert program.ends() == 143
     assert commands(programs) == []
+
+
+def test_a_far_command_that_ignores_signals_is_killed_after_a_while(monkeypatch):
+    need_link()
+    monkeypatch.setattr(pair, "GRACE_S", 0.2)
+    with LinkProcess(LinkConfig(), 1) as link:
+        before = children(os.getpid())
+        assert pair.run_pair(link, "sleep 0.3; exit 3", DAEMON + STUBBORN, print).code == 3
+        assert set(children(os.getpid())) <= set(before)
 
 
 def test_ctrl_c_lets_the_near_command_tidy_up(programs):
