@@ -6,10 +6,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
+MIDDLEWARE := $(VENV)/.middleware
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-long test-soak tools check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-middleware test-long test-soak tools check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -49,6 +50,11 @@ test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@$(BIN)/python tests/helpers/console/chromium.py
 	@echo "Running the tests in a browser ..."
 	@$(PYTEST) tests/console/browser
+
+test-middleware: $(MIDDLEWARE)  ## every transport over its real middleware, mosquitto among it
+	@$(BIN)/python -c 'import shutil, sys; sys.exit(shutil.which("mosquitto") is None)' \
+	  || echo "MQTT is left out: the program mosquitto is missing; try: apt-get install mosquitto"
+	@$(PYTEST) -m "system or not system" tests/testing/test_transports.py tests/network/middleware tests/simulation/middleware
 
 test-long: $(DEV)  ## long searches and whole studies, the same cases each time
 	@echo "Running the long tests ..."
@@ -95,6 +101,11 @@ $(DEV): pyproject.toml constraints.txt | $(VENV)
 	@echo "Installing dva-sim and its development tools (about a minute the first time) ..."
 	@$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $@ $(RUNTIME)
+
+$(MIDDLEWARE): $(DEV)
+	@echo "Installing the middleware that transports are tried over ..."
+	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds]'
+	@touch $@ $(DEV) $(RUNTIME)
 
 $(BENCH): $(DEV)
 	@echo "Installing what the benchmarks compare with ..."

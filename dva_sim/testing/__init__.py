@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dva_sim.testing.robots import check_robot as check_robot
     from dva_sim.testing.tilt import check_filter as check_filter
     from dva_sim.testing.tilt import check_mapping as check_mapping
+    from dva_sim.testing.transports import check_transport as check_transport
 
 _PLACES = {"BrokenPromises": "promises", "Outcome": "promises"}
 

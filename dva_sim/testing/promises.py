@@ -175,6 +175,7 @@ TRIALS: Final[dict[str, CheckedKind]] = {
     row[0]: CheckedKind(*row)
     for row in (
         ("pattern", "network.patterns", "patterns", f"{{tries}} drives, {_US} a command"),
+        ("transport", "network.middleware", "transports", "{tries} messages, slowest {ms:.0f} ms"),
         ("policy", "core.dispatch", "policies", "{tries} situations, slowest decision {ms:.1f} ms"),
         ("operator", _STRATEGIES, "operators", f"{{tries}} drives, {_US} a frame"),
         ("filter", "agents.tilt.filters", "tilt", f"{{tries}} runs, {_READINGS}"),

@@ -1,0 +1,159 @@
+"""What every transport promises: kept by those that are shipped, missed by the bad ones."""
+
+import time
+
+import pytest
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.network.middleware import (
+    CommandTransport,
+    TransportEnd,
+    TransportError,
+    load_transport,
+)
+from dva_sim.network.middleware.registry import SHIPPED
+from dva_sim.network.middleware.udp import UdpTransport
+from dva_sim.testing import transports
+from dva_sim.testing.promises import tried
+from dva_sim.testing.transports import check_transport
+
+EXAMPLE = "repeated_udp.py:RepeatedUdp"
+VARIANTS = [
+    *((name, {}) for name in SHIPPED),
+    ("zeromq", {"pattern": "req-rep"}),
+    ("zeromq", {"pattern": "conflate"}),
+    ("websocket", {"nodelay": False}),
+    ("mqtt", {"qos": 1, "nodelay": True, "broker": "near", "expiry_s": 2}),
+    ("zenoh", {"carrier": "udp", "congestion": "block", "express": True}),
+    ("webrtc", {"ordered": False, "retransmits": 0}),
+    ("dds", {"reliable": True, "depth": 8}),
+    (EXAMPLE, {"copies": 3}),
+]
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(("name", "options"), VARIANTS)
+def test_every_transport_that_is_shipped_keeps_its_promises(name, options):
+    if missing := load_transport(name, options)().lacks():
+        pytest.skip(missing)
+    outcome = tried(check_transport, name, options)
+    assert (outcome.broken, outcome.warnings) == ((), ())
+
+
+class Around(TransportEnd):
+    """Hands everything to another end."""
+
+    def __init__(self, end):
+        self._end = end
+
+    def send(self, data):
+        return self._end.send(data)
+
+    def serve(self, until):
+        self._end.serve(until)
+
+    def close(self):
+        self._end.close()
+
+
+class Over(CommandTransport):
+    """UDP with another kind of end at either side."""
+
+    near_end = far_end = Around
+
+    def near(self, place, receive):
+        return self.near_end(UdpTransport().near(place, receive))
+
+    def far(self, place, receive):
+        return self.far_end(UdpTransport().far(place, receive))
+
+
+class Eats(Around):
+    def send(self, data):
+        return True
+
+
+class Alters(Around):
+    def send(self, data):
+        return self._end.send(data[:-1] + b"?")
+
+
+class Stalls(Around):
+    def send(self, data):
+        time.sleep(0.05)
+        return self._end.send(data)
+
+
+class Stays(Around):
+    def close(self):
+        kept.append(self._end)
+
+
+class Oversleeps(Around):
+    def serve(self, until):
+        time.sleep(transports.SLACK_S + 0.5)
+
+
+kept: list[TransportEnd] = []
+
+
+def but(**changed):
+    return type("Bad", (Over,), changed)
+
+
+class Impatient(Over):
+    def near(self, place, receive):
+        raise TransportError("nobody is there yet")
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(
+    ("bad", "promise"),
+    [
+        (but(near_end=Eats), transports.CARRIES),
+        (but(near_end=Alters), transports.CARRIES),
+        (but(far_end=Eats), transports.SHOWS),
+        (but(far_end=Alters), transports.SHOWS),
+        (but(near_end=Stalls), transports.GOES_ON),
+        (but(far_end=Stays), transports.LEAVES),
+        (but(near_end=Oversleeps), transports.RETURNS),
+        (Impatient, transports.CONNECTS),
+    ],
+    ids=lambda given: getattr(given, "__name__", given),
+)
+def test_a_transport_that_breaks_a_promise_is_told_of_it(bad, promise, monkeypatch):
+    monkeypatch.setattr(transports, "ARRIVES_S", 0.5)
+    monkeypatch.setattr(transports, "CONNECTS_S", 1.0)
+    monkeypatch.setattr(transports, "SLACK_S", 1.0)
+    outcome = tried(check_transport, bad)
+    while kept:
+        kept.pop().close()
+    assert [text for text in outcome.broken if text.startswith(f"{promise}: ")]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "named"),
+    [
+        ("zeromq", {"pattern": "push"}, "'push'"),
+        ("mqtt", {"qos": 3}, "qos 3"),
+        ("mqtt", {"broker": "middle"}, "'middle'"),
+        ("zenoh", {"carrier": "quic"}, "'quic'"),
+        ("dds", {"depth": 0}, "depth 0"),
+        ("upd", {}, "udp"),
+        ("udp", {"qos": 1}, "qos"),
+    ],
+)
+def test_a_transport_or_an_option_that_does_not_exist_is_refused_in_a_line(name, options, named):
+    with pytest.raises(ConfigError) as refused:
+        load_transport(name, options)()
+    assert named in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_what_is_not_installed_is_said_with_the_extra_that_brings_it(monkeypatch):
+    made = type("Needy", (Over,), {"title": "Needy", "library": "no_such_library", "extra": "much"})
+    assert made().lacks() == "Needy needs no_such_library: pip install 'dva-sim[much]'"
+    made = type("Needy", (Over,), {"title": "Needy", "program": "no-such-program"})
+    assert made().lacks() == "Needy needs the program no-such-program"
+    with pytest.raises(ConfigError, match="no-such-program"):
+        check_transport(made)
