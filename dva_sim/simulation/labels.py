@@ -130,13 +130,18 @@ def measure_of(measure: str, part: str) -> str:
     return f"{measure_name(measure)} of part {part}"
 
 
-def level_name(factor: str, level: Scalar | Mapping[str, Any], short: bool = False) -> str:
+def level_name(
+    factor: str, level: Scalar | Mapping[str, Any] | list[Any], short: bool = False
+) -> str:
     """One level with its unit: 0.05 of `link.delay_s` is `50 ms`; a class without its file.
 
-    What a treatment sets may be a law, or another group of keys: `law gamma, mean_s 50 ms`.
+    What a treatment sets may be a law, or another group of keys: `law gamma, mean_s 50 ms`; or
+    several: `from_s 7 s, for_s 2 s; from_s 20 s, for_s 1 s`.
     """
     if isinstance(level, Mapping):
         return ", ".join(f"{key} {level_name(key, value)}" for key, value in level.items())
+    if isinstance(level, list):
+        return "; ".join(level_name(factor, value) for value in level) or "none"
     if isinstance(level, str):
         name = level.rpartition(":")[2] if is_in_file(level) else level
         return (_SHORT_LEVELS if short else _LEVELS).get(name, name)

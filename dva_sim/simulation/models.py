@@ -3,8 +3,9 @@
 `full`: bodies, cameras, persons with phones and every byte on the network. `timed`: travel and
 service times only, a thousand times faster; the DVA's core is the same in both. `task`: one
 person at a task of the literature, with the operators and hands of the full model. `transports`:
-a session of teleoperation beside TCP flows on one congested link, and a drive over it. Users add
-their own: a class derived from `Model` in a file or an installed package, named in a scenario.
+a session of teleoperation beside TCP flows on one congested link, and a drive over it.
+`middleware`: commands over real middleware and an emulated link, in real time. Users add their own:
+a class derived from `Model` in a file or an installed package, named in a scenario.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from dva_sim.kernel.measure import Columns, names_of
 from dva_sim.kernel.plugins import Plugins, stamp_of
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document
-from dva_sim.simulation import full, task, timed, transports
+from dva_sim.simulation import full, middleware, task, timed, transports
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import episode_measures as of_full
 from dva_sim.simulation.full import workload
 from dva_sim.simulation.full.drive_tables import COMMAND_COLUMNS, DRIVE_COLUMNS
+from dva_sim.simulation.middleware import MiddlewareScenario
+from dva_sim.simulation.middleware import freshness_measures as of_middleware
 from dva_sim.simulation.run_measures import RunMeasure, values_of
 from dva_sim.simulation.scenario import Scenario, contradictions
 from dva_sim.simulation.task import TaskScenario
@@ -59,7 +62,9 @@ def _restored(model: str, data: dict[str, Any]) -> Any:
     return model_named(model).scenario.model_validate(data)
 
 
-AnyScenario = Scenario | TimedScenario | TaskScenario | TransportScenario | OwnScenario
+AnyScenario = (
+    Scenario | TimedScenario | TaskScenario | TransportScenario | MiddlewareScenario | OwnScenario
+)
 
 
 S = TypeVar("S", bound=AnyScenario)
@@ -76,12 +81,15 @@ class Model(Generic[S]):
         scenario: What its scenarios are; a user's derives from `OwnScenario`.
         columns: Every column of its tables. `runs` has one row for each run.
         is_recorded: Whether its runs can be kept as recordings, filmed and run side by side.
+        is_real_time: Whether a run is measured by the clock: then nothing else may run beside it,
+            and the order of runs is random.
     """
 
     name = ""
     scenario: type[S]
     columns: ClassVar[Columns]
     is_recorded = False
+    is_real_time = False
 
     def simulate(self, scenario: S, seed: int) -> Any:
         """Run a scenario; what is left of the run, to be measured."""
@@ -257,11 +265,32 @@ class _Transports(_Operated[TransportScenario]):
         return transports.tables(recording)
 
 
+class _Middleware(Model[MiddlewareScenario]):
+    """Commands over real middleware and an emulated link, in real time."""
+
+    scenario = MiddlewareScenario
+    columns: ClassVar[Columns] = {
+        "runs": of_middleware.RUN_COLUMNS,
+        "commands": of_middleware.COMMAND_COLUMNS,
+        "pictures": of_middleware.PICTURE_COLUMNS,
+    }
+    is_real_time = True
+    build = staticmethod(middleware.build)
+    simulate = staticmethod(middleware.measure)
+
+    def rehearse(self, scenario: MiddlewareScenario, seed: int) -> None:
+        middleware.rehearse(scenario)
+
+    def rows(self, recording: middleware.MiddlewareRun, with_tracks: bool = False) -> Tables:
+        return middleware.tables(recording)
+
+
 SHIPPED: Final[dict[str, type[Model[Any]]]] = {
     "full": _Full,
     "timed": _Timed,
     "task": _Task,
     "transports": _Transports,
+    "middleware": _Middleware,
 }
 MODELS: Final[dict[str, Model[Any]]] = {name: model() for name, model in SHIPPED.items()}
 """Ours, by name: what a results folder or a recording may name."""

@@ -29,6 +29,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, read_text
 from dva_sim.protocol.mistakes import Problem
 from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.models import OwnScenario, model_of
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.task import TaskScenario
@@ -44,7 +45,14 @@ from dva_sim.worlds.site import DEFAULT_FRAME, SiteFile, load_site, map_site
 
 PROBE: Final = "drive-to-event"  # the scenario that a map is tried with
 PROBES: Final = 6  # its runs
-_SCENARIOS: Final = (Scenario, TimedScenario, TaskScenario, TransportScenario, OwnScenario)
+_SCENARIOS: Final = (
+    Scenario,
+    TimedScenario,
+    TaskScenario,
+    TransportScenario,
+    MiddlewareScenario,
+    OwnScenario,
+)
 
 
 # What readers may raise on files that nobody would write, besides what they say in words.

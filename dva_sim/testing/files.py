@@ -183,7 +183,7 @@ def _parse(path: Path) -> tuple[Document | None, Problem | None]:
 KINDS: Final = ("message", "study", "scenario", "cases", "site", "agent")
 _FILES: Final[dict[str, tuple[str, ...]]] = {
     "study": ("study",),
-    "scenario": ("scenario", "timed scenario", "task", "transports"),
+    "scenario": ("scenario", "timed scenario", "task", "transports", "middleware"),
     "cases": ("validation cases",),
     "site": ("site",),
 }  # by their names; an agent is whatever lies in a folder of agents

@@ -25,6 +25,7 @@ SHORT: Final[dict[str, tuple[tuple[str, Mapping[str, Any]], ...]]] = {
         ("tasks/corner", {"trials": 1, "practice": 0, "task.width_m": [1.2]}),
     ),
     "transports": (("congested-link", {"measure_s": 5, "warm_up_s": 2}),),
+    "middleware": (("commands-over-middleware", {"measure_s": 1, "set_up_s": 2}),),
 }
 """Scenarios that are run of each model, made short."""
 SEED: Final = 1  # of the runs

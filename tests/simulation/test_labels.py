@@ -89,6 +89,13 @@ def test_a_law_that_a_treatment_sets_is_told_key_by_key():
     assert told.split(", ") == ["law gamma", "mean_s 50\N{NO-BREAK SPACE}ms", "cv 0.5"]
 
 
+def test_a_list_that_a_treatment_sets_is_told_one_by_one():
+    outages = [{"from_s": 7, "for_s": 2}, {"from_s": 20, "for_s": 1}]
+    told = level_name("link.outages", outages).replace("\N{NO-BREAK SPACE}", " ")
+    assert told.split("; ") == ["from_s 7 s, for_s 2 s", "from_s 20 s, for_s 1 s"]
+    assert level_name("link.outages", []) == "none"
+
+
 def test_a_key_has_one_name_in_all_models():
     titles = defaultdict(set)
     for model in MODELS.values():

@@ -68,7 +68,7 @@ def test_all_that_is_shipped_is_valid(check, most, monkeypatch):
     agents = {"robot", "phone", "accelerometer", "guard", "bystanders", "operators"}
     agents |= {"bands of operators", "tuned values"}
     runs = {"study", "scenario", "timed scenario", "validation cases", "targets", "split", "task"}
-    runs |= {"transports", "measurements", "own scenario"}
+    runs |= {"transports", "middleware", "measurements", "own scenario"}
     assert kinds == {"site", "plan", "message"} | runs | agents
 
 

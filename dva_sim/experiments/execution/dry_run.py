@@ -14,7 +14,7 @@ from typing import NamedTuple
 from dva_sim.experiments.execution import executors
 from dva_sim.experiments.execution.checkpoint import Checkpoint
 from dva_sim.experiments.execution.kept_recordings import refuse_what_cannot_be_recorded
-from dva_sim.experiments.execution.scheduling import Simulate, limited
+from dva_sim.experiments.execution.scheduling import Simulate, clock_of, limited
 from dva_sim.experiments.results.manifest import manifest_of
 from dva_sim.experiments.results.results import JOURNAL
 from dva_sim.experiments.study import cell_grid
@@ -98,7 +98,7 @@ def dry_run(
     known = _by_config(costs)
     tried = _tried(left, probe) if probe is not None and not known else _Tried({})
     estimate = _estimate(left, known or tried.costs)
-    workers = executors.local(jobs).width
+    workers = 1 if plan.is_real_time else executors.local(jobs).width
     return DryRun(
         runs=len(todo),
         done=len(todo) - len(left),
@@ -139,17 +139,18 @@ def _tried(left: Sequence[StudyJob], probe: Simulate) -> _Tried:
             continue
         if gone > PROBE_S and len(costs) >= _FEW:
             break
-        start = time.thread_time()
+        clock = clock_of(job)
+        start = clock()
         try:
             with limited(max(MOST_S - gone, _SHORT_S), may_exit=False):
                 probe(job)
         except RunTooLong:
-            costs[job.config] = time.thread_time() - start
+            costs[job.config] = clock() - start
             return _Tried(costs, True, failed)
         except Exception as error:
             failed = failed or f"{type(error).__name__}: {' '.join(str(error).split())}"
         else:
-            costs[job.config] = time.thread_time() - start
+            costs[job.config] = clock() - start
     return _Tried(costs, False, failed)
 
 

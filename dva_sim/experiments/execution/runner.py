@@ -31,6 +31,7 @@ from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import is_enough, rounds
 from dva_sim.experiments.study.study import Study, Version
 from dva_sim.kernel.errors import ConfigError, DvaSimError
+from dva_sim.kernel.streams import derive_seed
 
 Progress = Callable[[int, int], object]
 
@@ -74,13 +75,13 @@ def run_study(
     plan = StudyPlan.of(asked)
     manifest = manifest_of(plan)
     with ExitStack() as stack:
-        workers = stack.enter_context(_workers(jobs, scheduler))
+        workers = stack.enter_context(_workers(plan, jobs, scheduler))
         stack.enter_context(FolderLock(out))
         checkpoint = stack.enter_context(_opened(out, manifest["hash"]))
         checkpoint.describe(manifest)
         own = tuple(plan.measures)
         simulate = episode or (partial(run_job, measures=own) if own else run_job)
-        session = _Session(plan.jobs, checkpoint, workers, simulate, progress, limit_s)
+        session = _Session(plan, checkpoint, workers, simulate, progress, limit_s)
         with session.told():
             carried_out, stopped = _run_rounds(plan.study, plan.jobs, session)
             with checkpoint.alone():
@@ -117,7 +118,7 @@ class _Session:
 
     def __init__(
         self,
-        todo: Sequence[StudyJob],
+        plan: StudyPlan,
         checkpoint: Checkpoint,
         workers: Workers,
         episode: Simulate,
@@ -127,18 +128,20 @@ class _Session:
         self.checkpoint = checkpoint
         self._workers, self._episode, self._limit_s = workers, episode, limit_s
         self._tell = progress or (lambda *_: None)
-        keys = {job.key for job in todo}
+        self._place = _at_random if plan.is_real_time else _as_designed
+        keys = {job.key for job in plan.jobs}
         self._total, self._count = len(keys), len(keys & checkpoint.done())
         self._tell(self._count, self._total)
 
     def left(self, batch: Sequence[StudyJob]) -> list[StudyJob]:
         """What is not done yet, each run once, person by person.
 
-        So what is known on the way is known of whole persons, in all cells.
+        So what is known on the way is known of whole persons, in all cells. Where the machine may
+        change meanwhile, the cells of each come in random order.
         """
         done = self.checkpoint.done()
         rest = [job for key, job in {job.key: job for job in batch}.items() if key not in done]
-        return sorted(rest, key=lambda job: (job.person, job.trial))
+        return sorted(rest, key=lambda job: (job.person, job.trial, self._place(job)))
 
     def run(self, rest: Sequence[StudyJob]) -> None:
         """Run some; what comes together is in the checkpoint before it is counted."""
@@ -170,6 +173,15 @@ class _Session:
             raise KeyboardInterrupt(
                 f"interrupted after {self._count} of {self._total} runs, which are kept; {go_on}"
             ) from None
+
+
+def _as_designed(_: StudyJob) -> int:
+    return 0
+
+
+def _at_random(job: StudyJob) -> int:
+    """The place of a run among those of its person: random, and the same in every session."""
+    return derive_seed(job.seed, "order", job.config)
 
 
 def _run_rounds(
@@ -215,7 +227,14 @@ def _rows(
 
 
 @contextmanager
-def _workers(jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
+def _workers(plan: StudyPlan, jobs: int | None, scheduler: str | None) -> Iterator[Workers]:
+    if plan.is_real_time:
+        if scheduler is not None or jobs not in (None, 1):
+            raise ConfigError(
+                "this study measures in real time, one run at a time on this machine: leave out "
+                "--jobs and --scheduler"
+            )
+        jobs = 1
     if scheduler is None:
         yield executors.local(jobs)
         return

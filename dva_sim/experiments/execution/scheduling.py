@@ -75,14 +75,20 @@ def perform(
     job: StudyJob, episode: Simulate, limit_s: float = LIMIT_S, may_exit: bool = False
 ) -> RunOutcome:
     """Run one job; whatever it raises becomes its outcome."""
-    start = time.thread_time()
+    clock = clock_of(job)
+    start = clock()
     try:
         with limited(limit_s, may_exit):
             tables = json.dumps(_checked(episode(job), job), separators=(",", ":"), default=_scalar)
     except (Exception, RunTooLong) as error:
         text = " ".join(str(error).split())
         return RunOutcome(job.key, None, error=f"{type(error).__name__}: {text}")
-    return RunOutcome(job.key, tables, time.thread_time() - start)
+    return RunOutcome(job.key, tables, clock() - start)
+
+
+def clock_of(job: StudyJob) -> Callable[[], float]:
+    """What tells the cost of a run [s]: CPU time, or the wall clock where it is real time."""
+    return time.monotonic if model_for(job.scenario).is_real_time else time.thread_time
 
 
 def perform_chunk(

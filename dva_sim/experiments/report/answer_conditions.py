@@ -59,6 +59,8 @@ def _persons(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
     """How many, how they steer, and what other models of them say."""
     if reading.cluster == "shift":
         return f"{finding.persons} simulated, independent of each other."
+    if reading.cluster == "repeat":
+        return f"{finding.persons} of each configuration, in real time, one run at a time."
     trials = reading.trials_of(finding.part)
     each = f", {trials} trial{'s' if trials > 1 else ''} each" if trials else ""
     who = f"{finding.persons} simulated{each}; no human took part."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -27,12 +28,15 @@ def remarks(reading: Reading) -> list[str]:
     return [*size, *said, *tests, _made_by(reading)]
 
 
+_SAMPLES: Final = {"shift": "Independent shifts", "repeat": "Repeats of each configuration"}
+
+
 def _size(reading: Reading) -> str:
     """Persons and trials as they were run, and what decided how many."""
     cluster = reading.cluster
     trials = "blocks of trials" if _is_task(reading) else "trials"
-    name = "Simulated persons" if cluster == "person" else "Independent shifts"
-    each = "" if cluster == "shift" else f"; {trials} of each: {_trials(reading)}"
+    name = _SAMPLES.get(cluster, "Simulated persons")
+    each = "" if cluster in _SAMPLES else f"; {trials} of each: {_trials(reading)}"
     return f"{name}: {reading.persons}{_why_so_many(reading)}{each}."
 
 

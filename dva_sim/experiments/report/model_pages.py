@@ -6,11 +6,16 @@ Only our models have one: a results folder loads no code of a user's.
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from dva_sim.experiments.report.middleware_page import MiddlewarePage
 from dva_sim.experiments.report.model_page import ModelPage
 from dva_sim.experiments.report.shift_page import ShiftPage
 from dva_sim.experiments.report.transport_page import TransportPage
 
-PAGES: dict[str, type[ModelPage]] = {"timed": ShiftPage, "transports": TransportPage}
+PAGES: dict[str, type[ModelPage]] = {
+    "timed": ShiftPage,
+    "transports": TransportPage,
+    "middleware": MiddlewarePage,
+}
 
 
 def page_of(scenarios: Iterable[Mapping[str, Any]]) -> type[ModelPage]:

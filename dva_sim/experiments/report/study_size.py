@@ -34,9 +34,9 @@ def _as_run(reading: Reading) -> str:
 
 def _people(persons: int, trials: int | None, cluster: str) -> str:
     counted = f"{persons} {cluster}{'' if persons == 1 else 's'}"
-    return (
-        counted if cluster == "shift" else f"{counted} × {trials} trial{'' if trials == 1 else 's'}"
-    )
+    if cluster != "person":
+        return counted
+    return f"{counted} × {trials} trial{'' if trials == 1 else 's'}"
 
 
 def _version(reading: Reading, usual: Mapping[str, Any]) -> str:

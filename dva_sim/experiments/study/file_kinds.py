@@ -24,6 +24,7 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import Document, load_yaml
+from dva_sim.simulation.middleware import MiddlewareScenario
 from dva_sim.simulation.models import MODELS, PLUGINS, OwnScenario
 from dva_sim.simulation.scenario import Scenario
 from dva_sim.simulation.task import TaskScenario
@@ -57,6 +58,7 @@ KINDS: Final = (
     FileKind("timed scenario", TimedScenario, _SCENARIOS, _PLAY),
     FileKind("task", TaskScenario, "experiments/scenarios/tasks", _PLAY),
     FileKind("transports", TransportScenario, _SCENARIOS, _PLAY),
+    FileKind("middleware", MiddlewareScenario, _SCENARIOS, _PLAY),
     FileKind("own scenario", OwnScenario, _SCENARIOS, _PLAY),
     FileKind("targets", TargetFile, EVIDENCE),
     FileKind("split", SplitFile, EVIDENCE),

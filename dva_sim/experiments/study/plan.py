@@ -12,7 +12,7 @@ from dva_sim.experiments.study.factor_levels import Traits
 from dva_sim.experiments.study.inputs import StudyInputs
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import TunedValues, TuningBasis
-from dva_sim.simulation.models import AnyScenario
+from dva_sim.simulation.models import AnyScenario, model_for
 from dva_sim.simulation.run_measures import RunMeasure
 
 
@@ -61,6 +61,11 @@ class StudyPlan:
             basis=None if inputs.tuned is None else cell_grid.basis_of_tuning(inputs),
             measures=inputs.measures,
         )
+
+    @property
+    def is_real_time(self) -> bool:
+        """Whether runs are measured by the clock, so that nothing may run beside them."""
+        return any(model_for(scenario).is_real_time for scenario in self.scenarios.values())
 
     @cached_property
     def jobs(self) -> list[StudyJob]:

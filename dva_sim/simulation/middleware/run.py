@@ -1,0 +1,255 @@
+"""One run in real time: two programs at the ends of an emulated link, and what they noted."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from dva_sim.kernel.errors import ConfigError, RunsFailed
+from dva_sim.network.emulator.enter import KILL_ALL
+from dva_sim.network.emulator.needs import EmulatorError
+from dva_sim.network.emulator.process import ADDRESSES, LinkProcess
+from dva_sim.network.emulator.report import LinkReport
+from dva_sim.network.middleware import SIDES, Side, load_transport, programs
+from dva_sim.network.middleware.programs import (
+    NOT_CONNECTED,
+    Plan,
+    ProgramNote,
+    ProgramNoteKind,
+    ProgramNotes,
+)
+from dva_sim.simulation.middleware.freshness_measures import (
+    Floats,
+    Row,
+    Window,
+    command_row,
+    picture_row,
+)
+from dva_sim.simulation.middleware.scenario import MiddlewareScenario
+
+LINGER_S: Final = 0.2  # the robot still hears what was sent last
+PATIENCE_S: Final = 10.0  # for the operator's program to end
+
+
+class MiddlewareRun(NamedTuple):
+    """What is left of a run.
+
+    Attributes:
+        scenario: As it was run.
+        near: ProgramNotes of the operator's program.
+        far: ProgramNotes of the robot's program.
+        window: The time that was measured.
+        link: What the link did, and how late it was itself.
+        attempts: Runs made until one was undisturbed; this is the last.
+        load: Runnable processes of the machine when it began, one-minute mean.
+    """
+
+    scenario: MiddlewareScenario
+    near: list[ProgramNote]
+    far: list[ProgramNote]
+    window: Window
+    link: LinkReport
+    attempts: int
+    load: float
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether the machine, and not the link alone, decided when packets came out."""
+        return self.link.is_disturbed
+
+
+def rehearse(scenario: MiddlewareScenario) -> None:
+    """See that the transport and the link work here.
+
+    Raises:
+        ConfigError: what is missing.
+    """
+    choice = scenario.transport
+    if missing := load_transport(choice.name, choice.options)().lacks():
+        raise ConfigError(missing)
+    try:
+        LinkProcess(scenario.link, 1).close()
+    except EmulatorError as error:
+        raise ConfigError(str(error)) from None
+
+
+def measure(scenario: MiddlewareScenario, seed: int) -> MiddlewareRun:
+    """Run until the link was punctual, as often as the scenario allows.
+
+    Raises:
+        EmulatorError: the link cannot be set up.
+        RunsFailed: a program failed otherwise than by finding no connection.
+    """
+    attempt = 1
+    while (run := _attempt(scenario, seed, attempt)).is_disturbed and attempt < scenario.attempts:
+        attempt += 1
+    return run
+
+
+def _attempt(scenario: MiddlewareScenario, seed: int, attempt: int) -> MiddlewareRun:
+    load = os.getloadavg()[0]
+    with (
+        LinkProcess(scenario.link, seed) as link,
+        tempfile.TemporaryDirectory(prefix="dva-sim-") as folder,
+    ):
+        link.begin()
+        start = time.monotonic()
+        since = start + scenario.set_up_s
+        window = Window(start, since, since + scenario.measure_s)
+        plan = plan_of(scenario, Path(folder), window)
+        far = _started(link, "far", plan)
+        near = _started(link, "near", plan)
+        _await_end(near, window.until + PATIENCE_S)
+        time.sleep(LINGER_S)
+        problem = _problem("near", near, plan) or _problem("far", far, plan)
+        far.send_signal(KILL_ALL)
+        far.wait()
+        report = link.report()
+        notes = [ProgramNotes.read(plan.folder / f"{side}.notes") for side in SIDES]
+    if problem:
+        raise RunsFailed(f"{scenario.transport.name}: {problem}")
+    return MiddlewareRun(
+        scenario,
+        near=notes[0],
+        far=notes[1],
+        window=window,
+        link=report,
+        attempts=attempt,
+        load=load,
+    )
+
+
+def plan_of(scenario: MiddlewareScenario, folder: Path, window: Window) -> Plan:
+    """What both programs are told."""
+    pictures = scenario.pictures
+    return Plan(
+        transport=scenario.transport.name,
+        options=scenario.transport.options,
+        near=ADDRESSES["near"],
+        far=ADDRESSES["far"],
+        folder=folder,
+        ready_by=window.since,
+        until=window.until,
+        command_hz=scenario.command_rate_hz,
+        picture_hz=0.0 if pictures is None else pictures.rate_hz,
+        picture_bytes=8 if pictures is None else pictures.bytes,
+    )
+
+
+def _started(link: LinkProcess, side: Side, plan: Plan) -> subprocess.Popen[bytes]:
+    words = [sys.executable, "-P", "-m", programs.__name__, side, plan.model_dump_json()]
+    with _complaints(side, plan).open("wb") as complaints:
+        return link.start(side, words, stdin=subprocess.DEVNULL, stderr=complaints)
+
+
+def _complaints(side: Side, plan: Plan) -> Path:
+    return plan.folder / f"{side}.err"
+
+
+def _await_end(near: subprocess.Popen[bytes], limit: float) -> None:
+    """Wait for the operator's program, and end it if it does not end by itself."""
+    try:
+        near.wait(limit - time.monotonic())
+    except subprocess.TimeoutExpired:
+        near.send_signal(KILL_ALL)
+        near.wait()
+
+
+def _problem(side: Side, program: subprocess.Popen[bytes], plan: Plan) -> str:
+    """Why a program has ended, unless it was done or found no connection; empty if it runs."""
+    if program.poll() in (None, 0, NOT_CONNECTED):
+        return ""
+    said = _complaints(side, plan).read_text(errors="replace").strip()
+    return f"the {side} program failed: {said.splitlines()[-1] if said else program.returncode}"
+
+
+# --- tables ------------------------------------------------------------------------------
+def tables(run: MiddlewareRun) -> dict[str, list[Row]]:
+    """A row of the run, and one of each command and picture."""
+    scenario, window = run.scenario, run.window
+    sent = _times(run.near, ProgramNoteKind.SENT)
+    refused = {note.number for note in run.near if note.kind is ProgramNoteKind.REFUSED}
+    applied = [note for note in run.far if note.kind is ProgramNoteKind.APPLIED]
+    outdated = [note for note in run.far if note.kind is ProgramNoteKind.OUTDATED]
+    arrived = _floats(note.time for note in applied)
+    made = _floats(sent[note.number] for note in applied)
+    taken, shown = _times(run.far, ProgramNoteKind.PICTURE_TAKEN), run.near
+    pictures = [note for note in shown if note.kind is ProgramNoteKind.PICTURE_SHOWN]
+    row = {
+        **_connection(run),
+        "commands": sum(window.since <= time < window.until for time in sent.values()),
+        "not_taken": len(refused),
+        "outdated_share": _share(len(outdated), len(outdated) + len(applied)),
+        **command_row(
+            *(made, arrived, window),
+            max_age_s=scenario.robot.max_age_s,
+            watchdog_s=scenario.robot.watchdog_s,
+        ),
+        **picture_row(
+            _floats(taken[note.number] for note in pictures),
+            _floats(note.time for note in pictures),
+            window,
+        ),
+        **_link_row(run),
+    }
+    return {
+        "runs": [row],
+        "commands": _fates(sent, applied, window),
+        "pictures": _fates(taken, pictures, window),
+    }
+
+
+def _connection(run: MiddlewareRun) -> Row:
+    ready = [note.time for note in run.near if note.kind is ProgramNoteKind.READY]
+    return {
+        "connected": int(bool(ready)),
+        "connected_after_s": ready[0] - run.window.start if ready else math.nan,
+    }
+
+
+def _link_row(run: MiddlewareRun) -> Row:
+    link = run.link
+    return {
+        "up_bytes": link.up.passed_bytes,
+        "down_bytes": link.down.passed_bytes,
+        "late_p99_s": link.late_p99_s,
+        "late_max_s": link.late_max_s,
+        "attempts": run.attempts,
+        "disturbed": int(run.is_disturbed),
+        "load": run.load,
+    }
+
+
+def _times(notes: list[ProgramNote], kind: ProgramNoteKind) -> dict[int, float]:
+    """When each command or picture of some notes was made [s], by number."""
+    return {note.number: note.time for note in notes if note.kind is kind}
+
+
+def _fates(made: dict[int, float], arrived: list[ProgramNote], window: Window) -> list[Row]:
+    """When each was made and arrived, in the time of the run; nan for what never did."""
+    found = {note.number: note.time - window.start for note in arrived}
+    return [
+        {
+            "number": number,
+            "made_s": time - window.start,
+            "arrived_s": found.get(number, math.nan),
+        }
+        for number, time in made.items()
+    ]
+
+
+def _floats(values: Iterable[float]) -> Floats:
+    return np.array(list(values), dtype=float)
+
+
+def _share(part: int, whole: int) -> float:
+    return part / whole if whole else math.nan

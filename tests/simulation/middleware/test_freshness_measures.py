@@ -1,0 +1,75 @@
+"""The age of the command in force, beside what a look at every moment finds."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dva_sim.simulation.middleware.freshness_measures import Ages, Window, command_row, picture_row
+
+WINDOW = Window(0.0, 2.0, 6.0)
+
+
+@st.composite
+def arrivals(draw):
+    """When commands were made and applied, in the order of both; some before the window."""
+    steps = st.lists(st.floats(0.01, 2.0), min_size=0, max_size=12)
+    made = np.cumsum(draw(steps))
+    late = np.array(draw(st.lists(st.floats(0.01, 3.0), min_size=len(made), max_size=len(made))))
+    return made, np.maximum.accumulate(made + late)
+
+
+@given(arrivals())
+def test_age_in_force_is_what_one_finds_at_every_moment(found):
+    made, applied = found
+    moments = np.linspace(WINDOW.since, WINDOW.until, 4001)[:-1] + 0.0005
+    newest = np.searchsorted(applied, moments, side="right")
+    seen = moments - np.concatenate([[WINDOW.start], made])[newest]
+
+    ages = Ages(made, applied, WINDOW)
+    assert ages.mean == pytest.approx(seen.mean(), abs=0.01)
+    assert ages.share_above(1.0) == pytest.approx((seen > 1.0).mean(), abs=0.01)
+    for share in (0.05, 0.5, 0.95):
+        at = ages.quantile(share)
+        assert (seen < at - 0.002).mean() <= share + 0.01
+        assert (seen < at + 0.002).mean() >= share - 0.01
+
+
+def row(made, applied):
+    arrays = (np.array(made, dtype=float), np.array(applied, dtype=float))
+    return command_row(*arrays, WINDOW, max_age_s=1.0, watchdog_s=1.0)
+
+
+def test_commands_in_step_are_as_old_as_the_link_and_half_a_period():
+    made = np.arange(0.0, 6.0, 0.1)
+    found = row(made, made + 0.05)
+    assert found["command_rate_hz"] == pytest.approx(10.0, abs=0.3)
+    assert found["command_age_p95_s"] == pytest.approx(0.05)
+    assert found["age_in_force_mean_s"] == pytest.approx(0.1)
+    assert found["age_in_force_p50_s"] == pytest.approx(0.1)
+    assert found["age_in_force_p95_s"] == pytest.approx(0.145)
+    assert found["longest_gap_s"] == pytest.approx(0.1)
+    assert (found["false_stops"], found["too_old_share"]) == (0, 0.0)
+
+
+def test_silence_counts_from_the_edges_of_the_window_and_stops_the_robot_each_time():
+    found = row([1.0, 4.0], [1.5, 4.5])
+    assert found["longest_gap_s"] == pytest.approx(2.5)
+    assert found["false_stops"] == 2
+    assert found["command_rate_hz"] == pytest.approx(0.25)
+
+
+def test_where_nothing_ever_arrives_the_age_is_that_of_the_run():
+    found = row([], [])
+    assert found["age_in_force_p50_s"] == pytest.approx(4.0)
+    assert found["too_old_share"] == 1.0
+    assert found["longest_gap_s"] == 4.0
+    assert math.isnan(found["command_age_p50_s"])
+
+
+def test_pictures_count_when_they_are_shown_in_the_window():
+    found = picture_row(np.array([1.0, 2.0, 5.9]), np.array([1.5, 2.1, 6.2]), WINDOW)
+    assert found["picture_rate_hz"] == 0.25
+    assert found["picture_age_p50_s"] == pytest.approx(0.1)
