@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dva_sim.console.alone.robot_world import RobotWorld
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.robots.robot_actions import RobotActions
-from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.network.addresses import check_address
 
-Line = dict[str, Any]
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
 
@@ -49,41 +46,41 @@ class RobotDesk:
         self._world.tell_now()
 
     @does("emergency")
-    def _emergency(self, _: str, line: Line, said: Said) -> None:
+    def _emergency(self, _: str, line: Asked, said: Said) -> None:
         self._hands.stop(self._world.field.robots)
         self._hands.press_emergency(self._world.robot.device.id_tag)
         said(True, f"{self._world.robot.device.label} has stopped")
 
     @does("robot_register")
-    def _register(self, _: str, line: Line, said: Said) -> None:
+    def _register(self, _: str, line: Asked, said: Said) -> None:
         dva = line["dva"].strip()
         check_address(dva)
         self._world.station.register(dva, said)
 
     @does("robot_listen")
-    def _listen(self, _: str, line: Line, said: Said) -> None:
+    def _listen(self, _: str, line: Asked, said: Said) -> None:
         self._world.station.listen()
         said(True, f"listens on {self._world.robot.device.address}")
 
     @does("robot_off")
-    def _off(self, _: str, line: Line, said: Said) -> None:
+    def _off(self, _: str, line: Asked, said: Said) -> None:
         self._world.station.switch_off()
         said(True, "it is off")
 
     @does("release")
-    def _release(self, _: str, line: Line, said: Said) -> None:
+    def _release(self, _: str, line: Asked, said: Said) -> None:
         """Nothing is in hand but by `manual_take`."""
         said(True, "released")
 
     @does("gone")
-    def _gone(self, client: str, _: Line) -> None:
+    def _gone(self, client: str, _: Asked) -> None:
         self._hands.gone(client)
 
     @does("watch")
-    def _watch(self, _: str, line: Line) -> None:
+    def _watch(self, _: str, line: Asked) -> None:
         own = {self._world.robot.device.id_tag}
         self._world.screens.watch(own if line["robots"] else set())
 
     @does("look")
-    def _look(self, _: str, line: Line) -> None:
+    def _look(self, _: str, line: Asked) -> None:
         self._world.logs.look(line["logs"])

@@ -12,13 +12,12 @@ from typing import Any, Protocol, TypeVar
 
 from dva_sim.console.asking.answers import Answers, answering
 from dva_sim.console.asking.refusal import Refused, Said
-from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, ActionPlace, Queueing
+from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, ActionPlace, Asked, Queueing
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.console.wire.seats import DoneLine
 
-Line = dict[str, Any]
-Doer = Callable[[str, Line, Said], object]
-Taker = Callable[[str, Line], object]
+Doer = Callable[[str, Asked, Said], object]
+Taker = Callable[[str, Asked], object]
 _HEAD = frozenset({"do", "id", "client", "role"})
 _Marked = TypeVar("_Marked", bound=Callable[..., object])
 
@@ -26,7 +25,7 @@ _Marked = TypeVar("_Marked", bound=Callable[..., object])
 class AuditedActions(Protocol):
     """The interface of an audit log."""
 
-    def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
+    def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
         """Return a callback that passes an answer on once its row is in the log."""
 
 
@@ -80,7 +79,7 @@ class ActionDispatcher:
             differ = ", ".join(sorted(declared ^ self._doers.keys()))
             raise TypeError(f"declared and done at {place.name} differ: {differ}")
 
-    def take(self, line: Line) -> None:
+    def take(self, line: Asked) -> None:
         """Do what a line asks for; nothing that it can hold does any harm."""
         what, client, number = str(line.get("do", "")), str(line.get("client", "")), line.get("id")
         known = _KNOWN.get(what)
@@ -91,7 +90,7 @@ class ActionDispatcher:
             do = partial(self.do, client, line | {"do": what})
             self._answers.once(number, do, self._tell, repeats=repeats)
 
-    def _hear(self, what: str, client: str, line: Line) -> None:
+    def _hear(self, what: str, client: str, line: Asked) -> None:
         """Do an action without an answer; invalid ones, and those of other places, are ignored."""
         take = self._doers.get(what)
         if take is not None:
@@ -101,7 +100,7 @@ class ActionDispatcher:
                 return
             take(client, asked)
 
-    def do(self, client: str, line: Line, said: Said) -> None:
+    def do(self, client: str, line: Asked, said: Said) -> None:
         """Do an action, and note it in the audit log.
 
         Raises:
@@ -121,9 +120,9 @@ class ActionDispatcher:
 _KNOWN: Mapping[str, Any] = {**ACTIONS, **OF_THE_WEB}
 
 
-def _checked(line: Line) -> Line:
+def _checked(line: Asked) -> Asked:
     """Check the arguments of a line against their declaration."""
     head = {key: value for key, value in line.items() if key in _HEAD}
     given = {key: value for key, value in line.items() if key not in _HEAD}
-    asked: Line = _KNOWN[line["do"]].read(given) | head
+    asked: Asked = _KNOWN[line["do"]].read(given) | head
     return asked

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.console.asking.answers import BYE
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
@@ -11,11 +11,10 @@ from dva_sim.console.asking.refusal import Refused, Said, unanswered
 from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.events.alarm_actions import AlarmActions
-from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.protocol import messages as m
 
-Line = dict[str, Any]
 NOT_HERE: Final = "this console is attached to a DVA that runs elsewhere: that cannot be done here"
 
 
@@ -41,25 +40,25 @@ class AttachedActions:
         self.take = dispatcher.take
 
     @does("look")
-    def _look(self, _: str, line: Line) -> None:
+    def _look(self, _: str, line: Asked) -> None:
         self._pages.looked = "devices" in line["tables"]
 
     @does("watch")
-    def _watch(self, _: str, line: Line) -> None:
+    def _watch(self, _: str, line: Asked) -> None:
         self._pages.sensors.watch(line["robots"])
 
     def _tell(self, answer: DoneLine) -> None:
         self._pages.tell({**answer, "t": self._system.now_ms})
 
     @does("release")
-    def _release(self, client: str, line: Line, said: Said) -> None:
+    def _release(self, client: str, line: Asked, said: Said) -> None:
         """Nothing is in hand; but a page may be gone for good."""
         if str(line["id"]).startswith(BYE):
             self._pages.people.leave(client)
         said(True, "released")
 
     @does("emergency")
-    def _emergency(self, _: str, line: Line, said: Said) -> None:
+    def _emergency(self, _: str, line: Asked, said: Said) -> None:
         """Each robot is told by a connection of its own; who does not answer is named."""
         system, wanted = self._system, line.get("robots", "all")
         robots = system.robots()
@@ -83,7 +82,7 @@ class AttachedActions:
             system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
 
     @does("revoke")
-    def _revoke(self, _: str, line: Line, said: Said) -> None:
+    def _revoke(self, _: str, line: Asked, said: Said) -> None:
         robot = line["device"]
         if robot not in self._system.robots():
             raise Refused(f"the DVA has listed no robot {robot}")
@@ -95,7 +94,7 @@ class AttachedActions:
         self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, said))
 
     @does("fake_add")
-    def _add_fake(self, _: str, line: Line, said: Said) -> None:
+    def _add_fake(self, _: str, line: Asked, said: Said) -> None:
         if self._system.options.keys is not None:
             raise Refused(
                 "with keys nobody can pretend to be a device: it would need one of its own"
@@ -103,6 +102,6 @@ class AttachedActions:
         self._system.fakes.add(line, said)
 
     @does("fake_remove")
-    def _remove_fake(self, _: str, line: Line, said: Said) -> None:
+    def _remove_fake(self, _: str, line: Asked, said: Said) -> None:
         label = self._system.fakes.remove(line["device"])
         said(True, f"{label} speaks no more: the DVA takes it from its list within some seconds")

@@ -10,18 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final, Unpack
+from typing import Final, Unpack
 
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
-from dva_sim.console.wire.actions import ACTIONS, Action, Audit
+from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
 from dva_sim.console.wire.seats import Answered
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
-
-Line = dict[str, Any]
 
 RECORD_WITHIN: Final = 0.5  # the DVA's record of a decision comes so long after its answer [s]
 
@@ -64,7 +62,7 @@ class AttachedAudit(Audited):
         self._system = system
         self._asked: dict[str, AskedDecision] = {}  # by the id of the action
 
-    def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
+    def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
         """See `Audited`; a decision that was taken waits a moment for the DVA's record of it."""
         told = super().answered(what, client, line, said)
         if ACTIONS[what].audit is not Audit.DVA and what != "revoke":
@@ -106,7 +104,7 @@ class AttachedAudit(Audited):
         waited = self._system.age_of(record.event_id)
         return Fact.of_record(record, self._system.clock.now, waited)
 
-    def _note(self, what: str, client: str, line: Line, outcome: str, text: str) -> None:
+    def _note(self, what: str, client: str, line: Asked, outcome: str, text: str) -> None:
         asked = self._asked.pop(str(line["id"]), None)
         if asked is None:
             super()._note(what, client, line, outcome, text)
@@ -118,7 +116,7 @@ class AttachedAudit(Audited):
             self._note_answer(asked, client, line, outcome, text)
 
     def _note_answer(
-        self, asked: AskedDecision, client: str, line: Line, outcome: str, text: str
+        self, asked: AskedDecision, client: str, line: Asked, outcome: str, text: str
     ) -> None:
         """All that is known of a decision is what was asked for, and what was answered."""
         told = {key: line[key] for key in ("task", "mode", "kind", "severity") if key in line}

@@ -15,9 +15,8 @@ from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.takeover import Takeover
+from dva_sim.console.wire.actions import Asked
 from dva_sim.protocol import messages as m
-
-Line = dict[str, Any]
 
 
 class AttachedDecisions:
@@ -32,7 +31,7 @@ class AttachedDecisions:
         self._system, self._people = system, people
 
     @does("room_join")
-    def _join(self, client: str, line: Line, said: Said) -> None:
+    def _join(self, client: str, line: Asked, said: Said) -> None:
         """All who decide here share the console's own control room, each by an own name."""
         if not self._system.answers:
             raise Refused(NO_ANSWER)
@@ -41,19 +40,19 @@ class AttachedDecisions:
         said(True, f"you are {name}, and may {self._system.role}")
 
     @does("event_raise")
-    def _raise(self, _: str, line: Line, said: Said) -> None:
+    def _raise(self, _: str, line: Asked, said: Said) -> None:
         place = self._system.place_of(line["x_m"], line["y_m"])
         self._ask(*report_of(line, place), said)
 
     @does(*DECISIONS)
-    def decide(self, _: str, line: Line, said: Said) -> None:
+    def decide(self, _: str, line: Asked, said: Said) -> None:
         """Decide on an event."""
         self._ask(*decision_of(line, self._device, self._seen), said)
 
     # --- robots ------------------------------------------------------------------------------
 
     @does("mission")
-    def _mission(self, _: str, line: Line, said: Said) -> None:
+    def _mission(self, _: str, line: Asked, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._system.agent.events.get(line["event"])
         if status is None:
@@ -65,7 +64,7 @@ class AttachedDecisions:
         send_on_mission(self._system.device, robot, label, inspection_of(status), said)
 
     @does("take_over")
-    def _take_over(self, _: str, line: Line, said: Said) -> None:
+    def _take_over(self, _: str, line: Asked, said: Said) -> None:
         """Take a robot from whoever holds it; it goes by itself where it was sent to."""
         robot, agent = self._robot(line["robot"]), self._system.agent
         label = self._system.label_of(robot)

@@ -10,13 +10,11 @@ from typing import Any, Final, Unpack
 
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.audit.audit_keeper import AuditKeeper
-from dva_sim.console.wire.actions import ACTIONS, Action, Audit
+from dva_sim.console.wire.actions import ACTIONS, Action, Asked, Audit
 from dva_sim.console.wire.seats import Answered
 from dva_sim.core.audit import Fact
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.audit_log import AuditEntry
-
-Line = dict[str, Any]
 
 DONE, REFUSED = "done", "refused"
 _HEAD: Final = frozenset(["id", "do", "client", "role", "robots", "robot", "event", "reason"])
@@ -41,7 +39,7 @@ class Audited:
         self.keeper = keeper
         self._author, self._label = author, label
 
-    def answered(self, what: str, client: str, line: Line, said: Said) -> Said:
+    def answered(self, what: str, client: str, line: Asked, said: Said) -> Said:
         """Return a callback that passes an answer on once its row is in the log.
 
         Raises:
@@ -75,7 +73,7 @@ class Audited:
         """Return True if an action has a row of its own; of the others the DVA tells."""
         return action.audit is Audit.OWN
 
-    def _note(self, what: str, client: str, line: Line, outcome: str, text: str) -> None:
+    def _note(self, what: str, client: str, line: Asked, outcome: str, text: str) -> None:
         robots = line.get("robots") or ([line["robot"]] if "robot" in line else [])
         named = robots if isinstance(robots, str) else ", ".join(map(str, robots))
         details = {k: v for k, v in line.items() if k not in _HEAD | SECRET}
@@ -99,14 +97,14 @@ class Audited:
 
     def _entry(self, fact: Fact) -> AuditEntry:
         ok = fact.code == m.OK
-        told: Line = {
+        told: Asked = {
             "task": fact.task,
             "mode": fact.mode,
             "operator": fact.operator and self._label(fact.operator),
             "arrival_s": fact.arrival_in,
             "waited_s": fact.waited,
         }
-        details: Line = {key: _short(value) for key, value in told.items() if value is not None}
+        details: Asked = {key: _short(value) for key, value in told.items() if value is not None}
         if fact.action == "assign":
             details["advised"] = fact.advised and self._label(fact.advised)
             details["advised_s"] = _short(fact.advised_in)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.dispatcher import does
@@ -12,11 +11,10 @@ from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.dva_port import DvaPort
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
-
-Line = dict[str, Any]
 
 
 class DvaPages:
@@ -57,18 +55,18 @@ class DvaPages:
         return {"k": "devices", "t": now_ms, "devices": rows}
 
     @does("server_start")
-    def _start(self, _: str, line: Line, said: Said) -> None:
+    def _start(self, _: str, line: Asked, said: Said) -> None:
         self.port.start(line["port"])
         self._moved(self.port.address)
         said(True, f"the server listens on {self.port.address}")
 
     @does("server_stop")
-    def _stop(self, _: str, __: Line, said: Said) -> None:
+    def _stop(self, _: str, __: Asked, said: Said) -> None:
         self.port.stop()
         said(True, "the server is stopped")
 
     @does("revoke")
-    def _revoke(self, _: str, line: Line, said: Said) -> None:
+    def _revoke(self, _: str, line: Asked, said: Said) -> None:
         robot = line["device"]
         grant = self._run.dva.desk.sessions.permissions.grants.get(robot)
         if grant is None:
@@ -81,11 +79,11 @@ class DvaPages:
         )
 
     @does("fake_add")
-    def _add(self, _: str, line: Line, said: Said) -> None:
+    def _add(self, _: str, line: Asked, said: Said) -> None:
         self._fakes.add(line, said)
 
     @does("fake_remove")
-    def _remove(self, _: str, line: Line, said: Said) -> None:
+    def _remove(self, _: str, line: Asked, said: Said) -> None:
         said(True, f"{self._fakes.remove(line['device'])} is removed")
 
     # --- fake devices ----------------------------------------------------------------------

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from dva_sim.agents.operator.handheld import Gathered
 from dva_sim.console.asking.dispatcher import Doer, does
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.events.alarm_desk import AlarmDesk
-
-Line = dict[str, Any]
+from dva_sim.console.wire.actions import Asked
 
 
 class AlarmActions:
@@ -26,7 +24,7 @@ class AlarmActions:
         self._desk, self._author, self._acknowledge_event = desk, author, acknowledge
 
     @does("alarm_acknowledge")
-    def _acknowledge(self, client: str, line: Line, said: Said) -> None:
+    def _acknowledge(self, client: str, line: Asked, said: Said) -> None:
         """What an open event is behind is acknowledged at the DVA, all else here."""
         keys = self._desk.members(line["alarm"])
         events = self._desk.by_event(keys)
@@ -43,12 +41,12 @@ class AlarmActions:
             self._acknowledge_event(client, who | about, answers)
 
     @does("alarm_shelve")
-    def _shelve(self, client: str, line: Line, said: Said) -> None:
+    def _shelve(self, client: str, line: Asked, said: Said) -> None:
         keys = self._desk.members(line["alarm"])
         self._desk.shelve(keys, line["for_s"], self._author(client))
         said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
 
     @does("alarm_unshelve")
-    def _unshelve(self, client: str, line: Line, said: Said) -> None:
+    def _unshelve(self, client: str, line: Asked, said: Said) -> None:
         self._desk.unshelve(self._desk.members(line["alarm"]))
         said(True, "back in the list")

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.people.person_guard import SEVERITIES
+from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.events import DecidedShown, DispatchShown, EventDecisions
 from dva_sim.console.wire.scenes import LabelledMoment
 from dva_sim.console.wire.seats import Answered, CandidateShown
 from dva_sim.core.candidates import FREE
 from dva_sim.protocol import messages as m
-
-Line = dict[str, Any]
 
 CERTAIN: Final = 0.9  # of what somebody in a control room reports
 DECISIONS: Final = (
@@ -22,7 +21,7 @@ DECISIONS: Final = (
 
 
 def decision_of(
-    line: Line, device: Callable[[str], str], seen: Callable[[int], int | None]
+    line: Asked, device: Callable[[str], str], seen: Callable[[int], int | None]
 ) -> tuple[m.Body, str]:
     """The message that a line of a page asks for, and what is told if it is done.
 
@@ -61,7 +60,7 @@ def decision_of(
     return m.SetDispatch(mode, reason), asks
 
 
-def report_of(line: Line, place: m.Position) -> tuple[m.EventReport, str]:
+def report_of(line: Asked, place: m.Position) -> tuple[m.EventReport, str]:
     """The report of an event that somebody at a page raises, and what is told if it is done."""
     kind, severity = str(line["kind"]), SEVERITIES[line["severity"]]
     report = m.EventReport(None, kind, place, severity, CERTAIN, "detected")

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.guards.played_guards import PlayedGuards
+from dva_sim.console.wire.actions import Asked
 from dva_sim.worlds.site import Site
-
-Line = dict[str, Any]
 
 
 class GuardActions:
@@ -31,7 +28,7 @@ class GuardActions:
         return guard
 
     @does("guard_join")
-    def _join(self, client: str, line: Line, said: Said) -> None:
+    def _join(self, client: str, line: Asked, said: Said) -> None:
         label = line["guard"]
         guard = self._guards.named(label)
         if guard is None:
@@ -46,28 +43,28 @@ class GuardActions:
         said(True, f"you are {label}")
 
     @does("guard_leave")
-    def _leave(self, client: str, _: Line, said: Said) -> None:
+    def _leave(self, client: str, _: Asked, said: Said) -> None:
         self._guards.leave(client)
         said(True, "nobody plays the guard now")
 
     @does("guard_answer")
-    def _answer(self, client: str, line: Line, said: Said) -> None:
+    def _answer(self, client: str, line: Asked, said: Said) -> None:
         self._guard(client).answer(line["accept"], line["reason"], said)
 
     @does("guard_say")
-    def _say(self, client: str, line: Line, said: Said) -> None:
+    def _say(self, client: str, line: Asked, said: Said) -> None:
         self._guard(client).say(line["what"], said)
 
     @does("guard_place")
-    def _place(self, client: str, line: Line, said: Said) -> None:
+    def _place(self, client: str, line: Asked, said: Said) -> None:
         self._guard(client).stand_at(*self._point(line), said)
 
     @does("guard_report")
-    def _report(self, client: str, line: Line, said: Said) -> None:
+    def _report(self, client: str, line: Asked, said: Said) -> None:
         point = self._point(line)
         self._guard(client).report(line["kind"], *point, line["severity"], said)
 
-    def _point(self, line: Line) -> tuple[float, float]:
+    def _point(self, line: Asked) -> tuple[float, float]:
         """A place on the site [m].
 
         Raises:

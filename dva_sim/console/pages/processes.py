@@ -20,6 +20,7 @@ from typing import Any, Protocol
 from dva_sim.cameras.children import END_WITHIN, PAINTED, Child
 from dva_sim.cameras.lines import Show
 from dva_sim.console.pages.page_options import PageOptions
+from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.lines import KINDS, Tell
 from dva_sim.network.realtime import PacedClock
 from dva_sim.serving.listening import listen
@@ -32,7 +33,6 @@ FLUSH = 0.05  # from one look at what waits to be written to the next, real time
 MOST_RESTARTS = 5  # of the process that draws
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
-Line = dict[str, Any]
 Say = Callable[[str], object]
 
 
@@ -86,7 +86,7 @@ class ConsoleProcesses:
     def start(
         self,
         subject: ConsoleSubject,
-        take: Callable[[Line], object],
+        take: Callable[[Asked], object],
         report: Path | None = None,
         audit: Path | None = None,
     ) -> None:
@@ -158,7 +158,7 @@ class ConsoleProcesses:
         self._children.append(pictures)
         return pictures
 
-    def _listen(self, subject: ConsoleSubject, web: Child, take: Callable[[Line], object]) -> None:
+    def _listen(self, subject: ConsoleSubject, web: Child, take: Callable[[Asked], object]) -> None:
         def hear() -> None:
             for line in web.pipe.lines():
                 take(line)

@@ -21,14 +21,12 @@ from dva_sim.console.people.room_actions import RoomActions
 from dva_sim.console.people.tour import tour_of
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.running.sliders import change_pattern
-from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import FASTEST
 from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.network.patterns import PATTERNS
-
-Line = dict[str, Any]
 
 LOOK = 0.05  # from one look at who has fallen silent to the next, real time [s]
 
@@ -79,7 +77,7 @@ class Actions:
         return self._world.person(seat.number)
 
     @does("take")
-    def _take(self, client: str, line: Line, said: Said) -> None:
+    def _take(self, client: str, line: Asked, said: Said) -> None:
         robots = self._robots(line)
         number = self._seats.sit(client, self._world.seat_of_order(robots))
         if number is None:
@@ -117,7 +115,7 @@ class Actions:
         return f"{'; '.join(named)}: release it there, or take it over on the page Events.{none}"
 
     @does("release")
-    def _release(self, client: str, line: Line, said: Said) -> None:
+    def _release(self, client: str, line: Asked, said: Said) -> None:
         if str(line["id"]).startswith(BYE):
             self._phones.forget(client)
             self._rooms.forget(client)
@@ -146,7 +144,7 @@ class Actions:
         held = {robot for person in self._world.persons for robot in person.robots}
         self._world.screens.hold(held)
 
-    def _robots(self, line: Line) -> list[str]:
+    def _robots(self, line: Asked) -> list[str]:
         """Ids of the robots that a line names by their numbers or labels."""
         given = line.get("robots", "all")
         if given == "all":
@@ -172,7 +170,7 @@ class Actions:
         return "The simulation is paused. Resume it first." if self._world.clock.paused else ""
 
     @does("start")
-    def _start(self, client: str, _: Line, said: Said) -> None:
+    def _start(self, client: str, _: Asked, said: Said) -> None:
         person = self._person(client)
         if why := self._why_not():
             raise Refused(why)
@@ -180,11 +178,11 @@ class Actions:
         person.start(said)
 
     @does("stop")
-    def _stop(self, client: str, _: Line, said: Said) -> None:
+    def _stop(self, client: str, _: Asked, said: Said) -> None:
         self._person(client).stop(said)
 
     @does("emergency")
-    def _emergency(self, client: str, line: Line, said: Said) -> None:
+    def _emergency(self, client: str, line: Asked, said: Said) -> None:
         seat = self._seats.taken.get(client)
         if "robots" not in line and seat is not None:
             line = {"robots": list(self._world.person(seat.number).robots)}
@@ -197,7 +195,7 @@ class Actions:
                 person.ended_by_others(robots)
         own.emergency(robots, said)
 
-    def _drew(self, client: str, line: Line) -> None:
+    def _drew(self, client: str, line: Asked) -> None:
         """Note which picture of each robot a page has drawn last, if it says so."""
         seat = self._seats.taken.get(client)
         if seat is None or "seen" not in line:
@@ -207,12 +205,12 @@ class Actions:
             held.drew(drawn.get(self._world.feed.numbers.get(robot)))
 
     @does("samples")
-    def _samples(self, client: str, line: Line) -> None:
+    def _samples(self, client: str, line: Asked) -> None:
         self._drew(client, line)
         self._phones.samples(client, line)
 
     @does("input")
-    def _input(self, client: str, line: Line) -> None:
+    def _input(self, client: str, line: Asked) -> None:
         """Steer as a person wants now; a stick that is let go asks for a stop."""
         self._drew(client, line)
         held = line["held"]
@@ -225,7 +223,7 @@ class Actions:
                 self._phones.let_go(client)
 
     @does("gone")
-    def _gone(self, client: str, _: Line) -> None:
+    def _gone(self, client: str, _: Asked) -> None:
         """The page is hidden, or its socket closed: nobody has a hand on it."""
         self._at_robots.gone(client)
         self._stop_one(client, "stopped: the page was hidden, left or cut off")
@@ -263,15 +261,15 @@ class Actions:
             self._stop_one(client, why)
 
     @does("confirm")
-    def _confirm(self, client: str, _: Line, said: Said) -> None:
+    def _confirm(self, client: str, _: Asked, said: Said) -> None:
         self._person(client).report("confirmed", said)
 
     @does("refute")
-    def _refute(self, client: str, _: Line, said: Said) -> None:
+    def _refute(self, client: str, _: Asked, said: Said) -> None:
         self._person(client).report("refuted", said)
 
     @does("decline")
-    def _decline(self, client: str, _: Line, said: Said) -> None:
+    def _decline(self, client: str, _: Asked, said: Said) -> None:
         """Of the own seat, or of one in which nobody sits."""
         if client in self._seats.taken:
             self._person(client).decline(said)
@@ -284,11 +282,11 @@ class Actions:
     # --- what can be changed ---------------------------------------------------------------
 
     @does("link")
-    def _link(self, _: str, line: Line, said: Said) -> None:
+    def _link(self, _: str, line: Asked, said: Said) -> None:
         said(True, self._world.change_link(line))
 
     @does("pattern")
-    def _pattern(self, _: str, line: Line, said: Said) -> None:
+    def _pattern(self, _: str, line: Asked, said: Said) -> None:
         robot, name = self._robot(line.get("robot")), line.get("name")
         world = self._world
         if name not in PATTERNS and name != world.scenario.pattern:
@@ -301,7 +299,7 @@ class Actions:
         change_pattern(world.run, world.persons, robot, str(name), changed)
 
     @does("pace")
-    def _pace(self, _: str, line: Line, said: Said) -> None:
+    def _pace(self, _: str, line: Asked, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if self._world.run.is_real:
             raise Refused("the links are real: time goes by as it does outside")
@@ -315,7 +313,7 @@ class Actions:
         said(True, now)
 
     @does("tour")
-    def _tour(self, _: str, line: Line, said: Said) -> None:
+    def _tour(self, _: str, line: Asked, said: Said) -> None:
         plan = tour_of(self._world.run, self._world.feed.numbers)
         if plan is None:
             raise Refused(
@@ -324,7 +322,7 @@ class Actions:
         said(True, "two goals", tour=plan)
 
     @does("tour_time")
-    def _tour_time(self, client: str, line: Line, said: Said) -> None:
+    def _tour_time(self, client: str, line: Asked, said: Said) -> None:
         robot, took = self._robot(line["robot"]), line["took_s"]
         log = self._world.recorder.newest_drive.get(robot)
         if log is None or log.operator != self._person(client).device.id_tag:
@@ -333,18 +331,18 @@ class Actions:
         said(True, f"{took:.1f} s noted")
 
     @does("mark")
-    def _mark(self, client: str, line: Line, said: Said) -> None:
+    def _mark(self, client: str, line: Asked, said: Said) -> None:
         world = self._world
         world.recorder.tell(world.clock.now, world.author(client), f"marks: {line['text']}")
         said(True, "marked")
 
     @does("watch")
-    def _watch(self, _: str, line: Line) -> None:
+    def _watch(self, _: str, line: Asked) -> None:
         ids = {t["id"] for t in self._world.feed.things.all if t["i"] in line["robots"]}
         self._world.screens.watch(ids)
 
     @does("look")
-    def _look(self, _: str, line: Line) -> None:
+    def _look(self, _: str, line: Asked) -> None:
         self._world.logs.look(line["logs"])
         self._world.dva.looked = "devices" in line["tables"]
 

@@ -13,11 +13,10 @@ from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, 
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.rooms import ConsoleRoom
 from dva_sim.console.events.takeover import Takeover
+from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.seats import Answered
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.protocol import messages as m
-
-Line = dict[str, Any]
 
 
 class RoomActions:
@@ -47,12 +46,12 @@ class RoomActions:
     # --- who asks ---------------------------------------------------------------------------
 
     @does("room_join")
-    def _join(self, client: str, line: Line, said: Said) -> None:
+    def _join(self, client: str, line: Asked, said: Said) -> None:
         name = line["name"].strip()
         self._rooms.join(client, str(line.get("role", "look")), name, said)
 
     def _room(
-        self, client: str, line: Line, said: Said, then: Callable[[ConsoleRoom, Said], object]
+        self, client: str, line: Asked, said: Said, then: Callable[[ConsoleRoom, Said], object]
     ) -> None:
         """The control room of a page; it gets one with its first decision."""
         room = self._rooms.by_client.get(client)
@@ -72,7 +71,7 @@ class RoomActions:
     def _ask(
         self,
         client: str,
-        line: Line,
+        line: Asked,
         said: Said,
         body: m.Body,
         done: str,
@@ -83,13 +82,13 @@ class RoomActions:
     # --- events -----------------------------------------------------------------------------
 
     @does(*DECISIONS)
-    def decide(self, client: str, line: Line, said: Said) -> None:
+    def decide(self, client: str, line: Asked, said: Said) -> None:
         """Decide on an event."""
         body, done = decision_of(line, self._device, self._rooms.decisions)
         self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
 
     @does("event_raise")
-    def _raise(self, client: str, line: Line, said: Said) -> None:
+    def _raise(self, client: str, line: Asked, said: Said) -> None:
         body, done = report_of(line, self._place(line))
 
         def then(_: m.Reply) -> Answered:
@@ -98,7 +97,7 @@ class RoomActions:
 
         self._ask(client, line, said, body, done, then)
 
-    def _place(self, line: Line) -> m.Position:
+    def _place(self, line: Asked) -> m.Position:
         """Where on earth a place of the site lies.
 
         Raises:
@@ -130,7 +129,7 @@ class RoomActions:
     # --- robots -----------------------------------------------------------------------------
 
     @does("mission")
-    def _mission(self, client: str, line: Line, said: Said) -> None:
+    def _mission(self, client: str, line: Asked, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._rooms.listener.events.get(line["event"])
         if status is None:
@@ -144,7 +143,7 @@ class RoomActions:
         self._room(client, line, said, send)
 
     @does("take_over")
-    def _take_over(self, client: str, line: Line, said: Said) -> None:
+    def _take_over(self, client: str, line: Asked, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
         robot, reason = self._robot(line["robot"]), line["reason"]
 

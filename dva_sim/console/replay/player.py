@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from dva_sim.cameras.lines import Show, contained_line, scene_line
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
@@ -18,7 +17,7 @@ from dva_sim.console.replay.audit import RecordedAudit
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
-from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import ClockShown, RowsLine
 from dva_sim.console.wire.seats import DoneLine
@@ -26,7 +25,6 @@ from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.reading import read_recording
 from dva_sim.recordings.writing import pack
 
-Line = dict[str, Any]
 # From one line to the next, real time [s].
 POSITIONS, ROWS, HAZARDS, FRAMES, LOGS = 0.1, 0.25, 1.0, 0.1, 0.2
 NOBODY = "this is a recording: there is nobody who could be told to do anything"
@@ -226,7 +224,7 @@ class Player:
         self.tell({**answer, "t": round(1000 * self.now)})
 
     @does("pace")
-    def _pace(self, _: str, line: Line, said: Said) -> None:
+    def _pace(self, _: str, line: Asked, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if paused is False and self.now >= self._duration:
             self._go_to(0.0)
@@ -236,7 +234,7 @@ class Player:
         said(True, now)
 
     @does("seek")
-    def _seek(self, _: str, line: Line, said: Said) -> None:
+    def _seek(self, _: str, line: Asked, said: Said) -> None:
         self._go_to(line["t_ms"] / 1000)
         self.tell_now()
         said(True, f"at {self.now:.1f} s")
@@ -247,7 +245,7 @@ class Player:
         self._told = dict.fromkeys(self._told, -1)
 
     @does("open_recording")
-    def _open(self, _: str, line: Line, said: Said) -> None:
+    def _open(self, _: str, line: Asked, said: Said) -> None:
         if self.shelf is None:
             raise Refused("there are no other recordings")
         path = self.shelf.find(line["name"])
@@ -260,13 +258,13 @@ class Player:
         said(True, f"{path.name} is played")
 
     @does("watch")
-    def _watch(self, _: str, line: Line) -> None:
+    def _watch(self, _: str, line: Asked) -> None:
         things = () if self.run is None else self.run.things.all
         watched = (t for t in things if t["i"] in line["robots"])
         self._watched = {t["id"] for t in watched if t["kind"] == "robot"}
 
     @does("look")
-    def _look(self, _: str, line: Line) -> None:
+    def _look(self, _: str, line: Asked) -> None:
         """Pages look at these logs; those that are new to them are told from the beginning."""
         self._looks_at_devices = "devices" in line["tables"]
         self._tell_devices()

@@ -15,10 +15,9 @@ from dva_sim.agents.robot.controller import Decision
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.robots.robot_windows import RobotWindow, RobotWindows
+from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.protocol import messages as m
-
-Line = dict[str, Any]
 
 
 @dataclass
@@ -66,7 +65,7 @@ class RobotActions:
     # --- by hand -----------------------------------------------------------------------
 
     @does("manual_take")
-    def _take(self, client: str, line: Line, said: Said) -> None:
+    def _take(self, client: str, line: Asked, said: Said) -> None:
         robot = self._robot(line["robot"])
         window = self._windows.by_id[robot]
         if why := self._why_not():
@@ -96,7 +95,7 @@ class RobotActions:
             raise Refused(f"{m.CODE_NAMES[decision.code]}: {text}")
 
     @does("manual_release")
-    def _release(self, client: str, _: Line, said: Said) -> None:
+    def _release(self, client: str, _: Asked, said: Said) -> None:
         hand = self._hands.get(client)
         if hand is not None:
             self._let_go(client, hand)
@@ -109,7 +108,7 @@ class RobotActions:
             window.number = None
 
     @does("manual")
-    def input(self, client: str, line: Line) -> None:
+    def input(self, client: str, line: Asked) -> None:
         """Steer as a hand wants now, in shares of the limits; letting go asks for a stop."""
         hand = self._hands.get(client)
         if hand is None:
@@ -160,7 +159,7 @@ class RobotActions:
     # --- faults ------------------------------------------------------------------------
 
     @does("fault")
-    def _fault(self, _: str, line: Line, said: Said) -> None:
+    def _fault(self, _: str, line: Asked, said: Said) -> None:
         robot, what = self._robot(line["robot"]), line["what"]
         window, on = self._windows.by_id[robot], line["on"]
         if what == "processing":
@@ -178,7 +177,7 @@ class RobotActions:
             self._stick(window, line, on)
         said(True, f"{what}: {'on' if on else 'off'}")
 
-    def _stick(self, window: RobotWindow, line: Line, on: bool) -> None:
+    def _stick(self, window: RobotWindow, line: Asked, on: bool) -> None:
         sensor = line.get("sensor", "")
         if sensor not in window.robot.sensors:
             there = ", ".join(window.robot.sensors) or "none"

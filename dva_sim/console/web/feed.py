@@ -8,6 +8,8 @@ is meant for this page alone waits in a short list.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
+from typing import Any
 
 from dva_sim.console.web.logs import TABLES, Looks
 from dva_sim.console.web.state import LATEST, RunState, Versioned, body_of
@@ -46,7 +48,7 @@ class PageFeed:
         """Begin again with all there is."""
         self._wants_snapshot = True
 
-    def put(self, line: dict[str, object]) -> bool:
+    def put(self, line: Mapping[str, Any]) -> bool:
         """Add a line for this page alone; False if too many wait, as of a page that is not read."""
         if len(self._own) >= OWN_KEPT:
             return False

@@ -71,8 +71,8 @@ class Hub:
         if client.ws is not None:  # the page has lost that one, and we did not know
             wire_of(client.ws.scope).drop(STUCK, "this page was opened again")
         client.ws = ws
-        you = {"client": client.name, "key": client.key, "role": role.name.lower()}
-        client.feed.put({"k": "you", **you})
+        you = {"k": "you", "client": client.name, "key": client.key, "role": role.name.lower()}
+        client.feed.put(you)
 
         def hear(text: str) -> None:
             self._hear_looker(client, text)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from dva_sim.kernel.labels import visible
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
 
-Line = dict[str, Any]
+if TYPE_CHECKING:
+    from dva_sim.console.wire.pages import LogEntry
+
 Names = Mapping[str, str]
 
 UNANSWERED: Final = "none"  # in place of the code of a reply
@@ -82,7 +84,7 @@ class Entry:
             if isinstance(answer, m.Reply):
                 self.code, self.text = answer.code, answer.text
 
-    def brief(self, names: Names) -> Line:
+    def brief(self, names: Names) -> LogEntry:
         """What a table shows of it."""
         header = self.header
         source, to = header.get("SourceID", ""), header.get("DestinationID", "")

@@ -17,11 +17,14 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from dva_sim.console.web.log_entries import UNANSWERED, Entry, Names
 from dva_sim.console.wire.kinds import BadMessage
 from dva_sim.protocol import messages as m
+
+if TYPE_CHECKING:
+    from dva_sim.console.wire.pages import LogEntry, LogLine
 
 Line = dict[str, Any]
 
@@ -241,7 +244,7 @@ class Looks:
         wanted = LogFilter.of(given)
         return wanted if self.acts else replace(wanted, text="")
 
-    def next(self) -> Line | None:
+    def next(self) -> LogLine | None:
         """What the page gets next of the logs that it looks at; None if it has everything."""
         for name, wanted in self.wanted.items():
             log = self._logs.of(name)
@@ -249,19 +252,19 @@ class Looks:
             line = self._more(log, wanted) if goes_on else self._first(log, wanted)
             self._seen[name] = log.changed, log.lost, log.begun
             if line is not None:
-                return {"k": "log", "log": name, "total": log.newest, **line}
+                return line
         return None
 
-    def brief(self, entry: Entry) -> Line:
+    def brief(self, entry: Entry) -> LogEntry:
         """What a page may see of an entry in a table."""
         brief = entry.brief(self._logs.names)
-        return brief if self.acts else brief | {"session": "", "payload": ""}
+        return brief if self.acts else {**brief, "session": "", "payload": ""}
 
-    def _first(self, log: KeptLog, wanted: LogFilter) -> Line:
+    def _first(self, log: KeptLog, wanted: LogFilter) -> LogLine:
         found = log.find(wanted, self._logs.names, None, AT_ONCE)
-        return {"first": True, "missed": 0, "lines": [self.brief(entry) for entry in found]}
+        return self._line(log, True, 0, found)
 
-    def _more(self, log: KeptLog, wanted: LogFilter) -> Line | None:
+    def _more(self, log: KeptLog, wanted: LogFilter) -> LogLine | None:
         changed, lost, _ = self._seen[log.name]
         found = {
             entry.number: entry
@@ -271,5 +274,14 @@ class Looks:
         missed = max(0, len(found) - AT_ONCE) + log.lost - lost
         if not found and not missed:
             return None
-        lines = [self.brief(found[number]) for number in sorted(found)[-AT_ONCE:]]
-        return {"first": False, "missed": missed, "lines": lines}
+        return self._line(log, False, missed, [found[n] for n in sorted(found)[-AT_ONCE:]])
+
+    def _line(self, log: KeptLog, first: bool, missed: int, entries: Iterable[Entry]) -> LogLine:
+        return {
+            "k": "log",
+            "log": log.name,
+            "total": log.newest,
+            "first": first,
+            "missed": missed,
+            "lines": [self.brief(entry) for entry in entries],
+        }

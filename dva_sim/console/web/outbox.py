@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from typing import Any
 
-from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, Queueing
+from dva_sim.console.wire.actions import ACTIONS, OF_THE_WEB, Asked, Queueing
 from dva_sim.console.wire.limits import MOST_ACTIONS, MOST_BATCHES, MOST_URGENT
-
-Asked = dict[str, Any]
 
 
 class OutgoingLines:

@@ -13,9 +13,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.console.web.outbox import Asked, OutgoingLines
+from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.web.state import RunState
-from dva_sim.console.wire.actions import ACTIONS, Queueing
+from dva_sim.console.wire.actions import ACTIONS, Asked, Queueing
 from dva_sim.console.wire.kinds import Labels
 from dva_sim.console.wire.limits import MOST_ASKING, MOST_PENDING, SILENCE
 from dva_sim.serving.pipes import Lines, WatchedEnd

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dva_sim.console.web.logs import TABLES, KeptLogs
 from dva_sim.console.wire.limits import STORY_KEPT
 
-Line = dict[str, Any]
+if TYPE_CHECKING:
+    from dva_sim.console.wire.pages import MovedLine, OtherSeatLine
+
+Line = dict[str, Any]  # as it arrives
 
 STORY_SHOWN = 200  # of them in a snapshot
 # Kinds of which only the newest counts.
@@ -21,7 +25,6 @@ LATEST = (
     *("rows", "hazards", "events", "control", "alarms", "audit", "pictures"),
     *("told", "shelf"),
 )
-SHORT = ("seat", "phase", "order", "label")  # what others may know of a seat
 MOST_SEATS = 256  # of which anything is remembered
 
 
@@ -32,12 +35,12 @@ class Versioned(NamedTuple):
     body: str
 
 
-def encode(line: Line) -> str:
+def encode(line: Mapping[str, Any]) -> str:
     """A line as compact JSON."""
     return json.dumps(line, separators=(",", ":"))
 
 
-def body_of(line: Line) -> str:
+def body_of(line: Mapping[str, Any]) -> str:
     """A line as JSON without its first brace, so that a number can be put before it."""
     return encode(line)[1:]
 
@@ -164,7 +167,7 @@ class RunState:
         """
         if version not in self._deltas:
             rows = [self.places[i] for i, at in self._moved.items() if at > version]
-            line: Line = {"k": "d", "t": self.place_time, "p": rows}
+            line: MovedLine = {"k": "d", "t": self.place_time, "p": rows}
             if left := [index for index, at in self._left.items() if at > version]:
                 line["gone"] = left
             self._deltas[version] = body_of(line)
@@ -185,9 +188,14 @@ class RunState:
         return self._snapshot[1]
 
 
-def short_seat(line: Line) -> Line:
+def short_seat(line: Line) -> OtherSeatLine:
     """What everybody may know of a seat: that it is held, of which robots, and in which phase."""
-    short: Line = {"k": "seat", "short": True}
-    short.update({key: line[key] for key in SHORT if key in line})
-    short["robots"] = [drive.get("i") for drive in line.get("drives") or ()]
-    return short
+    return {
+        "k": "seat",
+        "short": True,
+        "seat": line["seat"],
+        "phase": line["phase"],
+        "order": line["order"],
+        "label": line["label"],
+        "robots": [drive["i"] for drive in line["drives"]],
+    }

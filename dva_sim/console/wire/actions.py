@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from dva_sim.console.wire.arguments import (
     AssignAsked,
@@ -58,6 +58,9 @@ from dva_sim.console.wire.arguments import (
 from dva_sim.console.wire.kinds import BadMessage, Labels, adapter_of, read_arguments
 from dva_sim.console.wire.limits import LONG, PATIENCE
 from dva_sim.console.wire.roles import Role
+
+# What the web process asks for: an action with its arguments, and who asks.
+Asked: TypeAlias = dict[str, Any]
 
 
 class ActionPlace(Flag):

@@ -2,7 +2,7 @@
 
 import json
 
-from helpers.console.served_console import places, scene
+from helpers.console.served_console import places, scene, seat
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -105,20 +105,20 @@ def test_the_story_comes_whole_or_as_a_snapshot():
     assert snap["state"]["story_from"] + len(snap["state"]["story"]) == state.told
 
 
-SEAT = {"k": "seat", "t": 1, "phase": "driving", "alert": "secret", "drives": [{"i": 4, "n": 1}]}
+SEAT = seat("c1", t=1, phase="driving", alert="secret", drives=[{"i": 4, "n": 1}])
 
 
 def test_a_page_gets_its_own_seat_whole_and_those_of_others_in_short():
     state = told(scene())
     mine, theirs = PageFeed(state, "c1"), PageFeed(state, "c2")
     all_of(mine), all_of(theirs)
-    state.take(SEAT | {"seat": "c1"})
+    state.take(SEAT)
     (line,) = all_of(mine)
     assert line["alert"] == "secret"
     (short,) = all_of(theirs)
     assert "alert" not in short
     assert (short["phase"], short["robots"]) == ("driving", [4])
-    state.take(SEAT | {"seat": "c1", "t": 2, "drives": [{"i": 4, "n": 2}]})
+    state.take(SEAT | {"t": 2, "drives": [{"i": 4, "n": 2}]})
     assert [m["t"] for m in all_of(mine)] == [2]
     assert all_of(theirs) == []  # nothing that others see of it is new
 

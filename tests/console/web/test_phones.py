@@ -7,7 +7,7 @@ from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from helpers.console.served_console import Answer, Served, serving, serving_phones
+from helpers.console.served_console import Answer, Served, seat, serving, serving_phones
 from helpers.processes.patience import PATIENCE_S
 from websockets.exceptions import ConnectionClosed, InvalidMessage, InvalidStatus
 
@@ -216,7 +216,7 @@ def test_a_page_that_lost_its_connection_unnoticed_keeps_its_name_and_a_copy_get
             with pytest.raises(ConnectionClosed):
                 list(old)
             with wss(console, f"/ws/drive?key={key}", console.phone):  # it is still here
-                console.say({"k": "seat", "seat": name, "drives": [], "phase": "held"})
+                console.say(seat(name, phase="held"))
                 while json.loads(again.recv(PATIENCE_S)).get("phase") != "held":
                     pass
 

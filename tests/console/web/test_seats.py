@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from helpers.console.served_console import serving
+from helpers.console.served_console import seat, serving
 from helpers.processes.patience import PATIENCE_S
 from websockets.exceptions import InvalidStatus
 
@@ -19,7 +19,7 @@ def console():
 def page(console):
     """A supervisor's page that drives."""
     page = console.page(console.supervise)
-    console.say({"k": "seat", "t": 5, "seat": page.client, "phase": "driving", "drives": []})
+    console.say(seat(page.client, phase="driving"))
     with page.driving() as page.drive:
         console.asked_so_far()
         yield page

@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
-from helpers.console.served_console import HOSTILE, Served, places, scene, serving
+from helpers.console.served_console import HOSTILE, Served, places, scene, seat, serving
 from helpers.processes.patience import PATIENCE_S, becomes
 from helpers.wording import unnamed
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -280,7 +280,7 @@ def test_an_action_over_the_driving_socket_and_its_seat(console):
         asked = console.next_asked("take")
         assert (asked["client"], asked["id"]) == (page.client, f"{page.client}/d1")
         console.say({"k": "done", "t": 5, "id": asked["id"], "ok": True, "text": "taken"})
-        console.say({"k": "seat", "t": 5, "seat": page.client, "phase": "held", "drives": []})
+        console.say(seat(page.client, phase="held"))
         heard = [json.loads(drive.recv(PATIENCE_S)) for _ in range(2)]
         assert [line["k"] for line in heard] == ["done", "seat"]
         assert heard[0]["id"] == "d1"

@@ -57,6 +57,12 @@ def scene(labels: tuple[str, ...] = LABELS, **more: Any) -> Line:
     return {"k": "scene", "t": 0, "scenario": "test", "site": site, "things": things, **more}
 
 
+def seat(client: str, **more: Any) -> Line:
+    """A line `seat` of a page that holds nothing."""
+    line = {"k": "seat", "t": 5, "seat": client, "label": "", "phase": "free", "order": None}
+    return line | {"alert": "", "drives": [], "phone": None} | more
+
+
 def places(t: int, *rows: list[int]) -> Line:
     """A line `pos`."""
     return {"k": "pos", "t": t, "p": list(rows)}
