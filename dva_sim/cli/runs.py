@@ -300,7 +300,10 @@ def robot(
         dva-sim robot --number 2 --port 0  # another one beside it: robot-2
     """
     from dva_sim.cli import exposure  # late: start-up
-    from dva_sim.console.alone.robot_simulator import RobotOptions, RobotSimulator  # late: start-up
+    from dva_sim.console.simulator.robot_simulator import (  # late: start-up
+        RobotOptions,
+        RobotSimulator,
+    )
 
     options = RobotOptions(open=not no_open, token=not no_token, changes=tuple(set_ or ()), **asked)
     exposure.warn_of_pages([options.host], has_token=options.token)

@@ -9,7 +9,7 @@ from pathlib import Path
 from dva_sim.console.audit.audit_keeper import check_target as check_audit_target
 from dva_sim.console.pages.addresses import own_address
 from dva_sim.console.pages.page_options import PageOptions
-from dva_sim.console.running.real_links import ConsoleSockets, MakeSockets
+from dva_sim.console.run.real_links import ConsoleSockets, MakeSockets
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError

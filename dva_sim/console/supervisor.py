@@ -12,7 +12,7 @@ from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.options import ConsoleOptions
 from dva_sim.console.pages.processes import ConsoleProcesses
 from dva_sim.console.people.actions import Actions
-from dva_sim.console.running.recorder import keep_run
+from dva_sim.console.run.recorder import keep_run
 from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError

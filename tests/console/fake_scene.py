@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from fake_phones import DVA_ADDRESS, OFFER
 
-from dva_sim.console.shown.scene import RULES, patterns_of, site_of
+from dva_sim.console.views.scene import RULES, patterns_of, site_of
 from dva_sim.worlds.site import Site, load_site
 
 PATTERN = "req-rep"

@@ -8,11 +8,11 @@ from typing import Final
 
 from dva_sim.console.attached.told import ToldDevice
 from dva_sim.console.dva.device_rows import link_of
-from dva_sim.console.running.lag import LIMIT
-from dva_sim.console.shown.feed import SEVERITIES
-from dva_sim.console.shown.scene import RULES, legend, site_of
-from dva_sim.console.shown.strangers import row_of_stranger
-from dva_sim.console.shown.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
+from dva_sim.console.run.lag import LIMIT
+from dva_sim.console.views.feed import SEVERITIES
+from dva_sim.console.views.scene import RULES, legend, site_of
+from dva_sim.console.views.strangers import row_of_stranger
+from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.events import EventFacts
 from dva_sim.console.wire.rows import DeviceRow, RobotRow
 from dva_sim.console.wire.scenes import LinkShown, SceneLine, SiteShown, ThingBody, ThingShown

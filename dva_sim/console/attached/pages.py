@@ -18,9 +18,9 @@ from dva_sim.console.attached.system import AttachedSystem
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.events.alarm_desk import AlarmDesk
 from dva_sim.console.events.decisions import about_event, dispatch_shown
-from dva_sim.console.running.lag import LagRule
-from dva_sim.console.shown.feed import story_of
-from dva_sim.console.shown.news import News, clock_shown
+from dva_sim.console.run.lag import LagRule
+from dva_sim.console.views.feed import story_of
+from dva_sim.console.views.news import News, clock_shown
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import DoingShown, RobotRow, ServerShown

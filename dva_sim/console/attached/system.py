@@ -14,7 +14,7 @@ from dva_sim.console.attached.links import AttachedLinks
 from dva_sim.console.attached.options import AttachOptions
 from dva_sim.console.attached.told import ToldSystem
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
-from dva_sim.console.running.real_links import start_of_day
+from dva_sim.console.run.real_links import start_of_day
 from dva_sim.core.registry import CONTROL_ROOM, ROBOT
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA, id_of

@@ -10,7 +10,7 @@ from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.dva.device_rows import DeviceRows
 from dva_sim.console.dva.dva_port import DvaPort
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
-from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 from dva_sim.console.asking.refusal import Refused
-from dva_sim.console.running.real_links import ConsoleSockets
+from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.wire.rows import ServerShown
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.sockets import NetworkError, split_address

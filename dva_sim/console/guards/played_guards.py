@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dva_sim.agents.people.person_guard import PersonGuard
-from dva_sim.console.shown.feed import Feed
+from dva_sim.console.views.feed import Feed
 from dva_sim.console.wire.seats import GuardLine, GuardOrder, WayThere
 from dva_sim.simulation.full.run import Run
 

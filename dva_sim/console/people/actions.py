@@ -20,7 +20,7 @@ from dva_sim.console.people.phone_actions import PhoneActions
 from dva_sim.console.people.room_actions import RoomActions
 from dva_sim.console.people.tour import tour_of
 from dva_sim.console.robots.robot_actions import RobotActions
-from dva_sim.console.running.sliders import change_pattern
+from dva_sim.console.run.sliders import change_pattern
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.arguments import FASTEST
 from dva_sim.console.wire.limits import SILENT_AFTER

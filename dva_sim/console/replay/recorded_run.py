@@ -22,10 +22,10 @@ from dva_sim.console.replay.moments import (
     set_point,
 )
 from dva_sim.console.replay.robot_lines import RobotLines, about
-from dva_sim.console.shown.feed import event_facts, moment_shown
-from dva_sim.console.shown.fields import HazardFeed
-from dva_sim.console.shown.scene import scene_of
-from dva_sim.console.shown.things import UNKNOWN_PERSON, Things, camera_shown
+from dva_sim.console.views.feed import event_facts, moment_shown
+from dva_sim.console.views.fields import HazardFeed
+from dva_sim.console.views.scene import scene_of
+from dva_sim.console.views.things import UNKNOWN_PERSON, Things, camera_shown
 from dva_sim.console.wire.events import EventsLine, HazardsLine, SiteEventShown, ToldLine
 from dva_sim.console.wire.rows import DevicesLine, DoingShown, PlacesLine, RobotRow, RobotWindowLine
 from dva_sim.console.wire.scenes import Happened, LinkShown, SceneLine, ThingBody

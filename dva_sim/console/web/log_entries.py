@@ -56,7 +56,7 @@ class Entry:
 
     @classmethod
     def of(cls, line: list[Any]) -> Entry:
-        """What the simulation says of an exchange; see `dva_sim.console.shown.logs`."""
+        """What the simulation says of an exchange; see `dva_sim.console.views.logs`."""
         number, time, data, reply, took, published = line
         answer = None if reply is None else str(reply).encode("latin-1")
         entry = cls(number, time, str(data).encode("latin-1"), answer, took, bool(published))

@@ -1,6 +1,6 @@
 """Logs of messages, as the web process keeps them, and how far each page has seen them.
 
-The world tells exchanges in batches with numbers (`dva_sim.console.shown.logs`); here the newest
+The world tells exchanges in batches with numbers (`dva_sim.console.views.logs`); here the newest
 10,000 of each log are kept, read, and filtered. A page says which logs it looks at, and how:
 
     {"do": "look", "logs": {"robot-1": {"kind": "SetTeleOp", "publications": true}}}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.console.phones.phone_seat import PhoneSeat
-from dva_sim.console.shown.feed import Feed
+from dva_sim.console.views.feed import Feed
 from dva_sim.console.wire.scenes import OrderShown
 from dva_sim.console.wire.seats import DriveShown, InputHeard, PhoneShown, SeatLine
 from dva_sim.kernel.recorder import DriveLog

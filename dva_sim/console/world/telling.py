@@ -17,15 +17,15 @@ from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.robots.stands import why_stands
-from dva_sim.console.running.lag import LagRule
-from dva_sim.console.running.recorder import ConsoleRecorder
-from dva_sim.console.running.sliders import LinkSliders
-from dva_sim.console.shown.feed import Feed
-from dva_sim.console.shown.fields import HazardFeed
-from dva_sim.console.shown.logs import Logs
-from dva_sim.console.shown.news import News, clock_shown
-from dva_sim.console.shown.scene import scene_of
-from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.run.lag import LagRule
+from dva_sim.console.run.recorder import ConsoleRecorder
+from dva_sim.console.run.sliders import LinkSliders
+from dva_sim.console.views.feed import Feed
+from dva_sim.console.views.fields import HazardFeed
+from dva_sim.console.views.logs import Logs
+from dva_sim.console.views.news import News, clock_shown
+from dva_sim.console.views.scene import scene_of
+from dva_sim.console.views.strangers import Strangers
 from dva_sim.console.wire.events import SiteEventShown
 from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell

@@ -25,14 +25,14 @@ from dva_sim.console.events.rooms import ConsoleRooms
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.phones.phones import FIRST_SEAT, Phones
 from dva_sim.console.robots.robot_windows import RobotWindows
-from dva_sim.console.running.lag import LagRule
-from dva_sim.console.running.real_links import MakeSockets
-from dva_sim.console.running.recorder import ConsoleRecorder
-from dva_sim.console.running.sliders import LinkSliders, setup_of
-from dva_sim.console.shown.feed import Feed
-from dva_sim.console.shown.fields import HazardFeed
-from dva_sim.console.shown.logs import Logs
-from dva_sim.console.shown.strangers import Strangers
+from dva_sim.console.run.lag import LagRule
+from dva_sim.console.run.real_links import MakeSockets
+from dva_sim.console.run.recorder import ConsoleRecorder
+from dva_sim.console.run.sliders import LinkSliders, setup_of
+from dva_sim.console.views.feed import Feed
+from dva_sim.console.views.fields import HazardFeed
+from dva_sim.console.views.logs import Logs
+from dva_sim.console.views.strangers import Strangers
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.world.seat_lines import SeatLines
 from dva_sim.console.world.telling import ToldWorld

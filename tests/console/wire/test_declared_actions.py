@@ -7,10 +7,10 @@ import pytest
 from helpers.console.simulated_console import Page
 from helpers.paths import ROOT
 
-from dva_sim.console.alone.robot_desk import RobotDesk
 from dva_sim.console.asking.dispatcher import ActionDispatcher
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
+from dva_sim.console.simulator.robot_desk import RobotDesk
 from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.wire import generated
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Audit
@@ -94,8 +94,8 @@ def test_each_action_of_people_has_a_row_done_or_refused(audited, action):
 
 
 def test_a_robot_alone_keeps_who_switched_it_off(tmp_path):
-    from dva_sim.console.alone.robot_simulator import RobotOptions
-    from dva_sim.console.alone.robot_world import RobotWorld
+    from dva_sim.console.simulator.robot_simulator import RobotOptions
+    from dva_sim.console.simulator.robot_world import RobotWorld
 
     world = RobotWorld(RobotOptions().read())
     keeper = AuditKeeper(tmp_path / "audit.sqlite", lambda: 1.0, {})

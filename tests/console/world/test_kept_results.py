@@ -11,7 +11,7 @@ from helpers.processes.programs import wait_until
 from helpers.wording import unnamed
 
 import dva_sim
-from dva_sim.console.running.recorder import KEPT
+from dva_sim.console.run.recorder import KEPT
 from dva_sim.console.world.kept_results import KeptResults, name_of
 from dva_sim.experiments.execution import kept_run
 from dva_sim.experiments.execution.checkpoint import load_so_far

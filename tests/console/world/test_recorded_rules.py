@@ -8,7 +8,7 @@ import pytest
 from helpers.console.simulated_phone import PhonePage
 
 from dva_sim.agents.robot.controller import Decision, RobotController
-from dva_sim.console.running.recorder import keep_run
+from dva_sim.console.run.recorder import keep_run
 from dva_sim.live.recording import Keeper, LiveRecorder
 from dva_sim.protocol import messages as m
 from dva_sim.recordings.reading import read_recording

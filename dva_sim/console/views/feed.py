@@ -10,8 +10,8 @@ from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.robots.stands import why_stands
-from dva_sim.console.running.played_run import PlayedRun
-from dva_sim.console.shown.things import Things, camera_shown
+from dva_sim.console.run.played_run import PlayedRun
+from dva_sim.console.views.things import Things, camera_shown
 from dva_sim.console.wire.events import EventFacts, StoryLine
 from dva_sim.console.wire.rows import DoingShown, PlacesLine, RobotRow
 from dva_sim.console.wire.scenes import Happened, ThingBody

@@ -20,13 +20,13 @@ from dva_sim.console.audit.audited import Audited, name_of_page
 from dva_sim.console.robots.robot_station import LISTENING, OwnStation
 from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.robots.stands import why_stands
-from dva_sim.console.running.lag import LagRule
-from dva_sim.console.running.real_links import ConsoleSockets
-from dva_sim.console.running.recorder import ConsoleRecorder
-from dva_sim.console.shown.feed import Feed
-from dva_sim.console.shown.logs import Logs
-from dva_sim.console.shown.news import News, clock_shown
-from dva_sim.console.shown.scene import scene_of
+from dva_sim.console.run.lag import LagRule
+from dva_sim.console.run.real_links import ConsoleSockets
+from dva_sim.console.run.recorder import ConsoleRecorder
+from dva_sim.console.views.feed import Feed
+from dva_sim.console.views.logs import Logs
+from dva_sim.console.views.news import News, clock_shown
+from dva_sim.console.views.scene import scene_of
 from dva_sim.console.wire.limits import LOG_PERIOD
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.scenes import LinkShown

@@ -9,10 +9,10 @@ from helpers.dva.permissions import confirmation
 from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
 
-from dva_sim.console.alone.robot_desk import RobotDesk
-from dva_sim.console.alone.robot_simulator import RobotOptions
-from dva_sim.console.alone.robot_world import RobotWorld
 from dva_sim.console.robots.robot_station import two_free_ports
+from dva_sim.console.simulator.robot_desk import RobotDesk
+from dva_sim.console.simulator.robot_simulator import RobotOptions
+from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ACTIONS
 from dva_sim.console.wire.kinds import hints_of
 from dva_sim.kernel.errors import ConfigError

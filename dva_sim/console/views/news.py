@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.console.running.lag import LagRule
+from dva_sim.console.run.lag import LagRule
 from dva_sim.console.wire.lines import Tell, Told
 from dva_sim.console.wire.rows import ClockShown
 from dva_sim.network.realtime import PacedClock

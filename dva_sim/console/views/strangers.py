@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from dva_sim.console.shown.feed import Feed
-from dva_sim.console.shown.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
+from dva_sim.console.views.feed import Feed
+from dva_sim.console.views.things import UNKNOWN_PERSON, UNKNOWN_ROBOT
 from dva_sim.console.wire.rows import RobotRow
 from dva_sim.core.registry import GUARD, ROBOT, DeviceEntry
 from dva_sim.kernel.labels import distinct

@@ -1,4 +1,4 @@
-from dva_sim.console.running.lag import GOOD_FOR, LIMIT, LagRule
+from dva_sim.console.run.lag import GOOD_FOR, LIMIT, LagRule
 
 
 def test_lag_holds_once_and_lets_go_after_it_was_good_for_a_while():

@@ -8,7 +8,7 @@ from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.running.real_links import TITLE, ConsoleSockets
+from dva_sim.console.run.real_links import TITLE, ConsoleSockets
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.sockets import NetworkError, SocketNetwork
 from dva_sim.simulation.full.stage import DVA, Stage, id_of

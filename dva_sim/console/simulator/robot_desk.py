@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dva_sim.console.alone.robot_world import RobotWorld
 from dva_sim.console.asking.dispatcher import ActionDispatcher, does
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.robots.robot_actions import RobotActions
+from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ActionPlace, Asked
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.network.addresses import check_address

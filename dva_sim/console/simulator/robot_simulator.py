@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from dva_sim.cameras.children import ChildFailed
-from dva_sim.console.alone.robot_desk import RobotDesk
-from dva_sim.console.alone.robot_world import RobotWorld
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.audit.audit_keeper import auditing
 from dva_sim.console.pages.addresses import own_address
 from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.console.pages.processes import ConsoleProcesses
+from dva_sim.console.simulator.robot_desk import RobotDesk
+from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.live.process import ending_when_asked

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from shapely.geometry import mapping
 
-from dva_sim.console.running.lag import LIMIT
+from dva_sim.console.run.lag import LIMIT
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
 from dva_sim.console.wire.scenes import (
     LegendEntry,

@@ -8,8 +8,8 @@ from typing import Any
 from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
-from dva_sim.console.running.link import changed, with_link
-from dva_sim.console.running.real_links import TITLE
+from dva_sim.console.run.link import changed, with_link
+from dva_sim.console.run.real_links import TITLE
 from dva_sim.console.wire.arguments import LINK_LIMITS
 from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import ConfigError

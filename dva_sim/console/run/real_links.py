@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from dva_sim.console.running.recorder import ConsoleRecorder
+from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.realtime import PacedClock

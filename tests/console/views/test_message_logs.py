@@ -8,7 +8,7 @@ from helpers.console.served_console import HOSTILE, scene
 from helpers.paths import ROOT
 from lxml import etree
 
-from dva_sim.console.shown.logs import CUT, Logs
+from dva_sim.console.views.logs import CUT, Logs
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.log_entries import Entry
 from dva_sim.console.web.logs import AT_ONCE, KEPT, KEPT_BYTES, KeptLogs, Looks
