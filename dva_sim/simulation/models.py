@@ -150,6 +150,10 @@ class Model(Generic[S]):
             ConfigError: what cannot be read or placed.
         """
 
+    def lacks(self, scenario: S) -> str:
+        """One line that says what a run needs and this machine lacks; empty if nothing."""
+        return ""
+
     def contradictions(self, scenario: S) -> list[str]:
         """What in a scenario does not go together, each in a sentence."""
         return []
@@ -278,8 +282,8 @@ class _Middleware(Model[MiddlewareScenario]):
     build = staticmethod(middleware.build)
     simulate = staticmethod(middleware.measure)
 
-    def rehearse(self, scenario: MiddlewareScenario, seed: int) -> None:
-        middleware.rehearse(scenario)
+    def lacks(self, scenario: MiddlewareScenario) -> str:
+        return middleware.lacks(scenario)
 
     def rows(self, recording: middleware.MiddlewareRun, with_tracks: bool = False) -> Tables:
         return middleware.tables(recording)

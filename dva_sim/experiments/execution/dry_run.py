@@ -22,7 +22,7 @@ from dva_sim.experiments.study.cell_grid import DesignCell, RunKey, StudyJob
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.experiments.study.stopping import rounds
 from dva_sim.experiments.study.study import Study
-from dva_sim.kernel.errors import RunTooLong
+from dva_sim.kernel.errors import ConfigError, RunTooLong
 from dva_sim.simulation.models import model_for
 
 PROBE_S = 5.0  # after so long no further run is tried,
@@ -189,10 +189,13 @@ def rehearse_all(
         The study's plan, to be run.
 
     Raises:
-        ConfigError: what cannot be read, placed or recorded.
+        ConfigError: what cannot be read, placed or recorded, or what this machine lacks.
     """
     plan = StudyPlan.of(study)
     refuse_what_cannot_be_recorded(plan)
+    missing = {model_for(cell.scenario).lacks(cell.scenario): None for cell in plan.rehearsed}
+    if told := list(filter(None, missing)):
+        raise ConfigError("; ".join(told))
     for done, cell in enumerate(plan.rehearsed, 1):
         cell_grid.rehearse(study, cell)
         progress(done, len(plan.rehearsed))

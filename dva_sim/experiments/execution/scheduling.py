@@ -88,7 +88,8 @@ def perform(
 
 def clock_of(job: StudyJob) -> Callable[[], float]:
     """What tells the cost of a run [s]: CPU time, or the wall clock where it is real time."""
-    return time.monotonic if model_for(job.scenario).is_real_time else time.thread_time
+    is_real_time = job.scenario is not None and model_for(job.scenario).is_real_time
+    return time.monotonic if is_real_time else time.thread_time
 
 
 def perform_chunk(

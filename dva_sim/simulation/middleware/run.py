@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -19,6 +20,7 @@ from dva_sim.network.emulator.enter import KILL_ALL
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import ADDRESSES, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
+from dva_sim.network.link import LinkConfig
 from dva_sim.network.middleware import SIDES, Side, load_transport, programs
 from dva_sim.network.middleware.programs import (
     NOT_CONNECTED,
@@ -67,28 +69,30 @@ class MiddlewareRun(NamedTuple):
         return self.link.is_disturbed
 
 
-def rehearse(scenario: MiddlewareScenario) -> None:
-    """See that the transport and the link work here.
-
-    Raises:
-        ConfigError: what is missing.
-    """
+def lacks(scenario: MiddlewareScenario) -> str:
+    """One line that says what the transport or the link needs here; empty if nothing."""
     choice = scenario.transport
-    if missing := load_transport(choice.name, choice.options)().lacks():
-        raise ConfigError(missing)
+    return load_transport(choice.name, choice.options)().lacks() or _why_no_link()
+
+
+@cache
+def _why_no_link() -> str:
     try:
-        LinkProcess(scenario.link, 1).close()
+        LinkProcess(LinkConfig(), 1).close()
     except EmulatorError as error:
-        raise ConfigError(str(error)) from None
+        return str(error)
+    return ""
 
 
 def measure(scenario: MiddlewareScenario, seed: int) -> MiddlewareRun:
     """Run until the link was punctual, as often as the scenario allows.
 
     Raises:
-        EmulatorError: the link cannot be set up.
+        ConfigError: the transport or the link needs something that is missing here.
         RunsFailed: a program failed otherwise than by finding no connection.
     """
+    if missing := lacks(scenario):
+        raise ConfigError(missing)
     attempt = 1
     while (run := _attempt(scenario, seed, attempt)).is_disturbed and attempt < scenario.attempts:
         attempt += 1

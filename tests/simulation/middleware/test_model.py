@@ -4,12 +4,14 @@ import math
 
 import pytest
 from helpers.network.emulated_link import need_link
+from helpers.wording import unnamed
 
+from dva_sim.experiments.execution.dry_run import rehearse_all
 from dva_sim.experiments.execution.runner import _at_random, _workers
 from dva_sim.experiments.study.loading import load_study
 from dva_sim.experiments.study.plan import StudyPlan
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.simulation.middleware import build, measure, rehearse, tables
+from dva_sim.simulation.middleware import build, lacks, measure, tables
 from dva_sim.simulation.models import MODELS
 
 SHORT = {"model": "middleware", "set_up_s": 1.5, "measure_s": 1.0, "attempts": 1}
@@ -51,8 +53,13 @@ def test_where_no_packet_passes_nothing_is_connected_and_that_is_a_result():
 def test_what_is_not_installed_is_said_before_the_first_run(monkeypatch):
     monkeypatch.setattr("shutil.which", lambda _: None)
     monkeypatch.setattr("dva_sim.network.middleware.ends.find_spec", lambda _: None)
-    with pytest.raises(ConfigError, match=r"dva-sim\[mqtt\]"):
-        rehearse(build(SHORT | {"transport": {"name": "mqtt"}}))
+    scenario = build(SHORT | {"transport": {"name": "mqtt"}})
+    assert unnamed(lacks(scenario), "paho", "dva-sim[mqtt]") == []
+    with pytest.raises(ConfigError, match="paho"):
+        measure(scenario, 1)
+    with pytest.raises(ConfigError, match="paho") as refused:
+        rehearse_all(load_study("middleware"))
+    assert unnamed(str(refused.value), "[mqtt]", "[zenoh]", "[webrtc]", "[dds]") == []
 
 
 @pytest.mark.parametrize(
