@@ -16,7 +16,7 @@ from dva_sim.serving.pipes import LineKinds, LinePipe
 SERVING_WITHIN = 30.0  # from the start of the web process to its first word [s]
 END_WITHIN = 0.8  # for a child to end by itself once it is asked to [s]
 MOST_SAID = 10_000  # of what a child says on standard error [B]
-# Lines for whoever draws pictures.
+# Lines for the process that draws pictures.
 PAINTED = LineKinds(newest=frozenset({"frame"}), kept=frozenset({"scene", "contain"}))
 
 
@@ -34,7 +34,7 @@ class Child:
         module: What it runs.
         words: Its further arguments.
         others: Sockets that it gets beside its pipe.
-        kinds: Of the lines that it is told.
+        kinds: The kinds of lines that are sent to it.
 
     Attributes:
         pipe: Our end.

@@ -1,4 +1,4 @@
-"""The lines that whoever draws is told; times are of the run's clock [ms]."""
+"""Lines sent to the process that draws pictures; times are of the run's clock [ms]."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing_extensions import TypedDict
 
 
 class DrawnSceneLine(TypedDict):
-    """What there is to be seen."""
+    """Everything that can appear in a picture."""
 
     k: Literal["scene"]
     t: int
@@ -25,7 +25,7 @@ class ContainedLine(TypedDict):
 
 
 class FrameLine(TypedDict):
-    """What was true when a frame was taken that has arrived.
+    """The state of the world when a frame that has arrived was taken.
 
     `figures`: of each the kind, number, place [m], heading [rad] and what it does.
     """
@@ -43,7 +43,7 @@ PaintersLine: TypeAlias = DrawnSceneLine | ContainedLine | FrameLine
 
 
 class Show(Protocol):
-    """Takes lines for whoever draws, and a key for those of which the newest counts."""
+    """Takes lines for the drawing process, with a key where only the newest line counts."""
 
     def __call__(self, line: PaintersLine, key: object = "", /) -> object:
         """Take one."""
@@ -55,5 +55,5 @@ def contained_line(number: int, when: float) -> ContainedLine:
 
 
 def scene_line(scenario: dict[str, Any], seed: int) -> DrawnSceneLine:
-    """What there is to be seen, by the scenario as plain data."""
+    """Everything that can appear in a picture, as the scenario's plain data."""
     return {"k": "scene", "t": 0, "scenario": scenario, "seed": seed}

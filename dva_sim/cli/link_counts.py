@@ -54,7 +54,7 @@ def tell(line: str) -> None:
 
 
 def in_words(report: LinkReport, names: Sequence[str] = tuple(_WAYS)) -> list[str]:
-    """What became of the packets, and whether the emulator was punctual, in lines.
+    """Describe in lines the fate of the packets, and how punctual the emulator was.
 
     Args:
         report: The counts.

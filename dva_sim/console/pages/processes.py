@@ -42,7 +42,7 @@ class ConsoleSubject(Protocol):
     Attributes:
         clock: Its time, at its pace.
         tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for whoever draws pictures, likewise.
+        show: Takes lines for the process that draws pictures, likewise.
         dropped: How many lines for pages were dropped so far.
     """
 

@@ -1,1 +1,1 @@
-"""What people at pages ask of a console's own run."""
+"""Actions that people at pages ask of a console's own run."""

@@ -1,4 +1,4 @@
-"""What people at pages ask for: each action is done once, and answered once.
+"""Actions that people at pages ask for: each is done once, and answered once.
 
 Seats are given out here. Whatever ends a drive ends it for good: nothing begins again by itself.
 """

@@ -40,7 +40,7 @@ class Player:
 
     Attributes:
         tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for whoever draws pictures, likewise.
+        show: Takes lines for the process that draws pictures, likewise.
         audit: The audit log in the recording.
         take: Does what a page asks for; what would tell somebody something is refused.
     """

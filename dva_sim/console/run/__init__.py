@@ -1,1 +1,1 @@
-"""What a console needs of a run in real time: its memory, its links and its lag."""
+"""Parts of a run in real time that a console needs: its recorder, its links and its lag."""

@@ -68,7 +68,7 @@ class RobotWorld:
         audited: Keeps who did what, once that is wanted.
         windows: Its windows.
         tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for whoever draws pictures, likewise.
+        show: Takes lines for the process that draws pictures, likewise.
 
     Raises:
         ConfigError: the site has no place for it.

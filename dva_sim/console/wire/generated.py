@@ -55,7 +55,7 @@ def line_types() -> str:
     for one in get_args(ToPage):
         _declare(one, found)
     told = " | ".join(map(name_of, get_args(ToPage)))
-    union = _typedef("A line that a page is told.", f"({told}) & {{s?: number}}", "ToPage")
+    union = _typedef("A line sent to a page.", f"({told}) & {{s?: number}}", "ToPage")
     head = "// Written by dva_sim/console/wire/generated.py.\n"
     return head + "".join((*found.values(), union)) + "export {};\n"
 

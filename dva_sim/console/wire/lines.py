@@ -30,7 +30,7 @@ from dva_sim.console.wire.scenes import EmptySceneLine, SceneLine
 from dva_sim.console.wire.seats import DoneLine, GuardLine, SeatLine
 from dva_sim.serving.pipes import LineKinds
 
-# What a console tells the web process.
+# Lines from a console to the web process.
 Told: TypeAlias = (
     SceneLine
     | EmptySceneLine
@@ -53,7 +53,7 @@ Told: TypeAlias = (
     | DoneLine
     | ByeLine
 )
-# What that tells pages, with a number `s`.
+# Lines from the web process to pages, numbered by `s`.
 ToPage: TypeAlias = (
     SnapLine
     | MovedLine

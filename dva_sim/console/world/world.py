@@ -66,7 +66,7 @@ class ConsoleWorld(ToldWorld):
         windows: Those of the robots.
         dva: The DVA as people see and serve it.
         tell: Takes lines for pages, and a key for those of which the newest counts.
-        show: Takes lines for whoever draws pictures, likewise.
+        show: Takes lines for the process that draws pictures, likewise.
 
     Raises:
         ConfigError: the site cannot hold the team, or the events.

@@ -350,7 +350,7 @@
  * @typedef {{k: 'pong', at: any, now: number}} Pong
  */
 /**
- * A line that a page is told.
+ * A line sent to a page.
  * @typedef {(Snap | Moved | Rows | RobotWindow | Devices | Hazards | Events | Control | Alarms |
  *   Audit | Story | Told | Seat | OtherSeat | Guard | Log | Shelf | Pictures | Done | Bye | You |
  *   Pong) & {s?: number}} ToPage
