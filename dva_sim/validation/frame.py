@@ -11,6 +11,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -80,12 +81,13 @@ def play_jobs(
         RunsFailed: one of them failed.
     """
     rows: dict[Key, list[Row]] = {}
-    for batch in run_all(jobs, program, executors.local(workers)):
-        for outcome in batch:
-            if outcome.error is not None:
-                raise RunsFailed(f"{failed.format(outcome.key[0])}: {outcome.error}")
-            rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
-        progress(sum(map(count, rows.values())))
+    with executors.local(workers) as here, closing(run_all(jobs, program, here)) as batches:
+        for batch in batches:
+            for outcome in batch:
+                if outcome.error is not None:
+                    raise RunsFailed(f"{failed.format(outcome.key[0])}: {outcome.error}")
+                rows[outcome.key] = json.loads(outcome.tables or "")["rows"]
+            progress(sum(map(count, rows.values())))
     return rows
 
 

@@ -182,15 +182,18 @@ def test_too_few_open_files_are_told_with_how_many_it_takes(monkeypatch):
     open_files.check_room_for(1)
 
 
-def test_locks_that_cannot_be_shared_are_told_with_the_way_around(monkeypatch):
+def test_a_process_that_cannot_be_started_is_told_with_the_way_around(monkeypatch):
     def refuse(*_, **__):
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
 
-    monkeypatch.setattr(executors, "_WithoutScript", refuse)
-    workers = executors.LocalProcesses(2)
-    with pytest.raises(DvaSimError) as error, workers.executor(2, load_study):
-        pass
-    assert unnamed(str(error.value), "/dev/shm", "--jobs 1") == []
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    with (
+        pytest.raises(DvaSimError) as error,
+        executors.LocalProcesses(2) as workers,
+        workers.executor(2, load_study) as pool,
+    ):
+        pool.submit(load_study).result()
+    assert unnamed(str(error.value), "Resource temporarily unavailable", "--jobs") == []
 
 
 @pytest.mark.parametrize("name", ["dispatch", "network", "operators"])

@@ -166,6 +166,9 @@ def faults_of(node: ast.AST, room: str) -> Iterator[str]:
             yield f"reads source: ast.{node.attr}"
         if node.value.id == "sys" and node.attr in ("meta_path", "path_hooks"):
             yield f"takes part in imports of others: sys.{node.attr}"
+    elif isinstance(node, ast.Subscript):
+        if re.fullmatch(r"(sys\.)?modules\['__main__'\]", ast.unparse(node)):
+            yield "meddles with the script of a user"
     elif isinstance(node, ast.Call):
         yield from _faults_of_call(node)
     elif isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -249,6 +252,7 @@ def test_a_private_name_that_none_of_ours_has_is_found_where_it_is_read(read):
         ("from sys import modules\nmodules[package] = module", "stands in"),
         ("del sys.modules['numpy']", "stands in"),
         ("sys.meta_path.append(finder)", "imports of others"),
+        ("main = vars(sys.modules['__main__'])", "script of a user"),
         ("import ast\nast.parse(text)", "reads source"),
         ("from ast import parse", "reads source"),
         ("class A:\n    teller = 'dva_sim.cli.stories:tell_any'", "above"),

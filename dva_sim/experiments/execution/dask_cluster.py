@@ -21,6 +21,8 @@ from contextlib import ExitStack, contextmanager
 from functools import cache, partial
 from typing import Any, ParamSpec, TypeVar
 
+from typing_extensions import override
+
 from dva_sim.experiments.execution.executors import Workers, WorkersLost
 from dva_sim.experiments.results.manifest import versions
 from dva_sim.kernel.errors import ConfigError, DvaSimError
@@ -73,10 +75,8 @@ class DaskCluster(Workers):
             self._open = self._open.pop_all()
         self._seen = time.monotonic()
 
-    def __enter__(self) -> DaskCluster:
-        return self
-
-    def __exit__(self, *_: object) -> None:
+    @override
+    def close(self) -> None:
         self._open.close()
 
     @property

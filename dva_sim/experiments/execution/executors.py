@@ -5,26 +5,24 @@ They give executors of `concurrent.futures`; who hands out runs knows nothing el
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
-import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, suppress
-from multiprocessing.process import BaseProcess
-from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from typing import Any, ParamSpec, Self, TypeVar
 
+from typing_extensions import override
+
+from dva_sim.experiments.execution.worker_process import WorkerDied, WorkerProcess
 from dva_sim.kernel.errors import ConfigError, DvaSimError, RunsFailed
 from dva_sim.kernel.rare_collection import collect_rarely
 
 P = ParamSpec("P")
 R = TypeVar("R")
-_FAMILY = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
 class WorkersLost(RunsFailed):
@@ -41,6 +39,15 @@ class Workers(ABC):
 
     is_here = False
     deaths: tuple[type[Exception], ...] = ()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:  # noqa: B027
+        """Let the workers go; nothing has to be done."""
 
     @property
     @abstractmethod
@@ -112,26 +119,31 @@ class LocalProcesses(Workers):
     """Processes of this machine."""
 
     width = 0  # each has its own
-    deaths = (BrokenProcessPool,)
+    deaths = (WorkerDied,)
 
     def __init__(self, width: int) -> None:
         self.width = width
-        self._stopped: set[int] = set()
+        self._all: set[WorkerProcess] = set()
+        self._idle: list[WorkerProcess] = []
+        self._stopped: set[WorkerProcess] = set()
+        self._is_over = False
 
     @contextmanager
     def executor(self, width: int, task: Callable[..., Any]) -> Iterator[Executor]:
-        """A pool whose processes are gone when the block ends, at once if it ends in an error."""
-        context = multiprocessing.get_context(_FAMILY)
-        self._others = set(multiprocessing.active_children())
-        context.set_forkserver_preload([task.__module__])
-        kind = ProcessPoolExecutor if task.__module__ == "__main__" else _WithoutScript
-        try:
-            pool = kind(min(width, self.width), context, initializer=_begin)
-        except OSError as error:  # its locks lie there
-            raise DvaSimError(
-                f"processes cannot share locks: {error.strerror}; is /dev/shm there and writable? "
-                "--jobs 1 needs none"
-            ) from None
+        """Threads that each wait for a process; an error in the block ends these at once.
+
+        Raises:
+            ConfigError: the task is defined in the script that was started.
+        """
+        defined = getattr(task, "func", task)  # of a partial
+        if defined.__module__ == "__main__":
+            raise ConfigError(
+                f"other processes know nothing of a script, so not its {defined.__qualname__} "
+                "either: put that into a module of its own, or use one process (jobs=1)"
+            )
+        # What a thread starts inherits its signal mask: Ctrl-C is for this process alone.
+        mask = signal.SIG_BLOCK, {signal.SIGINT}
+        pool = _Handing(self._do, min(width, self.width), signal.pthread_sigmask, mask)
         with _ctrl_c_held_back(self._kill) as self._let_through:
             try:
                 yield pool
@@ -141,14 +153,47 @@ class LocalProcesses(Workers):
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)
 
-    def _processes(self) -> set[BaseProcess]:
-        """Processes that were started since the pool was made."""
-        return set(multiprocessing.active_children()) - self._others
+    def _do(self, task: Callable[[], R]) -> R:
+        """Have a task done by a process that is idle, or by a new one.
+
+        Raises:
+            WorkerDied: the process did not live to answer.
+            DvaSimError: no more processes can be started.
+        """
+        process = self._idle.pop() if self._idle else self._started()
+        try:
+            answer: R = process.call(task)
+        except BaseException:
+            process.kill()
+            process.close()
+            raise
+        self._idle.append(process)
+        return answer
+
+    def _started(self) -> WorkerProcess:
+        try:
+            process = WorkerProcess()
+        except OSError as error:
+            raise DvaSimError(
+                f"no further process can be started: {error.strerror}; give fewer --jobs"
+            ) from None
+        self._all.add(process)
+        if self._is_over:
+            process.kill()
+        process.call(collect_rarely)
+        return process
 
     def _kill(self) -> None:
-        for process in self._processes():
+        self._is_over = True
+        for process in list(self._all):
             process.kill()
 
+    @override
+    def close(self) -> None:
+        for process in self._all:
+            process.close()
+
+    @override
     def look_after(self, is_idle: bool) -> None:
         """End a process that has been stopped for some time: another one does what it had.
 
@@ -156,12 +201,22 @@ class LocalProcesses(Workers):
             KeyboardInterrupt: Ctrl-C was pressed.
         """
         self._let_through()
-        pids = {process.pid for process in self._processes()} if is_idle else set()
-        stopped = {pid for pid in pids if pid is not None and _is_stopped(pid)}
-        for pid in stopped & self._stopped:
-            with suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
+        stopped = {each for each in list(self._all) if is_idle and each.is_stopped}
+        for process in stopped & self._stopped:
+            process.kill()
         self._stopped = stopped
+
+
+class _Handing(ThreadPoolExecutor):
+    """Threads that hand on what they are given."""
+
+    def __init__(self, do: Callable[[Callable[[], Any]], Any], width: int, *initial: Any) -> None:
+        super().__init__(width, "worker", *initial)
+        self._do = do
+
+    @override
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        return super().submit(self._do, partial(fn, *args, **kwargs))
 
 
 @contextmanager
@@ -192,44 +247,3 @@ def _ctrl_c_held_back(at_once: Callable[[], object]) -> Iterator[Callable[[], No
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     let_through()
-
-
-class _WithoutScript(ProcessPoolExecutor):
-    """Processes that do not run the script of whoever started the study.
-
-    They would run it again to find what it defines, and none of that is needed: without
-    `if __name__ == "__main__"` in the script, they would start the same study anew.
-    """
-
-    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """Start a process, if need be, while nothing tells it of the script."""
-        main = vars(sys.modules["__main__"])
-        hidden: dict[str, Any] = {
-            name: main.pop(name) for name in ("__file__", "__spec__") if name in main
-        }
-        main["__spec__"] = None  # as of a script without a name
-        try:
-            return super().submit(fn, *args, **kwargs)
-        finally:
-            main.update(hidden)
-
-
-def _is_stopped(pid: int) -> bool:
-    """Whether a signal has stopped a process, where the system tells."""
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
-    return False
-
-
-def _begin() -> None:
-    """Leave Ctrl-C to the parent, and end with it however it ends."""
-    collect_rarely()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

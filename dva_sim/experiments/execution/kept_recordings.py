@@ -105,8 +105,10 @@ def _record(
     tell(done, total)
     problems = []
     try:
-        workers = executors.local(jobs)
-        with closing(scheduling.run_all(rest, Rerun(folder, prints), workers, limit_s)) as batches:
+        with (
+            executors.local(jobs) as workers,
+            closing(scheduling.run_all(rest, Rerun(folder, prints), workers, limit_s)) as batches,
+        ):
             for outcome in (outcome for batch in batches for outcome in batch):
                 done += outcome.error is None
                 problems += [] if outcome.error is None else [outcome.error]

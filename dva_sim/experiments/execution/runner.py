@@ -236,7 +236,8 @@ def _workers(plan: StudyPlan, jobs: int | None, scheduler: str | None) -> Iterat
             )
         jobs = 1
     if scheduler is None:
-        yield executors.local(jobs)
+        with executors.local(jobs) as processes:
+            yield processes
         return
     if jobs is not None:
         raise ConfigError("give the number of processes or a scheduler, not both")

@@ -58,6 +58,7 @@ def test_the_manifest_says_what_was_asked_and_changed(tmp_path):
     assert results.failures == []
 
 
+@pytest.mark.system
 def test_two_processes_write_the_same_bytes_as_one(tmp_path, plain):
     seen = []
     out = run_study(
@@ -148,6 +149,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path, plain, starte
     assert kit.files(run_study(kit.study_in(tmp_path), out, jobs=1, episode=kit.cheap)) == plain
 
 
+@pytest.mark.system
 def test_ctrl_c_while_a_lock_of_the_pool_is_taken_ends_the_run_all_the_same(tmp_path, monkeypatch):
     """Raised there it would leave the lock taken; then nobody could end the pool."""
 
@@ -175,7 +177,7 @@ def test_of_two_runners_on_one_folder_one_makes_the_study(tmp_path, plain, start
     assert kit.files(out) == plain
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.system)])
 def test_a_run_that_fails_is_named_and_the_others_go_on_and_it_is_tried_again(
     tmp_path, plain, jobs
 ):

@@ -90,6 +90,6 @@ def test_a_seed_whose_runs_take_long_is_parted(tmp_path, monkeypatch):
 
 def test_workers_look_for_garbage_rarely_and_this_process_as_before():
     before = gc.get_threshold()
-    with LocalProcesses(1).executor(1, len) as pool:
+    with LocalProcesses(1) as workers, workers.executor(1, len) as pool:
         assert pool.submit(gc.get_threshold).result()[0] == 20_000
     assert gc.get_threshold() == before

@@ -46,6 +46,7 @@ def study_with(tmp_path, measures="[mine.py:Mine]", code=MEASURE, text=SMALL):
     return study_in(tmp_path, text=f"{text}measures: {measures}\n")
 
 
+@pytest.mark.system
 def test_a_study_measures_what_a_file_beside_it_says_in_every_process(tmp_path):
     study = study_with(tmp_path)
     run_study(study, tmp_path / "two", jobs=2)

@@ -184,13 +184,15 @@ def rows(folder: Path) -> list[int]:
 
 
 def main() -> None:
+    from helpers.studies import small_study  # by the name that other processes know it by
+
     study, out, jobs = sys.argv[1:]
     try:
         run_study(
             load_study(study),
             out,
             jobs=int(jobs),
-            episode=slower,
+            episode=small_study.slower,
             progress=lambda done, _: print(done, flush=True),
         )
     except KeyboardInterrupt as stop:
