@@ -102,7 +102,7 @@ class _Line:
         headings = np.arctan2([leg[3] for leg in self.legs], [leg[2] for leg in self.legs])
         turns = np.abs(np.remainder(np.diff(headings) + math.pi, 2.0 * math.pi) - math.pi)
         self._turned: list[float] = [0.0, *np.cumsum(turns).tolist()]  # in all, up to each piece
-        self.begin = _Place(0, 0.0, *corners[0], math.inf)
+        self.begin = _Place(0, 0.0, *corners[0], offset=math.inf)
         self._last: _Place | None = None
         self._found = self.begin
 
@@ -153,7 +153,7 @@ class _Line:
             if at[i] > away and i < until:
                 i = until
         leg, along, away_x, away_y = found
-        return _Place(leg, along, x, y, math.hypot(away_x, away_y))
+        return _Place(leg, along, x, y, offset=math.hypot(away_x, away_y))
 
 
 class Route:

@@ -104,7 +104,7 @@ class Eyes:
 
 def figure_of(kind: str, index: int, x: float, y: float, heading: float, activity: str) -> Figure:
     """Somebody who was near."""
-    return Figure(kind, x, y, heading, index, activity == DOWN)
+    return Figure(kind, x, y, heading, number=index, lying=activity == DOWN)
 
 
 class Encoder:

@@ -420,8 +420,8 @@ class Orders:
             fact.label,
             fact.action,
             fact.time,
-            fact.cause,
-            self.label_of(fact.device) if fact.device else "",
+            reason=fact.cause,
+            device=self.label_of(fact.device) if fact.device else "",
         )
         event.handling.decide(choice)
         self.book.touch(event)

@@ -244,7 +244,11 @@ class _Trial:
             heading += wanted.turn_rate * FRAME
             y += push if number == round(PUSHED_AT / FRAME) else 0.0
             tick = round(1000 * (number + 1) * FRAME)
-            pictures.append(Observation(tick, x, y, heading, *wanted, ()))
+            pictures.append(
+                Observation(
+                    tick, x, y, heading, speed=wanted.speed, turn_rate=wanted.turn_rate, hazards=()
+                )
+            )
             if self._rests(track):
                 break
         self.took.append(spent / len(track))

@@ -174,7 +174,7 @@ class GuardedDrive(Guard, Drive):
         spec, given = self.spec, (speed, turn_rate, now_speed, now_turn_rate, dt)
         got = self._answer(self.drive.accelerations, *given)
         along, turn = got or (-now_speed / dt, -now_turn_rate / dt)
-        self._judge_motion(along, turn, now_speed, now_turn_rate, dt)
+        self._judge_motion(along, turn, now_speed, now_turn_rate, dt=dt)
         # Who was pushed beyond a limit comes back as fast as the accelerations allow.
         along = _within(along, -now_speed / dt, (spec.max_speed - now_speed) / dt)
         most = spec.max_turn_rate

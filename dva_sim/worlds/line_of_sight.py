@@ -52,14 +52,15 @@ class Sight:
         seen = np.ones(len(flat), bool)
         ends = self._ends.T.reshape(-1, 2, 2)
         for (px, py), (qx, qy) in ends.tolist():
-            (x, y), on_line = flat.T, ON_LINE * math.hypot(qx - px, qy - py)
-            side_a, sides = _side(px, py, qx, qy, *a), _side(px, py, qx, qy, x, y)
+            p, q, on_line = (px, py), (qx, qy), ON_LINE * math.hypot(qx - px, qy - py)
+            side_a, sides = _side(p, q, a), _side(p, q, flat.T)
             across = (np.minimum(side_a, sides) < -on_line) & (np.maximum(side_a, sides) > on_line)
-            ends_apart = _side(*a, x, y, px, py) * _side(*a, x, y, qx, qy) < 0
+            ends_apart = _side(a, flat.T, p) * _side(a, flat.T, q) < 0
             seen &= ~(across & ends_apart)
         return seen.reshape(points.shape[:-1])
 
 
-def _side(px: Any, py: Any, qx: Any, qy: Any, x: Any, y: Any) -> Any:
+def _side(p: Any, q: Any, point: Any) -> Any:
     """On which side of the line p-q a point lies, by sign."""
+    (px, py), (qx, qy), (x, y) = p, q, point
     return (qx - px) * (y - py) - (qy - py) * (x - px)

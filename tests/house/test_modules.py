@@ -3,7 +3,7 @@
 import ast
 import re
 import tomllib
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -43,11 +43,16 @@ def tree_of(path: Path) -> ast.Module:
 
 
 @cache
+def nodes_of(path: Path) -> list[ast.AST]:
+    return list(ast.walk(tree_of(path)))
+
+
+@cache
 def late_in(path: Path) -> list[ast.ImportFrom]:
     """The imports of ours inside functions and below conditions."""
     if not re.search(r"^ +(from|import) dva_sim", path.read_text(encoding="utf-8"), re.MULTILINE):
         return []
-    inner = [node for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom)]
+    inner = [node for node in nodes_of(path) if isinstance(node, ast.ImportFrom)]
     return [node for node in inner if node.col_offset and set(imports_of([node]))]
 
 
@@ -187,15 +192,82 @@ def _faults_of_import(names: Iterable[str]) -> Iterator[str]:
 
 
 def _faults_of_call(call: ast.Call) -> Iterator[str]:
-    called = getattr(call.func, "attr", getattr(call.func, "id", ""))
+    called, given = _called(call), _by_place(call)
     if called == "set_threshold":
         yield "sets when garbage is looked for"
+    if given > MOST_ARGUMENTS and called not in VARIADIC:
+        yield f"may exchange arguments: {called} with {given} by their place"
+
+
+def _called(call: ast.Call) -> str:
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def _by_place(call: ast.Call) -> int:
     given = 0
     for each in call.args:
         spread = isinstance(each, ast.Starred) and isinstance(each.value, ast.Tuple | ast.List)
         given += len(each.value.elts) if spread else 1
-    if given > MOST_ARGUMENTS and called not in VARIADIC:
-        yield f"may exchange arguments: {called} with {given} by their place"
+    return given
+
+
+MOST_ALIKE = 4
+OF_PLUGINS = {"accelerations"}
+"""What classes of users define: only its arguments' places are known."""
+ALIKE = {
+    "number": r"float|int|bool",
+    "text": r"str|Literal\[.*",
+    "array": r"NDArray\b.*|Floats|Ints|Integers|Flags",
+    "callable": r"Callable\b.*",
+}
+
+
+def kinds_of(arguments: Iterable[ast.expr | None]) -> list[str]:
+    """Kinds of values, by their annotations, of which a type check lets one pass for another."""
+    plain = [ast.unparse(each or ast.Constant(0)).removesuffix(" | None") for each in arguments]
+    return [
+        next((kind for kind, words in ALIKE.items() if re.fullmatch(words, each)), each)
+        for each in plain
+    ]
+
+
+def signatures(nodes: Iterable[ast.AST]) -> dict[str, list[list[str]]]:
+    """Kinds of the arguments of all functions and classes, by the names that they are called by."""
+    found, others = defaultdict(list), []
+    for scope in nodes:
+        of_class, body = isinstance(scope, ast.ClassDef), getattr(scope, "body", ())
+        fields = []
+        for node in body if isinstance(body, list) else ():
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                own = any(ast.unparse(each) == "staticmethod" for each in node.decorator_list)
+                given = [*node.args.posonlyargs, *node.args.args][of_class and not own :]
+                made = of_class and node.name in ("__init__", "__new__")
+                kinds = kinds_of(argument.annotation for argument in given)
+                found[scope.name if made else node.name].append(kinds)
+            elif isinstance(node, ast.AnnAssign) and of_class:
+                fields.append(node.annotation)
+            elif isinstance(node, ast.Assign) and re.match(r"maker\(", ast.unparse(node.value)):
+                others.append((ast.unparse(node.targets[0]), ast.unparse(node.value.args[0])))
+        if fields:
+            found[scope.name].append(kinds_of(fields))
+    for name, kind in others:
+        found[name] += found[kind.rpartition(".")[2]]
+    return found
+
+
+def exchangeable(nodes: Iterable[ast.AST], known: dict[str, list[list[str]]]) -> list[str]:
+    """Calls with more arguments of one kind by their place than anybody can tell apart."""
+    return [
+        f"{_called(call)} with {count} {kind} by their place"
+        for call in nodes
+        if isinstance(call, ast.Call)
+        and _by_place(call) > MOST_ALIKE
+        and _called(call) not in OF_PLUGINS
+        for kinds in known.get(_called(call), ())
+        if len(kinds) >= _by_place(call)
+        for kind, count in Counter(kinds[: _by_place(call)]).items()
+        if count > MOST_ALIKE
+    ]
 
 
 OF_TUPLES = {"_asdict", "_fields", "_make", "_replace"}
@@ -220,16 +292,14 @@ def read_of_others(nodes: Iterable[ast.AST]) -> set[str]:
 
 
 def test_no_module_does_what_none_should():
-    found, every = {}, []
+    found = {}
     for name, path in MODULES.items():
         room = name.split(".")[1] if "." in name else ""
-        nodes = list(ast.walk(tree_of(path)))
-        faults = [fault for node in nodes for fault in faults_of(node, room)]
-        every.append(nodes)
+        faults = [fault for node in nodes_of(path) for fault in faults_of(node, room)]
         if faults:
             found[name] = faults
     assert found == {"dva_sim.kernel.rare_collection": ["sets when garbage is looked for"]}
-    assert read_of_others(chain.from_iterable(every)) == set()
+    assert read_of_others(chain.from_iterable(map(nodes_of, MODULES.values()))) == set()
 
 
 @pytest.mark.parametrize(
@@ -266,6 +336,44 @@ def test_a_private_name_that_none_of_ours_has_is_found_where_it_is_read(read):
 def test_what_none_should_do_is_found_where_it_is_done(source, fault):
     (found,) = [f for node in ast.walk(ast.parse(source)) for f in faults_of(node, "simulation")]
     assert fault in found
+
+
+def test_no_call_has_many_arguments_of_one_kind_by_their_place():
+    nodes = list(chain.from_iterable(map(nodes_of, MODULES.values())))
+    assert exchangeable(nodes, signatures(nodes)) == []
+
+
+@pytest.mark.parametrize(
+    ("call", "is_fault"),
+    [
+        ("drive(1, 2.0, True, 3, 4.0)", True),
+        ("drive(1, 2.0, True, 3, dt=4.0)", False),
+        ("self._drive.drive(*(1, 2.0), True, 3, 4.0)", True),
+        ("Place('a', 1, 2, 3, 4, 5)", True),
+        ("make_place('a', 1, 2, 3, 4, 5)", True),
+        ("Place('a', 1, 2, 3, 4, z=5)", False),
+        ("Named('a', 'b', 'c', 'd', 'e')", True),
+        ("Named('a', 'b', 1, 'd', 'e')", True),
+        ("mixed(1, 'a', 2, 'b', [], 3)", False),
+    ],
+)
+def test_many_arguments_of_one_kind_are_found(call, is_fault):
+    known = """
+def drive(speed: float, turn: float, held: bool, tick: int, dt: float | None): ...
+def mixed(a: int, b: str, c: float, d: str, e: list[str], f: float): ...
+class Place(NamedTuple):
+    name: str
+    x: float
+    y: float
+    vx: float
+    vy: float
+    z: float = 0.0
+make_place = maker(Place)
+class Named:
+    def __init__(self, a: str, b: str | None, c: Literal["x"], d: str, e: str): ...
+"""
+    found = exchangeable(ast.walk(ast.parse(call)), signatures(ast.walk(ast.parse(known))))
+    assert bool(found) is is_fault
 
 
 def test_what_looks_alike_is_no_fault():

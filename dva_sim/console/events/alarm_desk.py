@@ -122,21 +122,23 @@ class AlarmDesk:
         """Robots that are driven and hear nothing."""
         for label, why in self._facts.lost(robots):
             text = f"{label} is lost in drive: {why}"
-            yield AlarmCondition(f"lost {label}", "robot lost", "high", "", text)
+            yield AlarmCondition(f"lost {label}", "robot lost", "high", place="", text=text)
 
     def _broken(self) -> Iterator[AlarmCondition]:
         """Safety rules that are broken: for good, so that somebody has to see it."""
         for breach in self._facts.broken():
             text = f"{breach.rule} broken by {breach.who}: {breach.what}"
             key, since = f"rule {breach.rule} {breach.who}", max(1, round(1000 * breach.time))
-            yield AlarmCondition(key, "safety rule broken", "critical", "", text, since)
+            yield AlarmCondition(
+                key, "safety rule broken", "critical", place="", text=text, since_ms=since
+            )
 
     def _nobody(self, events: Iterable[SiteEventShown]) -> Iterator[AlarmCondition]:
         """Events wait, and nobody is free to go."""
         waits = sum(1 for event in events if event["state"] == "pending")
         if waits and not self._facts.is_somebody_free():
             text = f"nobody is left to send, and {waits} wait"
-            yield AlarmCondition("nobody", "nobody left to send", "high", "", text)
+            yield AlarmCondition("nobody", "nobody left to send", "high", place="", text=text)
 
     # --- what people do -----------------------------------------------------------------------
 

@@ -153,7 +153,7 @@ class TcpEndpoint:
         fresh = end > start and receiver.take(start, end, now)
         if start < 0:
             receiver.urgent = True
-        sender.acknowledge(now, acknowledged, edge, blocks, duplicate, echo)
+        sender.acknowledge(now, acknowledged, edge, blocks, duplicate=duplicate, echo=echo)
         if receiver.must_acknowledge():
             self.acknowledge()
         if fresh:

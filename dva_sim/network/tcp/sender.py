@@ -180,8 +180,13 @@ class Sender:
                 self._look_for_queue(last)
 
     def _look_for_queue(self, round_trip: float) -> None:
-        window, shortest = self.window.window, self.times.minimum
-        ends = self._hystart.ends(window, round_trip, shortest, self.first, self.next)
+        ends = self._hystart.ends(
+            self.window.window,
+            round_trip,
+            self.times.minimum,
+            acknowledged=self.first,
+            sent=self.next,
+        )
         if ends and self._options.hystart:
             self.window.threshold = self.window.window
 

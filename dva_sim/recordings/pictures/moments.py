@@ -149,8 +149,14 @@ class Moments:
 
     def _figure(self, name: str, time: float) -> Figure:
         here, number = self.at(name, time), name.rpartition("-")[2]
-        looks = int(number) if number.isdigit() else 1
-        return Figure(kind_of(name), here.x, here.y, here.heading, looks, here.mode == DOWN)
+        return Figure(
+            kind_of(name),
+            here.x,
+            here.y,
+            here.heading,
+            number=int(number) if number.isdigit() else 1,
+            lying=here.mode == DOWN,
+        )
 
 
 def _shown(drive: DriveLog, time: float) -> float | None:

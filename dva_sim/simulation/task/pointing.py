@@ -173,7 +173,7 @@ class CursorTrial(Trial[Sighting]):
         """Velocities are those of the last frames; see `Motion`."""
         now, (x, y) = self.now, (self.plant.x, self.plant.y)
         tx, ty = self.goal.target(now)
-        self._motion.add(Places(now, x, y, tx, ty))
+        self._motion.add(Places(now, x, y, target_x=tx, target_y=ty))
         vx, vy, tvx, tvy = self._motion.velocities()
         if self.goal.stands:
             tvx = tvy = 0.0

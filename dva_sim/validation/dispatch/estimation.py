@@ -87,16 +87,17 @@ def estimate(tops: Floats, bottoms: Floats, controls: Floats | None = None) -> E
     """
     total = float(bottoms.sum())
     if not total:
-        return Estimate(math.nan, math.nan, math.nan, math.nan, len(tops))
+        return Estimate(math.nan, math.nan, plain=math.nan, plain_error=math.nan, batches=len(tops))
     plain = float(tops.sum()) / total
     off = (tops - plain * bottoms) / (total / len(bottoms))  # linearised: mean zero
     left = off if controls is None else adjusted(off, controls)
-    return Estimate(plain + float(left.mean()), _error(left), plain, _error(off), len(tops))
+    better = plain + float(left.mean())
+    return Estimate(better, _error(left), plain, plain_error=_error(off), batches=len(tops))
 
 
 def certain(value: float) -> Estimate:
     """A value that nothing is left to chance in."""
-    return Estimate(float(value), 0.0, float(value), 0.0, 1)
+    return Estimate(float(value), 0.0, plain=float(value), plain_error=0.0, batches=1)
 
 
 def adjusted(values: Floats, controls: Floats) -> Floats:

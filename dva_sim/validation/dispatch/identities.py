@@ -46,10 +46,9 @@ def changed_choices(seed: int) -> Iterator[tuple[str, float]]:
         order, angle = rng.permutation(units), float(rng.uniform(0, 2 * math.pi))
         same = np.arange(units)
         for policy in POLICIES:
-            before = _choice(policy, goals, starts, severities, robots, same)
-            after = _choice(
-                policy, _turned(goals, angle), _turned(starts, angle), severities, robots, order
-            )
+            before = _choice(policy, goals, starts, severities, robots=robots, order=same)
+            there = _turned(goals, angle), _turned(starts, angle)
+            after = _choice(policy, *there, severities, robots=robots, order=order)
             changed[policy] += before != after
     for policy, count in changed.items():
         yield f"of {INSTANCES} choices of {policy}: changed by turning and shuffling", float(count)

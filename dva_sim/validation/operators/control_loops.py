@@ -92,7 +92,7 @@ def pure_pursuit(speed_delay: float) -> list[float]:
     x, y, heading = 1.0, 1e-3, 0.0
     frames, errors = deque([(x, y, heading)] * STEPS, maxlen=STEPS), []
     for step in range(DELAYS * STEPS):
-        seen = Observation(0, *frames[0], 0.0, 0.0, ())
+        seen = Observation(0, *frames[0], speed=0.0, turn_rate=0.0, hazards=())
         wanted = pursuit.drive(route, View(step * dt, seen, 1.0), 0.0)
         middle = heading + 0.5 * wanted.turn_rate * dt
         x, y = x + wanted.speed * math.cos(middle) * dt, y + wanted.speed * math.sin(middle) * dt

@@ -108,7 +108,7 @@ def make_mesh(grid: OccupancyGrid, free: NDArray[np.bool_], cell: float = CELL) 
     nodes = np.full(free.shape, -1, np.int32)
     nodes[rows, columns] = node
     area = cells.astype(np.float64) * grid.resolution**2
-    return Mesh(area, a.astype(np.int64), b.astype(np.int64), shape, nodes, grid)
+    return Mesh(area, a.astype(np.int64), b.astype(np.int64), shape, nodes=nodes, grid=grid)
 
 
 def _edges(number: NDArray[np.int32], axis: int) -> NDArray[np.int32]:

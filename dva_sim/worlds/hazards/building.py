@@ -112,12 +112,12 @@ def _building(site: Site) -> Building:
     ceiling = np.array(parting.ceiling)
     tops = [ceiling[a] for a, _, _ in parting.cuts]
     spaces = Spaces(
-        np.array(parting.area),
-        ceiling,
-        joints[:, 0],
-        np.where(joints[:, 1] == NOWHERE, len(ceiling), joints[:, 1]),
-        np.array([*(o.width for o in openings), *(width for _, _, width in parting.cuts)]),
-        np.array([*(o.height for o in openings), *tops]),
+        area=np.array(parting.area),
+        ceiling=ceiling,
+        a=joints[:, 0],
+        b=np.where(joints[:, 1] == NOWHERE, len(ceiling), joints[:, 1]),
+        width=np.array([*(o.width for o in openings), *(width for _, _, width in parting.cuts)]),
+        top=np.array([*(o.height for o in openings), *tops]),
     )
     return Building(spaces, site.grid, parting.labels)
 
@@ -176,7 +176,7 @@ class _Parting:
         along = columns if axis else rows
         count = max(1, math.ceil(_span(along) * resolution / LONGEST - 0.1))
         low = int(along.min()) if len(along) else 0
-        cut = _Cut(first, count, axis, low, _span(along) / count)
+        cut = _Cut(first, parts=count, axis=axis, low=low, length=_span(along) / count)
         part = np.minimum((along - low) // cut.length, count - 1).astype(np.int64)
         self.labels[rows, columns] = first + part
         sizes = np.bincount(part, minlength=count)

@@ -352,11 +352,11 @@ class FireField(SolvedField):
         depth = min(ceiling, volume / float(spaces.area[space]))
         warmer = heat / (HEAT_CAPACITY * mass)
         return Layer(
-            ceiling - depth,
-            depth,
-            AMBIENT + warmer,
-            SOOT_EXTINCTION * soot / volume,
-            CO_RATIO * co / mass,
+            bottom=ceiling - depth,
+            depth=depth,
+            temperature=AMBIENT + warmer,
+            extinction=SOOT_EXTINCTION * soot / volume,
+            co=CO_RATIO * co / mass,
         )
 
     def extinctions(self, time: float, where: str = "breathing") -> Floats:

@@ -261,8 +261,8 @@ class LeakField(SolvedField):
         downwind, across = dx * cos + dy * sin, dy * cos - dx * sin
         if not leak.start <= time - downwind / leak.wind < self.until:
             return 0.0
-        height = BREATHING_HEIGHT
-        return plume(leak.release, leak.wind, leak.stability, downwind, across, height)
+        rate, wind, height = leak.release, leak.wind, BREATHING_HEIGHT
+        return plume(rate, wind, leak.stability, downwind, y=across, z=height)
 
     @cached_property
     def _air(self) -> Air:
