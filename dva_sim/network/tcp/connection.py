@@ -30,14 +30,14 @@ class TcpConnection:
     - congestion window: ten segments at first (RFC 6928), slow start and Reno (RFC 5681),
       CUBIC (RFC 9438), HyStart by delay, shrinking when idle (RFC 2861), no growth when
       it is not used;
+    - Nagle's algorithm where TCP_NODELAY is not set, as ZeroMQ sets it (RFC 896);
     - send buffer in charged bytes, tuned or fixed; receive window, tuned or fixed, with
       probes when it is closed (RFC 9293); giving up after 15 time-outs (tcp_retries2);
     - finishing: what was written is still delivered, what comes late is reset.
 
-    Not modelled: Nagle (ZeroMQ switches it off), the bytes of selective acknowledgements,
-    F-RTO (RFC 5682), the acknowledgement-train part of HyStart, ECN, pacing, segmentation
-    offload, keep-alive, path MTU, bytes charged to the receive buffer beyond the payload,
-    the states after finishing.
+    Not modelled: the bytes of selective acknowledgements, F-RTO (RFC 5682), the
+    acknowledgement-train part of HyStart, ECN, pacing, segmentation offload, keep-alive, path
+    MTU, bytes charged to the receive buffer beyond the payload, the states after finishing.
 
     Args:
         clock: The run's clock.

@@ -27,6 +27,8 @@ class TcpOptions:
         receive_buffer: SO_RCVBUF as the program sets it [B] (doubled likewise); None = tuned.
         mss: Payload of a full segment [B]: Ethernet with TCP time stamps.
         headers: IPv4 + TCP with time stamps, on every segment [B].
+        nodelay: TCP_NODELAY; without it a small segment waits for the acknowledgement of the
+            last small one (RFC 896, as draft-minshall-nagle-01 amends it).
         congestion: `cubic` or `reno`.
         initial_window: Congestion window at the start [segments] (RFC 6928).
         delayed_ack: How long an acknowledgement waits for data to ride on [s];
@@ -56,6 +58,7 @@ class TcpOptions:
     receive_buffer: int | None = None
     mss: int = 1448
     headers: int = 52
+    nodelay: bool = True
     congestion: str = "cubic"
     initial_window: int = 10
     delayed_ack: float = 0.04

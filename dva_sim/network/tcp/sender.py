@@ -2,7 +2,8 @@
 
 References:
     RFC 9293 (sliding window), RFC 5681 and 7661 (a window that is not used does not grow),
-    RFC 6298 (round trips are never taken from what was sent twice).
+    RFC 6298 (round trips are never taken from what was sent twice), RFC 896 and
+    draft-minshall-nagle-01 (small segments wait for the last small one).
 """
 
 from __future__ import annotations
@@ -62,6 +63,7 @@ class Sender:
         self._hystart = HyStart()
         self._alarm = Alarm(clock, options, self.times, self._ring)
         self._unanswered = 0
+        self._nodelay, self._small_end = options.nodelay, 0
         self._last_sent = 0.0
         self._window_used, self._most_out, self._use_round = False, 0, 0
 
@@ -218,11 +220,17 @@ class Sender:
         edge = self.edge + (self.end_mark < inf)  # the end itself takes no room
         while room > 0 and self.next < self.total:
             end = min(self.next + mss, self.total)
-            if end > edge:
+            if end > edge or self._gathers(end):
                 break
             self._send(end, now)
             room -= 1
         self._note_use(room <= 0)
+
+    def _gathers(self, end: int) -> bool:
+        """Whether a small segment waits for more, as without TCP_NODELAY; the end never does."""
+        if self._nodelay or end - self.next >= self._options.mss or end >= self.end_mark:
+            return False
+        return self._small_end > self.first
 
     def _note_use(self, used: bool) -> None:
         """Whether the congestion window was filled within the last round trip."""
@@ -233,6 +241,8 @@ class Sender:
 
     def _send(self, end: int, now: float) -> None:
         start, self.next = self.next, end
+        if end - start < self._options.mss:
+            self._small_end = end
         charge = self.buffer.depart(end - start)
         self.board.queue.append(SentSegment(start, end, now, charge))
         self._leave(start, end, now)
