@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.link import Link
-from dva_sim.network.tcp import TcpConnection, TcpEndpoint, TcpOptions
+from dva_sim.network.tcp import OrderedMessages, TcpConnection, TcpOptions
 from dva_sim.network.transports.config import (
     Btp,
     Irtp,
@@ -110,50 +109,6 @@ def answer_each_other(one: DatagramSender, other: DatagramSender) -> None:
     one.on_arrival, other.on_arrival = other.hear, one.hear
 
 
-ALL = 1 << 30  # more than is ever readable [B]
-
-
-class OrderedMessages:
-    """Messages written to one end of a connection and read from the other, in order.
-
-    What the send buffer has no room for waits in the program, without end.
-
-    Args:
-        writer: Where they are written.
-        reader: Where they are read.
-        deliver: Told of every message once all of it is read.
-    """
-
-    def __init__(self, writer: TcpEndpoint, reader: TcpEndpoint, deliver: Deliver) -> None:
-        self._writer, self._reader, self._deliver = writer, reader, deliver
-        self._unwritten, self._read, self._ends_at = 0, 0, 0
-        self._ends: deque[tuple[int, int]] = deque()  # of the messages under way
-        self._is_open = False
-        writer.on_writable = self._write
-        reader.on_readable = self._take
-
-    def open(self) -> None:
-        """From now on the connection takes what is written."""
-        self._is_open = True
-        self._write()
-
-    def send(self, message: TransportMessage) -> None:
-        """Write a message, or as much as there is room for."""
-        self._ends_at += message.size
-        self._ends.append((self._ends_at, message.number))
-        self._unwritten += message.size
-        self._write()
-
-    def _write(self) -> None:
-        if self._is_open and self._unwritten:
-            self._unwritten -= self._writer.write(self._unwritten)
-
-    def _take(self) -> None:
-        self._read += self._reader.read(self._reader.readable)
-        while self._ends and self._ends[0][0] <= self._read:
-            self._deliver(self._ends.popleft()[1])
-
-
 def tcp_session(clock: Clock, ends: Ends, options: TcpOptions) -> TransportSession:
     """One connection for both directions, alike at both ends; nothing frames the messages."""
     connection = TcpConnection(clock, ends.up, ends.down, options, options)
@@ -161,4 +116,7 @@ def tcp_session(clock: Clock, ends: Ends, options: TcpOptions) -> TransportSessi
     up = OrderedMessages(operator, robot, ends.on_command)
     down = OrderedMessages(robot, operator, ends.on_picture)
     connection.open(up.open, down.open)
-    return TransportSession(up.send, down.send)
+    return TransportSession(
+        lambda message: up.send(message.number, message.size),
+        lambda message: down.send(message.number, message.size),
+    )

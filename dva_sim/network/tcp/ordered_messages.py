@@ -1,0 +1,56 @@
+"""Messages over a TCP connection, in order, as a program writes them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from dva_sim.network.tcp.endpoint import TcpEndpoint
+
+
+class OrderedMessages:
+    """Messages written to one end of a connection and read from the other, in order.
+
+    What the send buffer has no room for waits in the program, without end.
+
+    Args:
+        writer: Where they are written.
+        reader: Where they are read.
+        deliver: Told of every message once all of it is read.
+
+    Attributes:
+        waiting: Bytes that wait in the program [B].
+    """
+
+    def __init__(
+        self, writer: TcpEndpoint, reader: TcpEndpoint, deliver: Callable[[Any], object]
+    ) -> None:
+        self._writer, self._reader, self._deliver = writer, reader, deliver
+        self._read, self._ends_at = 0, 0
+        self._ends: deque[tuple[int, Any]] = deque()  # of the messages under way
+        self._is_open = False
+        self.waiting = 0
+        writer.on_writable = self._write
+        reader.on_readable = self._take
+
+    def open(self) -> None:
+        """From now on the connection takes what is written."""
+        self._is_open = True
+        self._write()
+
+    def send(self, payload: Any, size: int) -> None:
+        """Write a message of `size` bytes [B], or as much as there is room for."""
+        self._ends_at += size
+        self._ends.append((self._ends_at, payload))
+        self.waiting += size
+        self._write()
+
+    def _write(self) -> None:
+        if self._is_open and self.waiting:
+            self.waiting -= self._writer.write(self.waiting)
+
+    def _take(self) -> None:
+        self._read += self._reader.read(self._reader.readable)
+        while self._ends and self._ends[0][0] <= self._read:
+            self._deliver(self._ends.popleft()[1])
