@@ -170,6 +170,10 @@ def schema(kind: str) -> None:
     ablate=(flag("--ablate", "Leave mechanisms out one by one; network only."), False),
     live=(flag("--live", "Measure real sockets now; network only."), False),
     measure=(file("Measure the whole design, or go on with it; network only."), None),
+    beside=(
+        text("Results of a middleware study beside predictions; network only.", metavar="FOLDER"),
+        None,
+    ),
 )
 def validate(
     what: str, cases: str | None, quiet: Quiet = False, verbose: Verbose = False, **asked: Any

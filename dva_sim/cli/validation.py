@@ -18,6 +18,9 @@ from dva_sim.agents.operator.published import lines_of, load_split, load_targets
 from dva_sim.agents.operator.strategies import try_strategy
 from dva_sim.cli.console import console, say
 from dva_sim.cli.verbosity import detail
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.loading import load_study
+from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.errors import ConfigError, ExitCode
 from dva_sim.kernel.suggestions import either
 from dva_sim.validation.dispatch import cases, identities
@@ -26,6 +29,9 @@ from dva_sim.validation.dispatch import result_page as dispatch_page
 from dva_sim.validation.frame import ResultSheet, ValidationResult
 from dva_sim.validation.network import comparison, reference
 from dva_sim.validation.network import result_page as network_page
+from dva_sim.validation.network.beside import measured as beside_measured
+from dva_sim.validation.network.beside import page as beside_page
+from dva_sim.validation.network.beside import predictions
 from dva_sim.validation.network.real_side import measuring
 from dva_sim.validation.network.real_side.cell import PACKETS, PROXY, why_no_packets
 from dva_sim.validation.network.real_side.measuring import Progress
@@ -59,6 +65,7 @@ def validate(
     ablate: bool = False,
     live: bool = False,
     measure: Path | None = None,
+    beside: str | None = None,
 ) -> ExitCode:
     """Play, print the comparison, write it if asked to; how it ended.
 
@@ -73,13 +80,16 @@ def validate(
         ablate: Leave mechanisms of the network's model out one by one.
         live: Measure sockets now, and compare with that alone.
         measure: Measure the whole design into this table; nothing is compared.
+        beside: Results of a middleware study to stand beside predictions, or a study, of which
+            predictions alone are made.
 
     Raises:
         ConfigError: something else to validate, an option that belongs to another, or a
             mistake in the files.
         EmulatorError: nothing can be measured here.
     """
-    _refuse_foreign(what, case_file, strategy, ablate or live or measure is not None)
+    of_network = ablate or live or measure is not None or beside is not None
+    _refuse_foreign(what, case_file, strategy, of_network)
     if out is not None and out.exists() and not out.is_dir():
         raise ConfigError(f"--out {out} is a file; give a folder")
     workers = jobs or os.cpu_count() or 1
@@ -91,6 +101,8 @@ def validate(
             return conclude(partial(_dispatch, case_file, quick, workers, seed), out)
         if what == "operators":
             return conclude(partial(_operators, strategy, quick, workers, seed), out)
+        if beside is not None:
+            return conclude(partial(_beside, beside, quick, workers), out)
         setting = comparison.NetworkSetting(seed, quick, workers, ablate)
         return _network(case_file, setting, measure, live, out)
     except KeyboardInterrupt:
@@ -108,7 +120,8 @@ def _refuse_foreign(what: str, cases: str | None, strategy: str | None, sockets:
         told = "`validate dispatch` and `validate network`: operators have no cases"
         raise ConfigError(f"--cases is for {told}")
     if sockets and what != "network":
-        raise ConfigError("--ablate, --live and --measure are for `validate network`")
+        told = "--ablate, --live, --measure and --beside are for `validate network`"
+        raise ConfigError(told)
 
 
 def conclude(play: Callable[[], ValidationResult], out: Path | None) -> ExitCode:
@@ -262,6 +275,24 @@ def _compared(
         "length": _length(setting.quick),
     }
     return network_page.evidence(found, conditions)
+
+
+def _beside(asked: str, quick: bool, workers: int) -> ValidationResult:
+    """Predictions of a middleware study, with its results beside them if there are any."""
+    results = Results.load(asked) if Path(asked).is_dir() else None
+    study = load_study(asked) if results is None else Study.model_validate(results.study)
+    plays = predictions.QUICK_PLAYS if quick else predictions.PLAYS
+    with _bar() as bar:
+        task = bar.add_task("runs of the model")
+        found = beside_measured.beside_of(
+            beside_measured.asked_by(study),
+            None if results is None else beside_measured.measured_in(results),
+            plays,
+            workers,
+            lambda done, of: bar.update(task, completed=done, total=of),
+        )
+    conditions = {"study": asked, "plays of each seed": str(plays)}
+    return beside_page.evidence(found, conditions)
 
 
 def _measured_now(

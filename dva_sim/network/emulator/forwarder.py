@@ -31,15 +31,20 @@ Links = tuple[Link, Link]
 T = TypeVar("T")
 
 
-def links_of(config: LinkConfig, seed: int) -> Links:
+def links_of(config: LinkConfig, seed: int, by_packet: bool = True) -> Links:
     """Both directions of a link that real packets cross: near to far (`up`), and back (`down`).
+
+    Args:
+        config: Both directions.
+        seed: Random seed of losses and jitter.
+        by_packet: See `Link`.
 
     Raises:
         ConfigError: a file that the link names cannot be read.
     """
     streams = Streams(seed)
-    up = make_link(config, "up", streams, "emulator", by_packet=True)
-    down = make_link(config, "down", streams, "emulator", by_packet=True)
+    up = make_link(config, "up", streams, "emulator", by_packet=by_packet)
+    down = make_link(config, "down", streams, "emulator", by_packet=by_packet)
     return part_links((up, down), NEAR, FAR, config.partitions)
 
 

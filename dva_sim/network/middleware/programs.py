@@ -126,6 +126,12 @@ def command(number: int) -> bytes:
     return encode(make_message(ROBOT_ID, number, OPERATOR_ID, NOON, SESSION, body))
 
 
+def reply_to(number: int, replies: int) -> bytes:
+    """The robot's reply to a command, with how many it has made as its message id."""
+    reply = Reply(number, OK, "")
+    return encode(make_message(OPERATOR_ID, replies, ROBOT_ID, NOON, SESSION, reply))
+
+
 class RobotProgram:
     """Obeys what is newer than everything before it, and sends pictures."""
 
@@ -151,8 +157,7 @@ class RobotProgram:
         self._notes.add(
             ProgramNoteKind.APPLIED if is_new else ProgramNoteKind.OUTDATED, message.message_id
         )
-        reply = Reply(message.message_id, OK, "")
-        return encode(make_message(OPERATOR_ID, self._replies, ROBOT_ID, NOON, SESSION, reply))
+        return reply_to(message.message_id, self._replies)
 
     def run(self) -> None:
         """Until killed, or some time after the operator has sent its last command."""

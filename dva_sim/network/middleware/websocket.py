@@ -34,16 +34,16 @@ class WebSocketTransport(CommandTransport):
     title = "WebSocket"
 
     def __init__(self, nodelay: bool = True) -> None:
-        self._nodelay = nodelay
+        self.nodelay = nodelay
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:
-        end = _Near(receive, self._nodelay)
+        end = _Near(receive, self.nodelay)
         return connected(end, lambda: end.connect(place))
 
     @override
     def far(self, place: Rendezvous, receive: Receive) -> TransportEnd:
-        return _Far(place, receive, self._nodelay)
+        return _Far(place, receive, self.nodelay)
 
 
 class _WebSocketEnd(LoopEnd):

@@ -49,7 +49,7 @@ class ZeroMqTransport(CommandTransport):
     ) -> None:
         if pattern not in _SOCKETS:
             raise ConfigError(f"pattern {pattern!r} is none of {', '.join(_SOCKETS)}")
-        self.pattern, self.timeout_s, self._high_water_mark = pattern, timeout_s, high_water_mark
+        self.pattern, self.timeout_s, self.high_water_mark = pattern, timeout_s, high_water_mark
 
     @override
     def near(self, place: Rendezvous, receive: Receive) -> TransportEnd:
@@ -65,7 +65,7 @@ class ZeroMqTransport(CommandTransport):
         """A socket with these options."""
         socket = context.socket(kind)
         socket.linger = 0
-        socket.sndhwm = socket.rcvhwm = self._high_water_mark
+        socket.sndhwm = socket.rcvhwm = self.high_water_mark
         if self.pattern == "conflate" and kind in (zmq.PUB, zmq.SUB):
             socket.conflate = True
         if kind == zmq.SUB:

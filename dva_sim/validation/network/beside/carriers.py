@@ -1,0 +1,507 @@
+"""The transports of commands in virtual time, as far as the model can say what they do.
+
+ZeroMQ, WebSocket, MQTT and Zenoh over TCP ride on TCP segment by segment, a datagram on the link
+alone. Sizes are those of the specifications; what a library does of its own beyond that (batches,
+congestion control, retransmission) is not modelled, and its transports are refused by name.
+
+References:
+    RFC 6455 (WebSocket's frames); MQTT 5.0, OASIS 2019 (packets, receive maximum);
+    ZMTP 3.1, rfc.zeromq.org/spec/37; RFC 768.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, cast
+
+from typing_extensions import override
+
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.streams import Streams
+from dva_sim.network.link import Link, LinkConfig, make_link
+from dva_sim.network.middleware import CommandTransport
+from dva_sim.network.middleware.mqtt import COMMANDS, PICTURES, MqttTransport
+from dva_sim.network.middleware.programs import command, reply_to
+from dva_sim.network.middleware.udp import UdpTransport
+from dva_sim.network.middleware.websocket import MOST_WAITING, WebSocketTransport
+from dva_sim.network.middleware.zenoh import ZenohTransport
+from dva_sim.network.middleware.zeromq import ZeroMqTransport
+from dva_sim.network.tcp import OrderedMessages, TcpConnection, TcpOptions
+from dva_sim.network.transports.interface import TransportMessage
+from dva_sim.network.transports.message_parts import IP_UDP, Assembly, parts_of
+from dva_sim.network.zmtp import ZmtpConnection, ZmtpOptions, framed
+
+Act = Callable[[], object]
+
+
+def _nothing() -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class BetweenPrograms:
+    """What a carrier stands between.
+
+    Attributes:
+        clock: Virtual time.
+        up: The link that commands take.
+        down: The link from the robot.
+        picture_bytes: Size of a picture [B].
+        on_command: Takes the number of a command at the robot, and what sends its reply.
+        on_picture: Takes the number of a picture at the operator.
+    """
+
+    clock: Clock
+    up: Link
+    down: Link
+    picture_bytes: int
+    on_command: Callable[[int, Act], object]
+    on_picture: Callable[[int], object]
+
+
+class Carrier(ABC):
+    """One transport between an operator and a robot.
+
+    Attributes:
+        on_free: Called when a command can be sent after one was refused.
+    """
+
+    on_free: Act = staticmethod(_nothing)
+
+    def __init__(self, between: BetweenPrograms) -> None:
+        self.between, self.clock = between, between.clock
+
+    @abstractmethod
+    def open(self, ready: Act) -> None:
+        """Connect; `ready()` when the operator's program goes on."""
+
+    @abstractmethod
+    def command(self, number: int) -> bool:
+        """Hand over a command; False if nothing is taken now."""
+
+    @abstractmethod
+    def picture(self, number: int) -> None:
+        """Hand over a picture at the robot."""
+
+
+class DatagramCarrier(Carrier):
+    """UDP: a command each, nothing is sent again."""
+
+    GREETING, AGAIN_S = 5 + IP_UDP, 0.2
+    _is_ready = _knows_peer = False
+
+    @override
+    def open(self, ready: Act) -> None:
+        def greet() -> None:
+            if not self._is_ready:
+                self._carry(self.between.up, self.GREETING, greeted)
+                self.clock.call_after(self.AGAIN_S, greet)
+
+        def greeted() -> None:
+            self._knows_peer = True
+            self._carry(self.between.down, self.GREETING, answered)
+
+        def answered() -> None:
+            if not self._is_ready:
+                self._is_ready = True
+                ready()
+
+        self._up = Assembly(lambda number: self.between.on_command(number, _nothing))
+        self._down = Assembly(self.between.on_picture)
+        greet()
+
+    @override
+    def command(self, number: int) -> bool:
+        self._send(self.between.up, self._up, TransportMessage(number, len(command(number))))
+        return True
+
+    @override
+    def picture(self, number: int) -> None:
+        if self._knows_peer:
+            size = self.between.picture_bytes
+            self._send(self.between.down, self._down, TransportMessage(number, size))
+
+    def _send(self, link: Link, assembly: Assembly, message: TransportMessage) -> None:
+        for part in parts_of(message, 0):
+            self._carry(link, part.size + IP_UDP, assembly.add, part)
+
+    def _carry(self, link: Link, size: int, then: Callable[..., object], *what: object) -> None:
+        arrival = link.carry(self.clock.now, size)
+        if arrival is not None:
+            self.clock.call_at(arrival, then, *what)
+
+
+HELLO: Final = "hello"
+Exchanges = Sequence[tuple[int, int]]  # what is said, and answered, before messages [B]
+
+
+class StreamCarrier(Carrier):
+    """Messages in frames over one TCP connection that the operator opens.
+
+    Args:
+        between: Both programs.
+        tcp: Of both ends.
+        header: Size of the frame around a message of so many bytes [B], by whether it goes up.
+        exchanges: Before the first message.
+    """
+
+    def __init__(
+        self,
+        between: BetweenPrograms,
+        tcp: TcpOptions,
+        header: Callable[[int, bool], int],
+        exchanges: Exchanges,
+    ) -> None:
+        super().__init__(between)
+        self._header, self._exchanges = header, deque(exchanges)
+        self._tcp = TcpConnection(self.clock, between.up, between.down, tcp, tcp)
+        operator, robot = self._tcp.opener, self._tcp.peer
+        self._up = OrderedMessages(operator, robot, self._at_robot)
+        self._down = OrderedMessages(robot, operator, self._at_operator)
+        self._ready: Act = _nothing
+        self._is_ready = False
+
+    @override
+    def open(self, ready: Act) -> None:
+        def opened() -> None:
+            self._up.open()
+            self._up.send(HELLO, self._exchanges[0][0])
+
+        self._ready = ready
+        self._tcp.open(opened, self._down.open)
+
+    def _at_robot(self, what: Any) -> None:
+        if what == HELLO:
+            self._down.send(HELLO, self._exchanges[0][1])
+        else:
+            self.between.on_command(what, _nothing)
+
+    def _at_operator(self, what: Any) -> None:
+        if what != HELLO:
+            self.between.on_picture(what)
+            return
+        self._exchanges.popleft()
+        if self._exchanges:
+            self._up.send(HELLO, self._exchanges[0][0])
+        else:
+            self._is_ready = True
+            self._ready()
+
+    @override
+    def command(self, number: int) -> bool:
+        return self._send(self._up, number, len(command(number)), True)
+
+    @override
+    def picture(self, number: int) -> None:
+        if self._is_ready:
+            self._send(self._down, number, self.between.picture_bytes, False)
+
+    def _send(self, stream: OrderedMessages, number: int, size: int, up: bool) -> bool:
+        if stream.waiting > MOST_WAITING:
+            return False
+        stream.send(number, size + self._header(size, up))
+        return True
+
+
+def websocket_header(size: int, masked: bool) -> int:
+    """RFC 6455, section 5.2: from a client with a mask [B]."""
+    length = 0 if size < 126 else 2 if size < 65_536 else 8
+    return 2 + length + 4 * masked
+
+
+HTTP_UPGRADE: Final = (250, 200)  # a request and its response, about [B]
+ZENOH_OPENING: Final = ((60, 90), (70, 30), (40, 40))  # INIT, OPEN, declarations; about [B]
+ZENOH_HEADER: Final = 20  # length of a batch, FRAME and PUSH; about [B]
+
+ACKNOWLEDGEMENT: Final = "acknowledged"
+LOOPBACK: Final = LinkConfig(delay_s=20e-6, rate_bps=10e9, queue_bytes=10_000_000)
+IN_FLIGHT: Final = 20  # messages not acknowledged, of clients and of the broker
+MQTT_OPENING: Final = ((30, 12), (35, 30))  # CONNECT, CONNACK; SUBSCRIBE, SUBACK, `HERE`; about [B]
+PUBACK: Final = 4
+
+
+class MqttLeg:
+    """One direction between a client and the broker; with QoS 1 the other end acknowledges.
+
+    Args:
+        out: Carries what is published.
+        qos: 0 or 1.
+    """
+
+    def __init__(self, out: OrderedMessages, qos: int) -> None:
+        self._out, self._qos, self._in_flight = out, qos, 0
+        self._waiting: deque[tuple[Any, int]] = deque()
+
+    def publish(self, what: Any, size: int) -> None:
+        """Send, or wait until fewer are in flight."""
+        if self._qos and self._in_flight >= IN_FLIGHT:
+            self._waiting.append((what, size))
+            return
+        self._in_flight += self._qos
+        self._out.send(what, size)
+
+    def acknowledged(self) -> None:
+        """One fewer is in flight."""
+        self._in_flight -= 1
+        if self._waiting:
+            self.publish(*self._waiting.popleft())
+
+
+class MqttClient:
+    """A client's connection to the broker, both ends of it.
+
+    Args:
+        clock: Virtual time.
+        links: From the client, and back.
+        options: Of the transport.
+        at_client: Takes what the broker sends.
+        at_broker: Takes what the client publishes.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        links: tuple[Link, Link],
+        options: MqttTransport,
+        at_client: Callable[[int], object],
+        at_broker: Callable[[int], object],
+    ) -> None:
+        tcp = TcpOptions(nodelay=options.nodelay)
+        self._tcp = TcpConnection(clock, *links, tcp, tcp)
+        client, broker = self._tcp.opener, self._tcp.peer
+        self._qos, self._takes = options.qos, (at_broker, at_client)
+        self._out = OrderedMessages(client, broker, lambda what: self._heard(0, what))
+        self._back = OrderedMessages(broker, client, lambda what: self._heard(1, what))
+        self._streams = self._out, self._back
+        self._legs = MqttLeg(self._out, options.qos), MqttLeg(self._back, options.qos)
+        self._exchanges, self._ready = deque(MQTT_OPENING), cast(Act, _nothing)
+
+    def open(self, ready: Act) -> None:
+        """Connect and subscribe."""
+
+        def opened() -> None:
+            self._out.open()
+            self._out.send(HELLO, self._exchanges[0][0])
+
+        self._ready = ready
+        self._tcp.open(opened, self._back.open)
+
+    def publish(self, number: int, size: int) -> None:
+        """From the client."""
+        self._legs[0].publish(number, size)
+
+    def forward(self, number: int, size: int) -> None:
+        """From the broker."""
+        self._legs[1].publish(number, size)
+
+    def _heard(self, at: int, what: Any) -> None:
+        if what == HELLO:
+            self._greeted(at)
+        elif what == ACKNOWLEDGEMENT:
+            self._legs[1 - at].acknowledged()
+        else:
+            self._takes[at](what)
+            if self._qos:
+                self._streams[1 - at].send(ACKNOWLEDGEMENT, PUBACK)
+
+    def _greeted(self, at: int) -> None:
+        if at == 0:
+            self._back.send(HELLO, self._exchanges[0][1])
+            return
+        self._exchanges.popleft()
+        if self._exchanges:
+            self._out.send(HELLO, self._exchanges[0][0])
+        else:
+            self._ready()
+
+
+class MqttCarrier(Carrier):
+    """Two clients and a broker, one of them across the link, the other on the broker's machine."""
+
+    def __init__(self, between: BetweenPrograms, options: MqttTransport) -> None:
+        super().__init__(between)
+        out, back = (make_link(LOOPBACK, "up", Streams(0), name) for name in ("out", "back"))
+        up, down = between.up, between.down
+        is_far, self._qos = options.broker == "far", options.qos
+        here = out, back
+        operators, robots = ((up, down), here) if is_far else (here, (down, up))
+        self._operator = MqttClient(
+            self.clock, operators, options, between.on_picture, self._to_robot
+        )
+        self._robot = MqttClient(
+            self.clock,
+            robots,
+            options,
+            lambda number: between.on_command(number, _nothing),
+            self._to_operator,
+        )
+
+    @override
+    def open(self, ready: Act) -> None:
+        self._robot.open(lambda: self._operator.open(ready))
+
+    @override
+    def command(self, number: int) -> bool:
+        self._operator.publish(number, self._size(COMMANDS, len(command(number))))
+        return True
+
+    @override
+    def picture(self, number: int) -> None:
+        self._robot.publish(number, self._size(PICTURES, self.between.picture_bytes))
+
+    def _to_robot(self, number: int) -> None:
+        self._robot.forward(number, self._size(COMMANDS, len(command(number))))
+
+    def _to_operator(self, number: int) -> None:
+        self._operator.forward(number, self._size(PICTURES, self.between.picture_bytes))
+
+    def _size(self, topic: str, payload: int) -> int:
+        """MQTT 5.0, section 3.3: a PUBLISH without properties [B]."""
+        rest = 2 + len(topic) + 2 * (self._qos > 0) + 1 + payload
+        return 1 + (1 if rest < 128 else 2 if rest < 16_384 else 3) + rest
+
+
+class ZeroMqCarrier(Carrier):
+    """ZeroMQ: each pair of sockets over its own connection, one pair of them for pictures."""
+
+    def __init__(self, between: BetweenPrograms, options: ZeroMqTransport) -> None:
+        super().__init__(between)
+        conflates = options.pattern == "conflate"
+        self._options = ZmtpOptions(mark=options.high_water_mark, conflate=conflates)
+        self._pictures = self._connection(self._watched, self.between.on_picture)
+        self._is_watched = False
+
+    def _connection(
+        self, at_robot: Callable[[Any], object], at_operator: Callable[[Any], object]
+    ) -> ZmtpConnection:
+        """A connection that the operator opens."""
+        links, both = (self.between.up, self.between.down), self._options
+        return ZmtpConnection(self.clock, *links, at_robot, at_operator, both, both)
+
+    @override
+    def open(self, ready: Act) -> None:
+        self._pictures.open(lambda: self._pictures.opener.send(None, framed(1)))
+
+    def _watched(self, _: Any) -> None:
+        self._is_watched = True
+
+    @override
+    def picture(self, number: int) -> None:
+        if self._is_watched:
+            self._pictures.peer.send(number, framed(self.between.picture_bytes))
+
+
+class PublishCarrier(ZeroMqCarrier):
+    """Commands by PUB and SUB, whose subscription takes half a round trip more."""
+
+    def __init__(self, between: BetweenPrograms, options: ZeroMqTransport) -> None:
+        super().__init__(between, options)
+        self._is_joined = False
+
+    @override
+    def open(self, ready: Act) -> None:
+        def heard(number: int) -> None:
+            self.between.on_command(number, _nothing)
+
+        def joined(_: Any) -> None:
+            self._is_joined = True
+
+        super().open(_nothing)
+        connection = self._commands = self._connection(heard, joined)
+        connection.open(ready, lambda: connection.peer.send(None, framed(1)))
+
+    @override
+    def command(self, number: int) -> bool:
+        if self._is_joined:
+            self._commands.opener.send(number, framed(len(command(number))))
+        return True  # PUB drops what nobody takes
+
+
+class RequestCarrier(ZeroMqCarrier):
+    """Commands by REQ and REP, one at a time; over a new connection after a time-out."""
+
+    def __init__(self, between: BetweenPrograms, options: ZeroMqTransport) -> None:
+        super().__init__(between, options)
+        self._timeout_s = options.timeout_s
+        self._under_way: int | None = None
+        self._attempts = self._replies = 0
+
+    @override
+    def open(self, ready: Act) -> None:
+        super().open(_nothing)
+        self._connect(ready)
+
+    def _connect(self, ready: Act) -> None:
+        def heard(number: int) -> None:
+            self.between.on_command(number, lambda: answer(number))
+
+        def answer(number: int) -> None:
+            self._replies += 1
+            size = len(reply_to(number, self._replies))
+            connection.peer.send(number, framed(0) + framed(size))
+
+        def replied(number: int) -> None:
+            if connection is self._commands and number == self._under_way:
+                self._under_way = None
+                self.on_free()
+
+        connection = self._commands = self._connection(heard, replied)
+        connection.open(ready)
+
+    @override
+    def command(self, number: int) -> bool:
+        if self._under_way is not None:
+            return False
+        self._under_way = number
+        self._ask()
+        return True
+
+    def _ask(self) -> None:
+        number, self._attempts = self._under_way, self._attempts + 1
+        assert number is not None
+        self._commands.opener.send(number, framed(0) + framed(len(command(number))))
+        self.clock.call_after(self._timeout_s, self._late, number, self._attempts)
+
+    def _late(self, number: int, attempt: int) -> None:
+        if (number, attempt) == (self._under_way, self._attempts):
+            self._commands.close()
+            self._connect(_nothing)
+            self._ask()
+
+
+def why_not(transport: CommandTransport) -> str:
+    """Why the model says nothing of a transport; empty if it does."""
+    if isinstance(transport, MqttTransport):
+        if transport.qos > 1:
+            return "MQTT's quality of service 2 is not modelled"
+        return "the broker's queue of expiring messages is not modelled" * (
+            transport.expiry_s is not None
+        )
+    if isinstance(transport, ZenohTransport) and transport.carrier == "udp":
+        return "Zenoh's own fragments and losses over UDP are not modelled"
+    if isinstance(transport, ZenohTransport) and transport.congestion == "block":
+        return "a sender that Zenoh blocks is not modelled"
+    if isinstance(
+        transport,
+        UdpTransport | WebSocketTransport | ZenohTransport | ZeroMqTransport | MqttTransport,
+    ):
+        return ""
+    return f"{transport.title or type(transport).__name__} is not modelled"
+
+
+def carrier_of(transport: CommandTransport, between: BetweenPrograms) -> Carrier:
+    """The carrier that plays a transport of which `why_not` says nothing."""
+    if isinstance(transport, ZeroMqTransport):
+        kind = RequestCarrier if transport.pattern == "req-rep" else PublishCarrier
+        return kind(between, transport)
+    if isinstance(transport, MqttTransport):
+        return MqttCarrier(between, transport)
+    if isinstance(transport, WebSocketTransport):
+        tcp = TcpOptions(nodelay=transport.nodelay)
+        return StreamCarrier(between, tcp, websocket_header, [HTTP_UPGRADE])
+    if isinstance(transport, ZenohTransport):
+        return StreamCarrier(between, TcpOptions(), lambda *_: ZENOH_HEADER, ZENOH_OPENING)
+    return DatagramCarrier(between)

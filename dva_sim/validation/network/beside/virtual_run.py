@@ -1,0 +1,161 @@
+"""A run of a middleware scenario in virtual time, measured as the real one is.
+
+The operator's program offers a command at every step of its grid, and the newest as soon as one is
+taken after a refusal; the robot's obeys what is newer than all before. The link has the seed of the
+real run: outages, bursts in time and the moment of a recorded link are the same ones. Losses packet
+by packet are not, since a packet more or less would shift them all.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.emulator.forwarder import links_of
+from dva_sim.network.link import Link, PartedLink
+from dva_sim.network.middleware import CommandTransport, load_transport
+from dva_sim.simulation.middleware import MiddlewareScenario
+from dva_sim.simulation.middleware.freshness_measures import Row, Window, command_row
+from dva_sim.simulation.middleware.run import LINGER_S
+from dva_sim.validation.network.beside.carriers import Act, BetweenPrograms, Carrier, carrier_of
+
+PROGRAM_S = 0.0005
+"""From the arrival of a command's last packet to its application: assumed. It also decides what
+comes first where a round trip is a whole number of periods."""
+STARTS_S, ENDS_S = (0.3, 1.0), (0.0, 0.6)
+"""When the programs have started, after the link, and how long the operator's takes to end:
+assumed, equally likely in between."""
+
+
+class ProgramTimes(NamedTuple):
+    """When both programs have started, in the time of the link, and how long one ends [s]."""
+
+    near: float
+    far: float
+    ending: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> ProgramTimes:
+        """Some, by chance."""
+        return cls(rng.uniform(*STARTS_S), rng.uniform(*STARTS_S), rng.uniform(*ENDS_S))
+
+
+class CountedLink(PartedLink):
+    """A link that knows how many bytes have left it by when."""
+
+    def __init__(self, whole: Link) -> None:
+        super().__init__(whole, ())
+        self._passed: list[tuple[float, int]] = []
+
+    def carry(self, now: float, size: int) -> float | None:
+        """See `Link`."""
+        arrival = super().carry(now, size)
+        if arrival is not None:
+            self._passed.append((arrival, size))
+        return arrival
+
+    def passed_bytes(self, by: float) -> int:
+        """Bytes that have come out by a time [s]."""
+        return sum(size for arrival, size in self._passed if arrival <= by)
+
+
+class VirtualRun:
+    """Both programs over a carrier.
+
+    Args:
+        scenario: What is sent over what; its transport is one that the model plays.
+        seed: Of the link.
+        times: When the programs start and end.
+    """
+
+    def __init__(self, scenario: MiddlewareScenario, seed: int, times: ProgramTimes) -> None:
+        self._scenario, self._times = scenario, times
+        since = scenario.set_up_s
+        self._window = Window(0.0, since, since + scenario.measure_s)
+        self._clock = Clock()
+        up, down = links_of(scenario.link, seed, by_packet=False)
+        self._up, self._down = CountedLink(up), CountedLink(down)
+        pictures = scenario.pictures
+        self._carrier = self._carried_by(
+            load_transport(scenario.transport.name, scenario.transport.options)(),
+            0 if pictures is None else pictures.bytes,
+        )
+        self._carrier.on_free = self._freed
+        self._made: dict[int, float] = {}
+        self._applied: list[tuple[int, float]] = []
+        self._newest = self._sent = self._steps = self._pictures = 0
+        self._waits = False
+        self._begun = 0.0
+
+    def _carried_by(self, transport: CommandTransport, picture_bytes: int) -> Carrier:
+        between = BetweenPrograms(
+            self._clock, self._up, self._down, picture_bytes, self._hear, lambda number: None
+        )
+        return carrier_of(transport, between)
+
+    def play(self) -> Row:
+        """The measures of the run, by the columns of a real one."""
+        clock, window, times = self._clock, self._window, self._times
+        end = window.until + times.ending + LINGER_S
+        clock.call_at(max(times.near, times.far), self._carrier.open, self._begin)
+        if self._scenario.pictures is not None:
+            clock.call_at(times.far, self._take_picture, 1.0 / self._scenario.pictures.rate_hz)
+        clock.run(end)
+        made = np.array([self._made[number] for number, _ in self._applied])
+        robot = self._scenario.robot
+        return {
+            **command_row(
+                made,
+                np.array([time for _, time in self._applied]),
+                window,
+                max_age_s=robot.max_age_s,
+                watchdog_s=robot.watchdog_s,
+            ),
+            "up_bytes": self._up.passed_bytes(end),
+            "down_bytes": self._down.passed_bytes(end),
+        }
+
+    # --- the operator ----------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        """The connection stands; if that took too long, the program has given up."""
+        self._begun = self._clock.now
+        if self._begun < self._window.since:
+            self._step()
+
+    def _step(self) -> None:
+        if self._clock.now >= self._window.until:
+            return
+        self._offer()
+        self._steps += 1
+        due = self._begun + self._steps / self._scenario.command_rate_hz
+        self._clock.call_at(due, self._step)
+
+    def _freed(self) -> None:
+        if self._waits and self._clock.now < self._window.until:
+            self._offer()
+
+    def _offer(self) -> None:
+        number = self._sent + 1
+        self._made[number] = self._clock.now
+        taken = self._carrier.command(number)
+        self._sent += taken
+        self._waits = not taken
+
+    # --- the robot ---------------------------------------------------------------------------
+
+    def _hear(self, number: int, answer: Act) -> None:
+        self._clock.call_after(PROGRAM_S, self._obey, number, answer)
+
+    def _obey(self, number: int, answer: Act) -> None:
+        if number > self._newest:
+            self._newest = number
+            self._applied.append((number, self._clock.now))
+        answer()
+
+    def _take_picture(self, period: float) -> None:
+        self._pictures += 1
+        self._carrier.picture(self._pictures)
+        self._clock.call_after(period, self._take_picture, period)
