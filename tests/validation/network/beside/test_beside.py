@@ -87,6 +87,7 @@ def rows_in(folder):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.system  # it draws
 def test_measured_rows_stand_beside_their_bands(results, tmp_path, capsys):
     written = tmp_path / "page"
     assert validation.validate("network", written, beside=results(), quick=True, jobs=1) == 0
