@@ -147,6 +147,20 @@ class AgentDevice:
             self._dva_beats.close()
         self._dva_beats, self.dva_watch = None, DvaWatch()
 
+    def crash(self) -> None:
+        """Be gone without a word: what was asked is never asked again, nor its answer heard."""
+        self.leave()
+        for requester in self._requesters.values():
+            requester.close()
+        self._requesters.clear()
+
+    def start_anew(self) -> None:
+        """Be the same device in a new process: it numbers from 1 and has answered nobody yet."""
+        self.crash()
+        self.outbox = Outbox(self.id_tag, *self.time_of_day)
+        self._replies, self._nuisances = ReplyCache(), Nuisances()
+        self.come_back()
+
     def come_back(self) -> None:
         """Have a new life, and be registered nowhere as yet."""
         self.silent = False

@@ -17,7 +17,7 @@ import json
 import math
 import sqlite3
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,7 @@ class Store:
     Attributes:
         past: Added to the DVA's time it gives the time that is kept [s].
         keeps_time: How often that is written while events are open [s].
+        between_writes: Called before each statement that writes, and after the last; it may raise.
 
     Raises:
         ConfigError: the file cannot be opened, or is something else.
@@ -69,6 +70,7 @@ class Store:
 
     def __init__(self, file: Path | str) -> None:
         self.past, self.keeps_time = 0.0, KEEPS_TIME
+        self.between_writes: Callable[[], object] = lambda: None
         self._time_kept_at = -math.inf  # by the DVA's time
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
         self._session_changes, self._asks = 0, False
@@ -138,7 +140,9 @@ class Store:
         try:
             self._file.execute("BEGIN IMMEDIATE")
             self._write(dva, sessions, lasting, now)
+            self.between_writes()
             self._file.execute("COMMIT")
+            self.between_writes()
         except sqlite3.Error as error:
             if self._file.in_transaction:
                 self._file.execute("ROLLBACK")
@@ -154,7 +158,10 @@ class Store:
     def _write(
         self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str], now: float
     ) -> None:
-        put = self._file.executemany
+        def put(statement: str, rows: Iterable[Sequence[object]]) -> None:
+            self.between_writes()
+            self._file.executemany(statement, rows)
+
         events = (
             (e.number, e.open, json.dumps(_of_event(e, dva, self.past)))
             for e in self._events.values()

@@ -20,6 +20,9 @@ SUBSCRIBE_AGAIN = 1.0  # where a subscription may get lost; assumed [s]
 Links = Callable[[str, str], tuple[Link, Link]]
 Traffic = Callable[[float, str, str, int, Any], None]
 Delivered = Callable[[float, str, str, Any], None]
+Take = Callable[[Any], None]
+Interference = Callable[[str, str, Any, Take], None]
+"""Takes a payload that reaches a node, from whom, to whom, and what takes it there."""
 
 
 class VirtualNetwork:
@@ -35,6 +38,7 @@ class VirtualNetwork:
     Attributes:
         dropped: Publications that found the pipe of a subscriber full.
         taps: See `Transport`.
+        interference: Decides whether, when and as what each payload arrives; None: as it was sent.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class VirtualNetwork:
         self.connector = connector or Connector()
         self.dropped = 0
         self.taps: dict[str, RequestTap] = {}
+        self.interference: Interference | None = None
         self._services: dict[str, Service] = {}
         self._gone: set[str] = set()
         self._clients: dict[str, dict[VirtualClient, None]] = defaultdict(dict)
@@ -169,6 +174,16 @@ class VirtualClient:
         self.connection.close()
         self._network.release(self)
 
+    def _while_connected(self, take: Take) -> Take:
+        """Return what takes a payload later, unless the connection it came by is gone by then."""
+        connection = self.connection
+
+        def taken(payload: Any) -> None:
+            if self.connection is connection and self._network.is_wanted(self):
+                take(payload)
+
+        return taken
+
     def _open(self) -> None:
         if self._network.is_wanted(self):
             self._is_up = True
@@ -224,15 +239,10 @@ class VirtualWire(VirtualClient):
 
         def at_peer(payload: tuple[int, bytes]) -> None:
             tag, data = payload
-            service = network.service(self.peer)
-            if service is not None:
-                network.delivered(network.clock.now, self.node, self.peer, data)
-                request = Request(data, partial(self._answer, made, tag), peer=self.node)
-                tap = network.taps.get(self.peer)
-                if tap is None:
-                    service(request)
-                else:
-                    tap.serve(service, request)
+            if network.interference is None:
+                self._serve(made, tag, data)
+            else:
+                network.interference(self.node, self.peer, data, partial(self._serve, made, tag))
 
         made = network.connector.connect(
             network.clock,
@@ -242,10 +252,31 @@ class VirtualWire(VirtualClient):
         )
         return made
 
-    def _replied(self, payload: tuple[int, bytes]) -> None:
+    def _serve(self, connection: AnyConnection, tag: int, data: bytes) -> None:
         network = self._network
-        network.delivered(network.clock.now, self.peer, self.node, payload[1])
-        self._on_reply(*payload)
+        service = network.service(self.peer)
+        if service is None:
+            return
+        network.delivered(network.clock.now, self.node, self.peer, data)
+        request = Request(data, partial(self._answer, connection, tag), peer=self.node)
+        tap = network.taps.get(self.peer)
+        if tap is None:
+            service(request)
+        else:
+            tap.serve(service, request)
+
+    def _replied(self, payload: tuple[int, bytes]) -> None:
+        tag, data = payload
+        if self._network.interference is None:
+            self._take_reply(tag, data)
+        else:
+            take = self._while_connected(partial(self._take_reply, tag))
+            self._network.interference(self.peer, self.node, data, take)
+
+    def _take_reply(self, tag: int, data: bytes) -> None:
+        network = self._network
+        network.delivered(network.clock.now, self.peer, self.node, data)
+        self._on_reply(tag, data)
 
     def _answer(self, connection: AnyConnection, tag: int, reply: bytes) -> None:
         size = len(reply) + FRAMING
@@ -297,16 +328,24 @@ class VirtualSubscription(VirtualClient):
     def _new_connection(self) -> AnyConnection:
         network = self._network
 
-        def heard(payload: Any) -> None:
-            network.delivered(network.clock.now, self.peer, self.node, payload)
-            if (tap := network.taps.get(self.node)) is not None:
-                tap.heard(self.peer, payload)
-            self._handler(payload)
-
         return network.connector.connect(
             network.clock,
             network.links(self.node, self.peer),
             self._joined,
-            heard,
+            self._heard,
             publishes=True,
         )
+
+    def _heard(self, payload: Any) -> None:
+        if self._network.interference is None:
+            self._take(payload)
+        else:
+            take = self._while_connected(self._take)
+            self._network.interference(self.peer, self.node, payload, take)
+
+    def _take(self, payload: Any) -> None:
+        network = self._network
+        network.delivered(network.clock.now, self.peer, self.node, payload)
+        if (tap := network.taps.get(self.node)) is not None:
+            tap.heard(self.peer, payload)
+        self._handler(payload)

@@ -40,6 +40,10 @@ class Outbox:
         self._start, self._exact = start_of_day, exact
         self._last_id = 0
 
+    def set_clock(self, by: float) -> None:
+        """Set the clock on the wall that its timestamps show, by so many seconds [s]."""
+        self._start += by
+
     def message(self, destination: str, body: Body, now: float, session: int = 0) -> Message:
         """A message that is newer than all before it."""
         self._last_id += 1

@@ -208,6 +208,18 @@ class RobotController:
         """Its computer hangs, and starts anew idle: an order that was under way is given up."""
         self._idle("its computer hung")
 
+    def start_anew(self, clock_offset: float) -> None:
+        """Begin as a program that was started anew: idle, and with nobody known who may act.
+
+        Args:
+            clock_offset: What its clock shows at the run's start from now on [s].
+        """
+        self._idle("its computer was restarted")
+        self.inquiry.start_anew()
+        self.grant, self.clock_offset = None, clock_offset
+        self.observers.clear()
+        self.last_order_id = self.last_set_id = self._numbered = 0
+
     # --- by hand, at the robot itself ---------------------------------------------------
 
     def take_by_hand(self, who: str, now: float, moving: bool) -> Decision:

@@ -234,6 +234,18 @@ class RobotAgent:
         if self.controller.mode is not before:
             self.mode_changed("")
 
+    def start_anew(self, clock_offset: float) -> None:
+        """Restart its program: it has forgotten its driver, and registers again.
+
+        Args:
+            clock_offset: See `RobotController.start_anew`.
+        """
+        self.hang()
+        self.controller.start_anew(clock_offset)
+        self.device.start_anew()
+        self.device.register()
+        self.device.connect(self.device.dva)
+
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
         if on is not self.body.powered:

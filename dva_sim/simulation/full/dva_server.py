@@ -43,6 +43,7 @@ class DvaAgent:
         events: Every event there ever was, by number, where `keep_events`.
         facts: What was decided; the last of it, unless `keep_events`.
         on_fact: Is told of each fact as it is taken from the desk.
+        is_gone: Whether it has crashed; another one may take its place.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class DvaAgent:
         self._memory, self._keep_events = memory, keep_events
         self._told: dict[int, State] = {}
         self._policy_failures = 0
-        self.leave_after = device.timeout
+        self.leave_after, self.is_gone = device.timeout, False
         self._problem: str | None = None
         self._turned_away: OrderedDict[tuple[str, str], None] = OrderedDict()
         self.beats: Counter[str] = Counter()
@@ -75,8 +76,19 @@ class DvaAgent:
         clock.every(TICK, self._tick, start=clock.now + TICK)
         clock.every(HEARTBEAT_PERIOD, self._beat, start=clock.now + FIRST_BEAT)
 
-    def _beat(self) -> None:
+    def crash(self) -> None:
+        """Be killed: nothing is said, kept or decided any more, and its memory is put away."""
+        self.is_gone, self.device.silent = True, True
+        self.device.crash()
+        for source in list(self._heard):
+            self._leave(source)
+        if self._memory is not None:
+            self._memory.close()
+            self._memory = None
+
+    def _beat(self) -> bool:
         self.device.publish(HEARTBEAT, m.Heartbeat())
+        return not self.is_gone
 
     def close(self) -> None:
         """End all sessions: nobody drives by a permission of a DVA that is no more."""
@@ -184,11 +196,11 @@ class DvaAgent:
             if sends or isinstance(message.body, m.SensorValue):
                 self._carry_out(sends)
 
-    def _tick(self) -> None:
-        if self.device.silent:
-            return
-        self._carry_out(self.desk.tick(self.device.clock.now))
-        self._attend()
+    def _tick(self) -> bool:
+        if not self.device.silent:
+            self._carry_out(self.desk.tick(self.device.clock.now))
+            self._attend()
+        return not self.is_gone
 
     def _carry_out(self, sends: list[Send]) -> None:
         """Keep what has changed, then say it: what was said must not be forgotten."""
@@ -217,6 +229,8 @@ class DvaAgent:
             self._undelivered(send)
 
     def _undelivered(self, send: Send) -> None:
+        if self.is_gone:
+            return
         self._carry_out(self.desk.undelivered(send, self.device.clock.now))
 
     def _keep_changes(self) -> None:

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras
 from dva_sim.agents.people.bystander import ALARMED, EVACUATING, SAFE, BystanderAgent
+from dva_sim.core.store import Store
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Accepted, ByHand, Recorder
 from dva_sim.network.connections import HEADERS, MSS, Connector, Load
@@ -26,6 +27,7 @@ from dva_sim.network.link import (
 from dva_sim.network.link.link import Reception, make_link
 from dva_sim.network.messaging import Transport
 from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.protocol.exchange import NOON
 from dva_sim.simulation.full.control_room import add_dispatcher, add_dva, add_operator
 from dva_sim.simulation.full.disturbance import Disturbance
 from dva_sim.simulation.full.observations import (
@@ -126,6 +128,8 @@ class Watched:
         seats: So many operators are people, the last ones, if the scenario names none.
         keeps: Whether all that happens is kept to be measured; without, a run may last for ever.
         real: What carries the messages; None: the network that the scenario models.
+        memory: What survives the DVA.
+        time_of_day: See `AgentDevice`; devices that start anew need exact timestamps.
     """
 
     clock: Clock
@@ -134,6 +138,8 @@ class Watched:
     seats: int = 0
     keeps: bool = True
     real: RealLinks | None = None
+    memory: Store | None = None
+    time_of_day: tuple[float, bool] = (NOON, False)
 
 
 class Run:
@@ -166,7 +172,8 @@ class Run:
         self.links = {} if self.is_real else self._make_links()
         lan = Link(LAN, ConstantRate(LAN.rate_bps), self.stage.streams, "lan")
         self._lan = lan, lan
-        self.dva = add_dva(self.stage, keep_events=watched.keeps)
+        self._keeps_events = watched.keeps
+        self.dva = add_dva(self.stage, None, watched.memory, watched.keeps)
         self.field = Field(self.stage)
         self.field.populate()
         count = scenario.operator.count
@@ -200,7 +207,15 @@ class Run:
             network: Transport = VirtualNetwork(
                 self.clock, self._link_between, self._sent, self._connector, self.delivered
             )
-            return network, Stage(scenario, seed, network, self.recorder, cameras=watched.cameras)
+            stage = Stage(
+                scenario,
+                seed,
+                network,
+                self.recorder,
+                time_of_day=watched.time_of_day,
+                cameras=watched.cameras,
+            )
+            return network, stage
         time_of_day, join = real.time_of_day(), real.join
         stage = Stage(
             scenario, seed, real.network, self.recorder, join, time_of_day, cameras=watched.cameras
@@ -274,6 +289,11 @@ class Run:
                 if i.detected < math.inf
             )
         )
+
+    def start_dva(self, memory: Store) -> None:
+        """Start another DVA in place of the one that has crashed, from what that has kept."""
+        self.dva = add_dva(self.stage, None, memory, self._keeps_events)
+        self.dva.start()
 
     def be_patient(self, scenario: Scenario) -> None:
         """From now on everybody waits for answers as long as another scenario's link needs."""
@@ -383,13 +403,24 @@ class Run:
             x, y = who.walking.place
             if is_dangerous(who.exposure.conditions) or self.field.is_near(dangers, x, y):
                 self.recorder.exposure[name] += WATCH_PERIOD
-        motions = {name: motion_of(robot) for name, robot in self.field.robots.items()}
-        page = page_of(self.dva)
         if self._log is not None:
             self._log.places(now, self.field.places())
+        self.show_motions()
+        self.show_page()
+
+    def show_motions(self) -> None:
+        """Let all observers see how the robots move now."""
+        now = self.clock.now
+        self.field.world.advance_to(now)
+        motions = {name: motion_of(robot) for name, robot in self.field.robots.items()}
         for observer in self._observers:
             observer.moves(now, motions)
-            observer.shows(now, page)
+
+    def show_page(self) -> None:
+        """Let all observers see the DVA's book as it is now."""
+        page = page_of(self.dva)
+        for observer in self._observers:
+            observer.shows(self.clock.now, page)
 
     def _sample(self) -> None:
         """Note where everybody is who is on the site."""

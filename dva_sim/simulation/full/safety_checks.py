@@ -31,6 +31,7 @@ MOVING = 0.05  # above this a robot is going somewhere [m/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
 ROUNDED = 0.002  # of ticks [s]
+STARTED_ANEW = 10.0  # a robot whose clock has jumped that much [s]
 LEASE = 30.0  # a driver of whom nothing valid was heard for so long has the robot no longer [s]
 LEASE_SLACK = 2.0  # a robot looks at that once a second, the audit twice [s]
 ENDLESS = 3600.0  # a set point that holds for so long has no end [s]
@@ -299,15 +300,12 @@ class SafetyAudit:
             return
         witness = self.witness(source)
         if not isinstance(payload, bytes):
-            if witness.offset is None:
-                witness.offset = offset_of(payload)
+            witness.offset = offset_of(payload) or witness.offset
             return
         if b"<GetGrant" in payload and payload != witness.question:
             witness.question, witness.asked = payload, now
-        if witness.offset is None and b"<RobotStatus>" in payload:
-            status = _read(payload)
-            if status is not None and isinstance(status.body, m.RobotStatus):
-                witness.offset = now - status.body.tick / 1000
+        if b"<RobotStatus>" in payload:
+            _learn_offset(witness, _read(payload), now)
         if not witness.unanswered:
             return
         reply = _read(payload) if b"<reply>" in payload else None
@@ -514,6 +512,15 @@ def offset_of(picture: Any) -> float | None:
         return picture.captured - picture.observation.tick / 1000
     tick = picture.get("tick_ms")  # as a recording has it
     return None if tick is None else float(picture["captured_s"]) - float(tick) / 1000
+
+
+def _learn_offset(witness: Witness, status: m.Message | None, now: float) -> None:
+    """A status shows the offset roughly: where it is not known, or the robot has started anew."""
+    if status is None or not isinstance(status.body, m.RobotStatus):
+        return
+    offset = now - status.body.tick / 1000
+    if witness.offset is None or abs(offset - witness.offset) > STARTED_ANEW:
+        witness.offset = offset
 
 
 def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:

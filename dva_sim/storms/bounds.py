@@ -1,0 +1,67 @@
+"""S10: queues, registry, caches and memory are bounded, by counting what is really there."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from types import FunctionType, MethodType, ModuleType
+from typing import Any, Final
+
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
+
+MOST: Final = 2_500
+"""Elements of a container without a bound of its own: twice a full queue, and some."""
+BOUNDS: Final[dict[str, int]] = {
+    "Registry.entries": 20_000,
+    "EventBook.open": 10_000,
+    "EventBook.closed": 10_000,
+    "EventBook.waiting": 10_000,
+    "Requester.round_trips": 100_000,
+    "DvaAgent._told": 20_000,
+    "ReplyCache._replies": 64 * 1024,
+    "Trail._facts": 10_000,
+    "Store._events": 10_000,
+}
+"""Bounds that are stated in docs/invariants.md, by class and attribute."""
+KEPT_FOR_MEASURES: Final = frozenset({"DvaAgent.events", "DvaAgent.facts"})
+"""What a run keeps of everything, to measure it afterwards; a DVA that lasts keeps none of it."""
+_ATOMS: Final = (str, bytes, int, float, complex, bool, type(None), type, ModuleType, FunctionType)
+_NOT_THEIRS: Final = (Recorder, Clock)
+
+
+def oversized(roots: Iterable[object]) -> Iterator[tuple[str, int, int]]:
+    """Yield each container that holds more than it may, of all that can be reached from objects.
+
+    Args:
+        roots: Agents; what they share with the whole run is left out.
+
+    Yields:
+        Class and attribute, number of elements, bound.
+    """
+    seen, todo = set[int](), [("", root) for root in roots]
+    while todo:
+        name, each = todo.pop()
+        if isinstance(each, _ATOMS) or isinstance(each, _NOT_THEIRS) or id(each) in seen:
+            continue
+        seen.add(id(each))
+        if isinstance(each, (dict, list, tuple, set, frozenset, deque)):
+            if name in KEPT_FOR_MEASURES:
+                continue
+            bound = BOUNDS.get(name, MOST)
+            if len(each) > bound:
+                yield name, len(each), bound
+            inner = each.values() if isinstance(each, dict) else each
+            todo += [(f"{name}[]", value) for value in inner if not isinstance(value, _ATOMS)]
+        elif isinstance(each, MethodType):
+            continue
+        elif type(each).__module__.startswith("dva_sim."):
+            todo += [(f"{type(each).__name__}.{key}", v) for key, v in _attributes(each)]
+
+
+def _attributes(each: object) -> Iterator[tuple[str, Any]]:
+    yield from getattr(each, "__dict__", {}).items()
+    for kind in type(each).__mro__:
+        for slot in getattr(kind, "__slots__", ()):
+            if hasattr(each, slot):
+                yield slot, getattr(each, slot)

@@ -1,0 +1,148 @@
+"""Many storms: played by processes of this machine, kept as they end, gone on with later."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final
+
+from scipy.stats import chi2
+
+from dva_sim.experiments.execution.executors import Workers
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import Breach
+from dva_sim.storms.drawing import draw
+from dva_sim.storms.storm import Outcome, play
+
+HOUR = 3600.0
+CONFIDENCE: Final = 0.95
+LOOK_EVERY = 1.0  # after the processes [s]
+
+
+@dataclass
+class Tally:
+    """What many storms add up to.
+
+    Attributes:
+        storms: Number of storms.
+        hours: Simulated time of one team each [h].
+        cpu_s: What they cost [s].
+        faults: Number of faults by kind.
+        messages: Number of messages that faults have touched, by kind.
+        failures: Seeds of the storms that broke a rule, with the rules.
+    """
+
+    storms: int = 0
+    hours: float = 0.0
+    cpu_s: float = 0.0
+    faults: Counter[str] = field(default_factory=Counter)
+    messages: Counter[str] = field(default_factory=Counter)
+    failures: dict[int, list[str]] = field(default_factory=dict)
+
+    def add(self, outcome: Outcome) -> None:
+        """Count one more storm."""
+        self.storms += 1
+        self.hours += outcome.simulated_s / HOUR
+        self.cpu_s += outcome.cpu_s
+        self.faults += outcome.faults
+        self.messages += outcome.messages
+        if not outcome.is_clean:
+            self.failures[outcome.seed] = sorted(outcome.signature)
+
+    def most_per_hour(self) -> float:
+        """Return the upper limit of failed storms in an hour of one team, exact (Garwood 1936)."""
+        if not self.hours:
+            return float("inf")
+        return float(chi2.ppf(CONFIDENCE, 2 * (len(self.failures) + 1)) / 2 / self.hours)
+
+
+def play_seed(seed: int, profile: str) -> Outcome:
+    """Play the storm of a seed."""
+    return play(draw(seed, profile))
+
+
+class Journal:
+    """The outcomes of storms in a file, one line each, so that a campaign can be gone on with.
+
+    Args:
+        file: Made if it is not there.
+
+    Raises:
+        ConfigError: it is something else.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.outcomes: dict[tuple[str, int], Outcome] = {}
+        if not file.exists():
+            return
+        whole = file.read_bytes()
+        lines, _, rest = whole.rpartition(b"\n")
+        try:
+            for line in lines.splitlines():
+                kept = json.loads(line)
+                self.outcomes[kept["profile"], kept["seed"]] = outcome_of(kept)
+        except (ValueError, KeyError, TypeError) as error:
+            raise ConfigError(f"is no journal of storms: {error}", file) from None
+        if rest:  # of a process that was killed while it wrote
+            file.write_bytes(lines + b"\n" if lines else b"")
+
+    def keep(self, profile: str, outcome: Outcome) -> None:
+        """Write down the outcome of a storm."""
+        self.outcomes[profile, outcome.seed] = outcome
+        line = json.dumps({"profile": profile, **plain(outcome)})
+        with self._file.open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+
+def plain(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome as JSON has it."""
+    return {
+        **{key: value for key, value in vars(outcome).items() if key != "breaches"},
+        "breaches": [vars(breach) for breach in outcome.breaches],
+    }
+
+
+def outcome_of(kept: dict[str, Any]) -> Outcome:
+    """Return an outcome from JSON."""
+    fields = {key: value for key, value in kept.items() if key not in ("profile", "breaches")}
+    for counted in ("faults", "messages"):
+        fields[counted] = Counter(fields[counted])
+    return Outcome(**fields, breaches=[Breach(**each) for each in kept["breaches"]])
+
+
+def outcomes(
+    seeds: Iterable[int], profile: str, journal: Journal, workers: Workers
+) -> Iterator[tuple[Outcome, bool]]:
+    """Yield the outcomes of storms, and whether each was known before, as they come.
+
+    Args:
+        seeds: Which storms.
+        profile: Which kinds of faults.
+        journal: Keeps them.
+        workers: Who plays them.
+    """
+    todo = []
+    for seed in seeds:
+        known = journal.outcomes.get((profile, seed))
+        if known is None:
+            todo.append(seed)
+        else:
+            yield known, True
+    waiting, left = set[Future[Outcome]](), iter(todo)
+    with workers.executor(workers.width, play_seed) as executor:
+        while True:
+            for seed in islice(left, 2 * workers.width - len(waiting)):
+                waiting.add(executor.submit(play_seed, seed, profile))
+            if not waiting:
+                return
+            done, waiting = wait(waiting, LOOK_EVERY, FIRST_COMPLETED)
+            workers.look_after(not done)
+            for future in done:
+                journal.keep(profile, outcome := future.result())
+                yield outcome, False

@@ -1,0 +1,157 @@
+"""Draws a storm from its seed: team, site, link, policy, pattern, people, events and faults."""
+
+from __future__ import annotations
+
+import random
+from typing import Any, Final
+
+from dva_sim.core.dispatch import POLICIES
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.network.patterns import PATTERNS
+from dva_sim.storms.faults import FAULTS, FaultKind
+from dva_sim.storms.plan import Fault, Plan
+
+FIRST, STORM = 15.0, 600.0  # faults begin and have ended [s]
+DEADLINES: Final = (3.0, 6.0, 9.0, 10.0, 27.0, 30.0)
+"""Watchdog, age limit, time-out, silence, three time-outs, lease [s]: a fault often lasts about
+as long as one of them."""
+PROFILES: Final[dict[str, tuple[str, ...]]] = {
+    "all": tuple(FAULTS),
+    "messages": tuple(
+        kind for kind in FAULTS if kind.startswith(("messages", "partition", "replay", "junk"))
+    ),
+    "nodes": tuple(
+        kind
+        for kind in FAULTS
+        if kind.startswith(("robot", "dva", "frozen", "clock", "vanishes", "replies"))
+    ),
+    "people": (
+        *("revocation", "take-over", "emergency", "asks-twice", "old-session", "held-tilt"),
+        *("second-driver", "flood", "taken-by-hand", "vanishes", "replay-by-another"),
+    ),
+    "none": (),
+}
+"""Which kinds of faults a profile draws from."""
+
+
+def draw(seed: int, profile: str = "all") -> Plan:
+    """Draw a storm.
+
+    Args:
+        seed: Of everything in it.
+        profile: Which kinds of faults it has, as in `PROFILES`.
+
+    Raises:
+        ConfigError: there is no such profile.
+    """
+    if profile not in PROFILES:
+        raise ConfigError(unknown("profile", profile, PROFILES))
+    chance = random.Random(f"storm {seed}")
+    scenario = _scenario(chance)
+    kinds = PROFILES[profile]
+    count = round(chance.uniform(10, 60)) if kinds else 0
+    faults = sorted(
+        (_fault(chance, kinds, scenario) for _ in range(count)), key=lambda each: each.at_s
+    )
+    return Plan(seed, scenario, tuple(faults), STORM)
+
+
+def _scenario(chance: random.Random) -> dict[str, Any]:
+    robots, guards = chance.randint(2, 6), chance.randint(1, 4)
+    return {
+        "site": _site(chance),
+        "robot": {"count": robots, "watchdog_s": chance.choice((1.0, 3.0, 3.0))},
+        "guard": {"count": guards, "mobilisation_s": chance.choice((5.0, 15.0))},
+        "operator": {
+            "count": chance.randint(1, min(4, robots)),
+            "strategy": chance.choice(("adaptive", "pursuit", "move_and_wait")),
+            "span": chance.choice((1, 1, 2)),
+            "person": chance.randrange(100),
+        },
+        "control": chance.choice(("direct", "direct", "coordinated", "supervisory")),
+        "pattern": chance.choice(sorted(PATTERNS)),
+        "command": {"rate_hz": chance.choice((2, 5, 10))},
+        "camera": {"rate_hz": chance.choice((2, 5)), "frame_bytes": 4000},
+        "request": {"timeout_s": 9.0, "attempts": 3},
+        "link": _link(chance),
+        "dva": {"sensors": chance.choice(([], [], [], ["temperature", "smoke"]))},
+        "dispatch": {
+            "policy": chance.choice(sorted(POLICIES.keys() - {"oracle"})),
+            "containment": chance.random() < 0.5,
+            "escalate_after_s": chance.choice((30.0, 120.0)),
+            "order_limit_s": 300.0,
+            "depart_within_s": 60.0,
+            "mode": chance.choice(("automatic", "automatic", "ask_first")),
+            "decide_within_s": 10.0,
+        },
+        "events": [_event(chance, number) for number in range(chance.randint(2, 8))],
+    }
+
+
+def _site(chance: random.Random) -> dict[str, Any]:
+    name = chance.choice(("caparica", "caparica", "hall", "office-block"))
+    if name != "office-block":
+        return {"name": name}
+    return {"name": name, "options": {"seed": chance.randint(1, 4), "width_m": 40, "depth_m": 30}}
+
+
+def _link(chance: random.Random) -> dict[str, Any]:
+    link: dict[str, Any] = {"delay_s": chance.choice((0.005, 0.05, 0.2, 0.5, 1.0))}
+    if chance.random() < 0.3:
+        link["loss"] = chance.choice((0.005, 0.02))
+    if chance.random() < 0.3:
+        link["outages"] = [
+            {"from_s": chance.uniform(FIRST, STORM - 60), "for_s": chance.uniform(1, 30)}
+        ]
+    return link
+
+
+def _event(chance: random.Random, number: int) -> dict[str, Any]:
+    kind = chance.choice(("fire", "gas_leak", "flood"))
+    return {
+        "kind": kind,
+        "at_s": round(chance.uniform(5.0, STORM - 100.0), 1),
+        "reported": True,
+        "false_alarm": chance.random() < 0.2,
+        "reports": chance.choice((1, 1, 3)),
+    }
+
+
+def _fault(chance: random.Random, kinds: tuple[str, ...], scenario: dict[str, Any]) -> Fault:
+    (name,) = chance.choices(kinds, [FAULTS[kind].weight for kind in kinds])
+    kind = FAULTS[name]
+    target = _device(chance, kind.strikes, scenario)
+    source = _device(chance, ("", "operator", "dva", "robot"), scenario) if _passes(name) else ""
+    lasts = _duration(chance, kind)
+    at = round(chance.uniform(FIRST, STORM - lasts - 45.0), 3)
+    on = chance.choice(kind.on) if kind.on and chance.random() < 0.5 else ""
+    return Fault(
+        kind=name,
+        at_s=at,
+        for_s=lasts,
+        target=target,
+        source=source if source != target else "",
+        on=on,
+        value=round(chance.uniform(*kind.value), 3),
+    )
+
+
+def _passes(name: str) -> bool:
+    return name.startswith(("messages", "partition"))
+
+
+def _duration(chance: random.Random, kind: FaultKind) -> float:
+    low, high = kind.lasts
+    near = [deadline for deadline in DEADLINES if low <= deadline <= high]
+    if near and chance.random() < 0.5:
+        return round(chance.choice(near) + chance.uniform(-0.3, 0.3), 3)
+    return round(chance.uniform(low, high), 3)
+
+
+def _device(chance: random.Random, kinds: tuple[str, ...], scenario: dict[str, Any]) -> str:
+    """Draw a device of some kinds, by label."""
+    kind = chance.choice(kinds)
+    if kind in ("", "dva"):
+        return kind
+    return f"{kind}-{chance.randint(1, scenario[kind]['count'])}"

@@ -1,0 +1,85 @@
+"""The lives of a DVA that is killed and started anew from its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from dva_sim.core.store import Store
+from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.simulation.full.run import Run
+from dva_sim.simulation.full.stage import DVA
+
+
+class Killed(BaseException):
+    """The process of the DVA ends here; nothing of what it was about to do happens."""
+
+
+class DvaLives:
+    """Kills the DVA of a run, and starts it anew.
+
+    Args:
+        file: Its memory.
+        down: Called with True when it is killed, and with False when it is back.
+
+    Attributes:
+        memory: Of the present life.
+        kills: How often it was killed.
+    """
+
+    def __init__(self, file: Path, down: Callable[[bool], object]) -> None:
+        self._down = down
+        self._file, self.memory, self.kills = file, Store(file), 0
+        self._run: Run | None = None
+        self._away, self._is_away = 0.0, False
+
+    def begin(self, run: Run) -> None:
+        """Take over the DVA of a run that was made with this memory."""
+        self._run = run
+
+    def kill(self, away: float) -> None:
+        """Kill it now; it is back after so many seconds."""
+        run = self._run
+        assert run is not None
+        if self._is_away:
+            return
+        self.kills, self._is_away = self.kills + 1, True
+        assert isinstance(run.network, VirtualNetwork)
+        run.network.leave(DVA)
+        run.dva.crash()
+        self._down(True)
+        run.clock.call_after(away, self._back)
+
+    def kill_at_write(self, number: int, away: float) -> None:
+        """Kill it at one of its next writes; nothing of that write remains."""
+        left = [number]
+
+        def between_writes() -> None:
+            left[0] -= 1
+            if left[0] < 0:
+                self._away = away
+                raise Killed
+
+        self.memory.between_writes = between_writes
+
+    def survive(self, until: float) -> None:
+        """Let time pass, through any death in the midst of a write."""
+        run = self._run
+        assert run is not None
+        while True:
+            try:
+                run.clock.run(until)
+            except Killed:
+                self.kill(self._away)
+            else:
+                return
+
+    def _back(self) -> None:
+        run = self._run
+        assert run is not None
+        self._is_away = False
+        self.memory = Store(self._file)
+        run.start_dva(self.memory)
+        assert isinstance(run.network, VirtualNetwork)
+        run.network.come_back(DVA)
+        self._down(False)

@@ -1,0 +1,214 @@
+"""Interference with messages: what reaches a node late, twice, altered, or not at all."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from dva_sim.agents.observation import CameraFrame
+from dva_sim.kernel.clock import Clock
+from dva_sim.network.virtual_network import Take
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode, encode
+from dva_sim.protocol.errors import ProtocolError
+
+REMEMBERED = 64  # messages to a node that may be replayed
+
+
+class Passing(NamedTuple):
+    """A message that is about to reach a node.
+
+    Attributes:
+        source: Id of its sender.
+        to: Id of its receiver.
+        payload: Bytes, or a camera frame.
+        take: Hands a payload to the receiver, now.
+    """
+
+    source: str
+    to: str
+    payload: Any
+    take: Take
+
+
+Rule = Callable[[Passing], bool]
+"""Takes a message that is passing; True if nothing else is to happen to it."""
+
+
+class Interference:
+    """Lets each message pass, unless a rule that is in force says otherwise.
+
+    Args:
+        clock: The run's clock.
+        watch: Called with each message that really reaches its receiver, and what takes it there.
+
+    Attributes:
+        rules: In force now, in the order in which they began.
+        counts: Messages that were interfered with, by kind of fault.
+        delivered: Number of messages that have reached somebody.
+    """
+
+    def __init__(self, clock: Clock, watch: Callable[[Passing], None]) -> None:
+        self.clock, self.rules, self.counts = clock, list[Rule](), Counter[str]()
+        self._watch, self.delivered = watch, 0
+        self._awaited: list[tuple[bytes, str, Callable[[], object]]] = []
+        self._past: dict[str, deque[Passing]] = {}
+
+    def __call__(self, source: str, to: str, payload: Any, take: Take) -> None:
+        """See `VirtualNetwork.interference`."""
+        passing = Passing(source, to, payload, take)
+        if isinstance(payload, bytes):
+            self._past.setdefault(to, deque(maxlen=REMEMBERED)).append(passing)
+            if self._awaited:
+                self._look_out(passing)
+        for rule in tuple(self.rules):
+            if rule(passing):
+                return
+        self.deliver(passing)
+
+    def deliver(self, passing: Passing) -> None:
+        """Let a message reach its receiver now."""
+        self.delivered += 1
+        self._watch(passing)
+
+    def later(self, passing: Passing, delay: float) -> None:
+        """Let a message reach its receiver after a delay [s]."""
+        self.clock.call_after(delay, self.deliver, passing)
+
+    def past(self, to: str) -> list[Passing]:
+        """Return the newest messages to a node."""
+        return list(self._past.get(to, ()))
+
+    def await_message(self, kind: str, to: str, then: Callable[[], object]) -> None:
+        """Call `then` once, just before the next message of a kind reaches a node.
+
+        Args:
+            kind: Name of its element, such as `StartTeleOp`.
+            to: Id of the receiver; empty: any.
+            then: What happens.
+        """
+        self._awaited.append((b"<" + kind.encode(), to, then))
+
+    def _look_out(self, passing: Passing) -> None:
+        for waiting in tuple(self._awaited):
+            kind, to, then = waiting
+            if to in ("", passing.to) and kind in passing.payload:
+                self._awaited.remove(waiting)
+                then()
+
+
+# --- rules -------------------------------------------------------------------------------
+
+
+def loses(share: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Lose a share of the messages."""
+    return lambda interference, passing: chance.random() < share
+
+
+def delays(longest: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Delay each message by up to so much [s]; they overtake each other."""
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        interference.later(passing, longest * chance.random())
+        return True
+
+    return rule
+
+
+def doubles(longest: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Let each message pass, and a copy of it up to so much later [s]."""
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        interference.deliver(passing)
+        interference.later(passing, longest * chance.random())
+        return True
+
+    return rule
+
+
+def reorders(longest: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Hold back every second message, at random, by up to so much [s]."""
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        if chance.random() < 0.5:
+            return False
+        interference.later(passing, longest * chance.random())
+        return True
+
+    return rule
+
+
+def corrupts(share: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Alter a share of the messages: a byte is changed, lost, or another one inserted."""
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        if not isinstance(passing.payload, bytes) or chance.random() >= share:
+            return False
+        data, place = passing.payload, chance.randrange(len(passing.payload))
+        new = bytes([chance.randrange(256)]) * chance.randrange(3)
+        altered = data[:place] + new + data[place + 1 :]
+        interference.deliver(passing._replace(payload=altered))
+        return True
+
+    return rule
+
+
+def loses_in_bursts(share: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Lose all messages in a share of the quarters of a second."""
+    first = chance.randrange(1 << 30)
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        slot = int(interference.clock.now * 4)
+        return random.Random(first + slot).random() < share
+
+    return rule
+
+
+def holds_tilt(speed: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Make all commands say the same, as of somebody who has put the phone aside.
+
+    Args:
+        speed: What they say [m/s].
+        chance: Draws the turn rate.
+    """
+    turn = chance.uniform(-0.5, 0.5)
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        message = _read(passing.payload) if b"<SetTeleOp" in _bytes(passing.payload) else None
+        if message is None or not isinstance(message.body, m.SetTeleOp):
+            return False
+        body = message.body._replace(speed=speed, turn_rate=turn)
+        same = encode(message._replace(body=body))
+        interference.deliver(passing._replace(payload=same))
+        return True
+
+    return rule
+
+
+def freezes_pictures(_: float, __: random.Random) -> Callable[[Interference, Passing], bool]:
+    """Show the first picture for ever, each time with the tick of the present one: a lie."""
+    shown: dict[str, CameraFrame] = {}
+
+    def rule(interference: Interference, passing: Passing) -> bool:
+        frame = passing.payload
+        if not isinstance(frame, CameraFrame):
+            return False
+        first = shown.setdefault(passing.source, frame)
+        lie = first.observation._replace(tick=frame.observation.tick)
+        interference.deliver(passing._replace(payload=frame._replace(observation=lie)))
+        return True
+
+    return rule
+
+
+def _bytes(payload: Any) -> bytes:
+    return payload if isinstance(payload, bytes) else b""
+
+
+def _read(data: bytes) -> m.Message | None:
+    try:
+        return decode(data)
+    except ProtocolError:
+        return None

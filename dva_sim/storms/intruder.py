@@ -1,0 +1,80 @@
+"""A device that does what no honest one does: forges, floods, replays, drives beside the driver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import count
+
+from dva_sim.agents.device import AgentDevice, do_nothing
+from dva_sim.network.messaging import Wire
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
+from dva_sim.simulation.full.stage import DVA, Stage
+
+NUMBER = 900  # beyond all operators of a scenario
+
+
+class Intruder:
+    """A device that says anything to anybody.
+
+    Args:
+        stage: Where.
+        number: Tells it from other intruders.
+    """
+
+    def __init__(self, stage: Stage, number: int = NUMBER) -> None:
+        self.device: AgentDevice = stage.device("operator", number)
+        self.device.label = stage.labels[self.device.id_tag] = f"intruder-{number - NUMBER + 1}"
+        self.device.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
+        self._network, self._tags = stage.network, count(1)
+        self._wires: dict[str, Wire] = {}
+        self.ask = self.device.ask
+
+    def send(self, to: str, data: bytes) -> None:
+        """Send bytes as a request, and care for no answer."""
+        if to not in self._wires:
+            node = self.device.id_tag
+            self._wires[to] = self._network.connect(node, to, do_nothing, pipelined=True)
+        self._wires[to].send(next(self._tags), data)
+
+    def send_message(self, to: str, body: m.Body, session: int = 0) -> None:
+        """Send a request, and care for no answer."""
+        now = self.device.clock.now
+        self.send(to, encode(self.device.outbox.message(to, body, now, session)))
+
+    def report(self, kind: str, place: m.Position) -> None:
+        """Report an event once."""
+        self.ask(DVA, m.EventReport(None, kind, place, 0.5, 0.9, "detected"))
+
+    def drive(self, robot: str, rate: float) -> Callable[[], None]:
+        """Ask for a robot until it is granted, then drive it with so many commands a second.
+
+        Returns:
+            What ends that: it vanishes without giving anything back.
+        """
+        held, goes = list[int](), [True]
+        self.device.register()
+
+        def answered(reply: m.Reply) -> None:
+            if isinstance(reply.content, m.Permission):
+                held[:] = [reply.content.session]
+                self.ask(robot, m.StartTeleOp(), session=held[0])
+
+        def act() -> bool:
+            if not held:
+                self.ask(DVA, m.PermissionRequest(robot, "teleoperation"), answered)
+            return goes[0]
+
+        def command() -> bool:
+            if held and goes[0]:
+                self.send_message(robot, m.SetTeleOp(0.4, 0.2), held[0])
+            return goes[0]
+
+        def ends() -> None:
+            goes[0] = False
+            self.device.leave()
+            self.device.come_back()
+
+        self.device.clock.every(2.0, act)
+        self.device.clock.every(1.0 / rate, command)
+        return ends

@@ -1,0 +1,122 @@
+"""The plan of a storm: a scenario, and the faults that strike it, each with its time.
+
+A plan is data. It can be written to a file, cut down to fewer faults, and run again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.yaml_files import load_yaml
+from dva_sim.simulation import scenario as scenarios
+from dva_sim.simulation.scenario import Scenario
+
+RECOVERS_WITHIN: Final = 120.0
+"""From the end of the last fault to the probes that must succeed (S8) [s].
+
+A request fails after three attempts of 9 s. Who cannot register asks again every 2 s, who can every
+10 s; the DVA calls somebody silent after 10 s, and forgets a permission with them. Four of these
+chains follow each other where a robot has just been restarted under a driver.
+"""
+PROBES_LAST: Final = 120.0
+"""How long a probe may take, from the first request to its end [s]."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that goes wrong.
+
+    Attributes:
+        kind: Its name, as in `dva_sim.storms.faults.FAULTS`.
+        at_s: When it begins at the earliest [s].
+        for_s: How long it lasts [s]; 0: it is an act, and over at once.
+        target: Label of the device that it strikes, such as `robot-1`; empty: any.
+        source: Of faults of messages: label of the sender; empty: any.
+        on: Waits for the first message of this kind to the target, such as `StartTeleOp`; empty:
+            it begins at `at_s`.
+        value: Its strength; each kind says what that is.
+    """
+
+    kind: str
+    at_s: float
+    for_s: float = 0.0
+    target: str = ""
+    source: str = ""
+    on: str = ""
+    value: float = 0.0
+
+    def as_plain(self) -> dict[str, Any]:
+        """Return it for a file, without what is as usual."""
+        usual = {field.name: field.default for field in fields(self)}
+        return {key: value for key, value in asdict(self).items() if value != usual[key]}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A storm.
+
+    Attributes:
+        seed: Of all chance in it.
+        scenario: Keys of a scenario, as in its file.
+        faults: In order of time.
+        calm_s: When the last fault has ended [s]; from then on everything has to recover.
+    """
+
+    seed: int
+    scenario: Mapping[str, Any]
+    faults: tuple[Fault, ...]
+    calm_s: float
+
+    @property
+    def horizon_s(self) -> float:
+        """When it is over [s]: after recovery and probes."""
+        return self.calm_s + RECOVERS_WITHIN + PROBES_LAST
+
+    def built(self) -> Scenario:
+        """Return the scenario.
+
+        Raises:
+            ConfigError: it makes no sense.
+        """
+        scenario = scenarios.build(dict(self.scenario), {"horizon_s": self.horizon_s})
+        assert isinstance(scenario, Scenario)
+        return scenario
+
+    def with_faults(self, faults: tuple[Fault, ...]) -> Plan:
+        """Return the same storm with other faults."""
+        return replace(self, faults=faults)
+
+    def as_plain(self) -> dict[str, Any]:
+        """Return it for a file."""
+        return {
+            "seed": self.seed,
+            "calm_s": self.calm_s,
+            "scenario": dict(self.scenario),
+            "faults": [fault.as_plain() for fault in self.faults],
+        }
+
+    def text(self) -> str:
+        """Return its file."""
+        return yaml.safe_dump(self.as_plain(), sort_keys=False, width=100)
+
+
+def load_plan(path: Path) -> Plan:
+    """Read a plan from its file.
+
+    Raises:
+        ConfigError: it cannot be read, or is no plan.
+    """
+    data = load_yaml(path).data
+    try:
+        faults = tuple(Fault(**fault) for fault in data["faults"])
+        plan = Plan(int(data["seed"]), data["scenario"], faults, float(data["calm_s"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ConfigError(f"is not the plan of a storm: {error}", path) from None
+    plan.built()
+    return plan

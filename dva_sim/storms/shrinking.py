@@ -1,0 +1,111 @@
+"""Cuts a storm that breaks a rule down to what breaks it: fewer faults, fewer agents, no link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.storms.plan import Fault, Plan
+from dva_sim.storms.storm import Outcome, Storm, play
+
+TRIES: Final = 120
+"""So many smaller storms are tried at most."""
+_PLAINER: Final[tuple[tuple[str, Any], ...]] = (
+    ("link", {"delay_s": 0.05}),
+    ("site", {"name": "caparica"}),
+    ("control", "direct"),
+    ("pattern", "latest-wins"),
+    ("dva", {}),
+)
+"""Parts of a scenario, and what is plainer than anything else there."""
+
+
+class Shrinker:
+    """Looks for the smallest storm that fails as a given one does.
+
+    Args:
+        plan: A storm that fails.
+        outcome: How.
+        before: Called with each storm before it begins.
+        tries: How many are played at most.
+
+    Attributes:
+        plan: The smallest so far.
+        outcome: Its outcome.
+        left: How many may still be played.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        outcome: Outcome,
+        before: Callable[[Storm], object] = lambda _: None,
+        tries: int = TRIES,
+    ) -> None:
+        self.plan, self.outcome, self.left = plan, outcome, tries
+        self._before, self._wanted = before, outcome.signature
+
+    def shrink(self) -> Plan:
+        """Return the smallest storm that still breaks one of the same rules."""
+        self._drop_faults()
+        for smaller in self._simpler():
+            self._try(smaller)
+        self._drop_faults()
+        return self.plan
+
+    def _try(self, plan: Plan) -> bool:
+        """Play a smaller storm; keep it if it fails in the same way."""
+        if self.left <= 0 or plan == self.plan:
+            return False
+        self.left -= 1
+        try:
+            outcome = play(plan, self._before)
+        except ConfigError:
+            return False  # nobody is left to act, for example
+        if not outcome.signature & self._wanted:
+            return False
+        self.plan, self.outcome = plan, outcome
+        return True
+
+    def _drop_faults(self) -> None:
+        """Drop halves, then quarters, down to single faults, as long as the failure remains."""
+        size = -(-len(self.plan.faults) // 2)
+        while size and self.left > 0:
+            if not any(self._try(self.plan.with_faults(f)) for f in _without(self.plan, size)):
+                size = size // 2 if size > 1 else 0
+
+    def _simpler(self) -> Iterator[Plan]:
+        """Yield storms with fewer events and agents, and a plainer scenario, one step each."""
+        while len(self.plan.scenario["events"]) > 1:
+            before = self.plan
+            for number in range(len(before.scenario["events"])):
+                yield self._with("events", _all_but(self.plan.scenario["events"], number))
+                if self.plan is not before:
+                    break
+            else:
+                break
+        for kind in ("robot", "guard", "operator"):
+            named = [f.target for f in self.plan.faults] + [f.source for f in self.plan.faults]
+            numbers = [int(n.rpartition("-")[2]) for n in named if n.startswith(kind + "-")]
+            for count in range(max([1, *numbers]), self.plan.scenario[kind]["count"]):
+                before = self.plan
+                yield self._with(kind, {**self.plan.scenario[kind], "count": count})
+                if self.plan is not before:
+                    break
+        for key, plain in _PLAINER:
+            yield self._with(key, plain)
+
+    def _with(self, key: str, value: Any) -> Plan:
+        return replace(self.plan, scenario={**self.plan.scenario, key: value})
+
+
+def _without(plan: Plan, size: int) -> Iterator[tuple[Fault, ...]]:
+    """Yield the faults without so many neighbours, from each place."""
+    for first in range(0, len(plan.faults), size):
+        yield plan.faults[:first] + plan.faults[first + size :]
+
+
+def _all_but(items: Sequence[Any], number: int) -> list[Any]:
+    return [item for place, item in enumerate(items) if place != number]

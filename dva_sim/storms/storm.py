@@ -1,0 +1,304 @@
+"""One storm: a run in virtual time, its faults, and what the checkers find."""
+
+from __future__ import annotations
+
+import hashlib
+import random
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.robot.faults import RobotFaults
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Accepted, Breach, Recorder
+from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.protocol.exchange import NOON
+from dva_sim.protocol.messages import PermissionGrant, Position
+from dva_sim.simulation.full.observations import RobotMotion, motion_of
+from dva_sim.simulation.full.physical_world import PHYSICS_TICK
+from dva_sim.simulation.full.run import Run, Watched
+from dva_sim.simulation.full.stage import DVA
+from dva_sim.storms.answers import Answers
+from dva_sim.storms.bounds import oversized
+from dva_sim.storms.dva_lives import DvaLives
+from dva_sim.storms.faults import FAULTS
+from dva_sim.storms.interference import Interference, Passing
+from dva_sim.storms.intruder import Intruder
+from dva_sim.storms.plan import Fault, Plan
+from dva_sim.storms.recovery import Recovery
+
+LOOK_AT_BOUNDS = 60.0  # how often all containers are counted [s]
+SILENCED = frozenset(
+    {"robot-hangs", "robot-without-power", "robot-restarts", "replies-lost", "vanishes"}
+    | {"dva-silent", "messages-lost", "partition", "frozen"}
+)
+"""Faults after which what was asked may stay without an answer."""
+
+
+class StormRobot(NamedTuple):
+    """A robot of a storm."""
+
+    id: str
+    agent: RobotAgent
+    faults: RobotFaults
+
+
+@dataclass
+class Outcome:
+    """What a storm was, and what broke.
+
+    Attributes:
+        seed: Of the storm.
+        breaches: Of rules, each by one agent; none if all were held.
+        error: Traceback of an exception that ended it; empty if it went to its end.
+        faults: Number of faults by kind.
+        messages: Number of messages that faults have touched, by kind.
+        simulated_s: How long it lasted [s].
+        cpu_s: What it cost [s].
+        digest: Of all that was sent: the same storm has the same.
+    """
+
+    seed: int
+    breaches: list[Breach] = field(default_factory=list)
+    error: str = ""
+    faults: Counter[str] = field(default_factory=Counter)
+    messages: Counter[str] = field(default_factory=Counter)
+    simulated_s: float = 0.0
+    cpu_s: float = 0.0
+    digest: str = ""
+
+    @property
+    def signature(self) -> frozenset[str]:
+        """What makes two failures the same: the rules that broke, or the kind of exception."""
+        if self.error:
+            return frozenset({self.error.strip().rpartition("\n")[2].partition(":")[0]})
+        return frozenset(breach.rule for breach in self.breaches)
+
+    @property
+    def is_clean(self) -> bool:
+        """Return True if no rule was broken."""
+        return not self.breaches and not self.error
+
+
+class Storm:
+    """A run that a plan's faults strike.
+
+    Args:
+        plan: The storm.
+        folder: For the DVA's memory.
+
+    Attributes:
+        run: The run.
+        recorder: What happened.
+        interference: What reaches whom.
+        intruder: Does what no honest device does.
+        dva: Kills the DVA, and starts it anew.
+        robots: All robots.
+    """
+
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        self.plan, self.recorder = plan, Recorder(False)
+        self.dva = DvaLives(folder / "dva.sqlite", partial(self._excuse, DVA))
+        clock = Clock()
+        watched = Watched(
+            clock, self.recorder, memory=self.dva.memory, time_of_day=(NOON, True), keeps=False
+        )
+        self.run = run = Run(plan.built(), plan.seed, watched=watched)
+        self.dva.begin(run)
+        self.labelled = {label: id_tag for id_tag, label in run.stage.labels.items()}
+        self.robots = [
+            StormRobot(i, r, RobotFaults(r, self._lost)) for i, r in run.field.robots.items()
+        ]
+        nodes = {DVA: "dva"} | {robot.id: robot.agent.device.label for robot in self.robots}
+        self._answers = Answers(self.recorder, lambda: clock.now, nodes, self._answered)
+        self.interference = Interference(clock, self._arrives)
+        assert isinstance(run.network, VirtualNetwork)
+        run.network.interference = self.interference
+        run.network.taps |= {node: self._answers.tap(node) for node in nodes}
+        self.intruder = Intruder(run.stage)
+        self._recovery = Recovery(run.stage, self.recorder, self._motion, plan.calm_s)
+        self._digest = hashlib.blake2b(digest_size=12)
+        self._sessions: dict[str, list[int]] = {}
+        self.begun: Counter[str] = Counter()
+        run.observe(_Witness(self))
+        clock.every(PHYSICS_TICK, run.show_motions)
+        clock.every(1.0, self._answers.look)
+        clock.every(LOOK_AT_BOUNDS, self._look_at_bounds)
+        for fault in plan.faults:
+            clock.call_at(fault.at_s, self._await, fault)
+        self._recovery.begin([robot.id for robot in self.robots], self.anywhere(_chance(plan)))
+
+    def play(self) -> Outcome:
+        """Let the storm pass, and judge it."""
+        began = time.process_time()
+        self.dva.survive(self.plan.horizon_s)
+        self._recovery.end()
+        self._look_at_bounds()
+        return Outcome(
+            seed=self.plan.seed,
+            breaches=list(self.recorder.broken.values()),
+            faults=self.begun,
+            messages=self.interference.counts,
+            simulated_s=self.run.clock.now,
+            cpu_s=time.process_time() - began,
+            digest=self._digest.hexdigest(),
+        )
+
+    # --- what faults make use of -----------------------------------------------------------
+
+    @property
+    def now(self) -> float:
+        """Time [s]."""
+        return self.run.clock.now
+
+    def id_of(self, label: str) -> str:
+        """Return the id of a device by its label; of none, none."""
+        return self.labelled[label] if label else ""
+
+    def robot(self, label: str) -> StormRobot:
+        """Return a robot by its label."""
+        return next(robot for robot in self.robots if robot.id == self.labelled[label])
+
+    def device(self, label: str) -> AgentDevice:
+        """Return a device by its label."""
+        id_tag = self.labelled[label]
+        return next(d for d in reversed(self.run.stage.devices) if d.id_tag == id_tag)
+
+    def anywhere(self, chance: random.Random) -> Position:
+        """Draw a place within the bounds of the site, in walls or not."""
+        site = self.run.stage.site
+        low_x, low_y, high_x, high_y = site.extent
+        x, y = chance.uniform(low_x, high_x), chance.uniform(low_y, high_y)
+        return Position(*site.frame.to_latlon(x, y))
+
+    def sessions_seen(self, robot: str) -> list[int]:
+        """Return the newest sessions in which a robot was granted to somebody."""
+        return self._sessions.get(robot, [])[-8:]
+
+    # --- faults ------------------------------------------------------------------------------
+
+    def _await(self, fault: Fault) -> None:
+        if not fault.on:
+            self._begin(fault)
+            return
+        # What never comes is not waited for beyond the storm.
+        waits = [True]
+
+        def begin() -> None:
+            if waits[0] and self.now + fault.for_s <= self.plan.calm_s:
+                self._begin(fault)
+
+        self.interference.await_message(fault.on, self.id_of(fault.target), begin)
+        self.run.clock.call_at(self.plan.calm_s, waits.__setitem__, 0, False)
+
+    def _begin(self, fault: Fault) -> None:
+        self.begun[fault.kind] += 1
+        what = f"{fault.kind} {fault.source and fault.source + ' to '}{fault.target}"
+        self.recorder.tell(self.now, "storm", what, "fault")
+        node = self.id_of(fault.target)
+        is_silenced = fault.kind in SILENCED
+        if is_silenced:
+            self._excuse(node, True)
+        ends = FAULTS[fault.kind].begin(self, fault, _chance(self.plan, fault))
+        if ends is not None:
+            self.run.clock.call_after(fault.for_s, ends)
+        if is_silenced:
+            self.run.clock.call_after(fault.for_s + 1.0, self._excuse, node, False)
+
+    def _excuse(self, node: str, excused: bool) -> None:
+        for each in (node,) if node else (DVA, *(robot.id for robot in self.robots)):
+            self._answers.excuse(each, excused)
+
+    # --- what is seen --------------------------------------------------------------------------
+
+    def _arrives(self, passing: Passing) -> None:
+        self._answers.watch(passing)
+        if passing.to == DVA and isinstance(passing.payload, bytes):
+            if not any(quiet in passing.payload for quiet in (b"<HBMsg>", b"<RobotStatus>")):
+                self.run.show_page()
+
+    def _answered(self, node: str, to: str, reply: bytes) -> None:
+        """Tell the audit what a node has answered, even if there is nobody who hears it."""
+        self.run.audit.sent(self.now, node, to, reply)
+
+    def _lost(self, robot: str, reply: bytes) -> None:
+        self._answered(robot, "", reply)
+
+    def _motion(self, robot: str) -> Any:
+        return motion_of(self.run.field.robots[robot])
+
+    def _look_at_bounds(self) -> None:
+        agents = [self.run.dva, *(robot.agent for robot in self.robots)]
+        for name, held, bound in oversized(agents):
+            what = f"{name} holds {held}, more than {bound}"
+            self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)
+
+    def sent(self, now: float, source: str, to: str, payload: Any) -> None:
+        """Note what was sent, for the digest, and which sessions there are."""
+        if not isinstance(payload, bytes):
+            return
+        self._digest.update(f"{now:.6f} {source} {to} ".encode() + payload)
+        if source == DVA and b"<PermissionGrant" in payload:
+            from dva_sim.protocol.codec import decode
+
+            body = decode(payload).body
+            if isinstance(body, PermissionGrant):
+                self._sessions.setdefault(to, []).append(body.session)
+
+    def accepted(self, command: Accepted) -> None:
+        """Note that a robot obeys."""
+        self._recovery.accepted(command)
+
+    def moves(self, now: float, motions: Mapping[str, RobotMotion]) -> None:
+        """Note which robots go somewhere."""
+        self._recovery.moves(now, motions)
+
+
+class _Witness:
+    """Passes on what a storm has to know; see `Observer`."""
+
+    def __init__(self, storm: Storm) -> None:
+        self.sent, self.accepted, self.moves = storm.sent, storm.accepted, storm.moves
+
+    def _nothing(self, *_: object) -> None:
+        """See `Observer`."""
+
+    delivered = by_hand = shows = deafened = slowed = _nothing
+
+
+def _chance(plan: Plan, fault: Fault | None = None) -> random.Random:
+    """Return the chance of one fault: the same whatever other faults there are."""
+    return random.Random(f"{plan.seed} {fault!r}")
+
+
+def play(plan: Plan, before: Callable[[Storm], object] = lambda _: None) -> Outcome:
+    """Play a storm to its end, whatever happens.
+
+    Args:
+        plan: The storm.
+        before: Called with the storm before it begins.
+    """
+    import traceback
+
+    with tempfile.TemporaryDirectory(prefix="dva-storm-") as folder:
+        storm = Storm(plan, Path(folder))
+        before(storm)
+        try:
+            return storm.play()
+        except Exception:  # noqa: BLE001 - an exception is a finding like any other
+            return Outcome(
+                plan.seed,
+                list(storm.recorder.broken.values()),
+                traceback.format_exc(),
+                storm.begun,
+                storm.interference.counts,
+                storm.now,
+            )
+
