@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn
 import typer
 
 from dva_sim import __version__
-from dva_sim.cli import files, link, results, runs, site, studies
+from dva_sim.cli import files, link, results, runs, site, storm, studies
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
@@ -104,7 +104,7 @@ class DvaSimProgram(PanelGroup):
         },
         "Names, files and evidence": {
             **_named(files.list_, files.plugins, files.check, files.phone_log),
-            **_named(files.schema, files.validate),
+            **_named(files.schema, files.validate, storm.storm),
             "site": typer_of(SiteGroup, help="Draw a site, or write it as files to edit."),
         },
     }

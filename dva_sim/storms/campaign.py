@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -127,22 +126,27 @@ def outcomes(
         journal: Keeps them.
         workers: Who plays them.
     """
-    todo = []
-    for seed in seeds:
-        known = journal.outcomes.get((profile, seed))
-        if known is None:
-            todo.append(seed)
-        else:
-            yield known, True
-    waiting, left = set[Future[Outcome]](), iter(todo)
+    waiting = set[Future[Outcome]]()
     with workers.executor(workers.width, play_seed) as executor:
-        while True:
-            for seed in islice(left, 2 * workers.width - len(waiting)):
-                waiting.add(executor.submit(play_seed, seed, profile))
-            if not waiting:
-                return
-            done, waiting = wait(waiting, LOOK_EVERY, FIRST_COMPLETED)
-            workers.look_after(not done)
-            for future in done:
-                journal.keep(profile, outcome := future.result())
-                yield outcome, False
+        for seed in seeds:
+            known = journal.outcomes.get((profile, seed))
+            if known is not None:
+                yield known, True
+                continue
+            waiting.add(executor.submit(play_seed, seed, profile))
+            while len(waiting) >= 2 * workers.width:
+                yield from _ended(waiting, profile, journal, workers)
+        while waiting:
+            yield from _ended(waiting, profile, journal, workers)
+
+
+def _ended(
+    waiting: set[Future[Outcome]], profile: str, journal: Journal, workers: Workers
+) -> Iterator[tuple[Outcome, bool]]:
+    """Yield the outcomes of storms that have ended, and wait for them no longer."""
+    done, _ = wait(waiting, LOOK_EVERY, FIRST_COMPLETED)
+    workers.look_after(not done)
+    waiting -= done
+    for future in done:
+        journal.keep(profile, outcome := future.result())
+        yield outcome, False

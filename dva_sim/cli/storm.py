@@ -1,0 +1,182 @@
+"""The command that lets faulty hours pass, and looks whether any rule breaks."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from typer import Argument, Option
+
+from dva_sim.cli.options import Jobs, Quiet, asks, folder, number, text
+from dva_sim.kernel.errors import ConfigError, ExitCode
+
+if TYPE_CHECKING:
+    from dva_sim.storms.campaign import Tally
+    from dva_sim.storms.plan import Plan
+    from dva_sim.storms.storm import Outcome
+
+OUT = Path("results/storms")
+AROUND = 20.0  # of a breach, in its story [s]
+_PLAN = "Plan of one storm, as a failure leaves it: play that alone."
+_HOURS = "Go on with the next seeds until so many hours of a team have passed in all."
+
+
+@asks(
+    plan=(Annotated[Path | None, Argument(metavar="PLAN.yaml", help=_PLAN)], None),
+    seeds=(text("Seeds of the storms, from and to.", metavar="FIRST:LAST", of=str), "1:16"),
+    hours=(Annotated[float | None, Option(metavar="H", parser=number(), help=_HOURS)], None),
+    profile=(text("Kinds of faults: all, messages, nodes, people or none.", of=str), "all"),
+    mutants=(text("Hunt planted bugs: all, or one by name.", metavar="NAME", of=str), ""),
+    jobs=(Jobs, None),
+    out=(folder("Folder for the journal and for failures.", "-o", "--out"), OUT),
+)
+def storm(
+    plan: Path | None,
+    seeds: str,
+    hours: float | None,
+    profile: str,
+    mutants: str,
+    jobs: int | None,
+    out: Path,
+    quiet: Quiet = False,
+) -> None:
+    """Let faulty hours pass, and look whether any safety rule breaks.
+
+    Each seed draws a team, a site, a link, people, events and up to sixty faults: messages that are
+    lost, late, doubled or altered, devices that hang, restart or vanish, a DVA that is killed between
+    two writes, revocations and emergencies at the worst moment, intruders, wrong clocks. Fourteen
+    minutes pass in virtual time. Rules S1 to S11 are judged by checkers that ask no agent anything;
+    two minutes after the last fault everything has to work again.
+
+    A storm that breaks a rule is cut down to the faults that matter. Its plan and its story are
+    kept in the folder, and the plan can be played again. The same seed is the same storm. Storms that
+    were played before are counted, and not played again.
+
+    The exit code is 1 if a rule was broken, or with --mutants, if a planted bug was not found.
+
+    Examples:
+        dva-sim storm --seeds 1:256  # 60 hours of a team
+        dva-sim storm --hours 100  # go on with further seeds, until it is 100 hours in all
+        dva-sim storm results/storms/found/all-7.yaml  # play a failure again
+        dva-sim storm --mutants all --seeds 1:32  # how soon planted bugs are found
+    """
+    from dva_sim.experiments.execution.executors import local  # late: start-up
+    from dva_sim.storms.campaign import Journal, Tally, outcomes  # late: start-up
+    from dva_sim.storms.drawing import draw  # late: start-up
+    from dva_sim.storms.plan import load_plan  # late: start-up
+
+    if plan is not None:
+        raise typer.Exit(_replay(load_plan(plan)))
+    first, last = _range(seeds)
+    draw(first, profile)  # an unknown profile is told before anything starts
+    if mutants:
+        raise typer.Exit(_hunt(mutants, range(first, last + 1), profile))
+    out.mkdir(parents=True, exist_ok=True)
+    tally, known = Tally(), 0
+    numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
+    for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), local(jobs)):
+        tally.add(outcome)
+        known += is_known
+        if not outcome.is_clean:
+            _tell_failure(outcome, profile)
+            if not is_known:
+                _keep_failure(draw(outcome.seed, profile), outcome, out / "found", profile)
+        if not quiet and not is_known:
+            _progress(tally, hours)
+        if hours and tally.hours >= hours:
+            break
+    _tell(tally, known)
+    raise typer.Exit(ExitCode.DOES_NOT_HOLD if tally.failures else ExitCode.OK)
+
+
+def _range(seeds: str) -> tuple[int, int]:
+    first, _, last = seeds.partition(":")
+    if not first.isdecimal() or not (last or first).isdecimal() or int(last or first) < int(first):
+        raise ConfigError(f"--seeds should be FIRST:LAST, such as 1:256, not {seeds!r}")
+    return int(first), int(last or first)
+
+
+def _replay(plan: Plan) -> ExitCode:
+    """Play one storm, and tell its story."""
+    from dva_sim.storms.storm import Storm, play  # late: start-up
+
+    kept = list[Storm]()
+    outcome = play(plan, kept.append)
+    for moment in kept[0].recorder.timeline:
+        typer.echo(f"{moment.time:9.3f} s  {moment.who}: {moment.what}")
+    _tell_failure(outcome, "")
+    typer.echo(f"{outcome.simulated_s:.0f} s, digest {outcome.digest}")
+    if outcome.is_clean:
+        typer.echo("no rule was broken")
+    return ExitCode.OK if outcome.is_clean else ExitCode.DOES_NOT_HOLD
+
+
+def _hunt(mutants: str, seeds: range, profile: str) -> ExitCode:
+    """Tell how many storms it takes to find each planted bug."""
+    from dva_sim.storms.hunting import hunt  # late: start-up
+    from dva_sim.storms.mutants import named  # late: start-up
+
+    missed = 0
+    for mutant in named(mutants):
+        found = hunt(mutant, seeds, profile)
+        missed += found.seeds is None
+        typer.echo(str(found))
+    typer.echo(f"{missed} planted bugs were not found" if missed else "all were found")
+    return ExitCode.DOES_NOT_HOLD if missed else ExitCode.OK
+
+
+def _tell_failure(outcome: Outcome, profile: str) -> None:
+    where = f"seed {outcome.seed} ({profile}): " if profile else ""
+    for breach in outcome.breaches:
+        times = f", {breach.count} times" if breach.count > 1 else ""
+        typer.echo(
+            f"{where}{breach.rule} broken by {breach.who} at {breach.time:.2f} s{times}: "
+            f"{breach.what}"
+        )
+    if outcome.error:
+        typer.echo(f"{where}{outcome.error}")
+
+
+def _keep_failure(plan: Plan, outcome: Outcome, folder: Path, profile: str) -> None:
+    """Cut a failure down, and keep its plan and its story."""
+    from dva_sim.storms.shrinking import Shrinker  # late: start-up
+    from dva_sim.storms.storm import Storm, play  # late: start-up
+
+    shrinker = Shrinker(plan, outcome)
+    small = shrinker.shrink()
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"{profile}-{plan.seed}.yaml"
+    file.write_text(small.text(), encoding="utf-8")
+    kept = list[Storm]()
+    again = play(small, kept.append)
+    when = min((breach.time for breach in again.breaches), default=again.simulated_s)
+    story = [
+        f"{moment.time:9.3f} s  {moment.who}: {moment.what}\n"
+        for moment in kept[0].recorder.timeline
+        if abs(moment.time - when) < AROUND or moment.kind == "fault"
+    ]
+    file.with_suffix(".txt").write_text("".join(story) + again.error, encoding="utf-8")
+    typer.echo(f"  {len(plan.faults)} faults cut to {len(small.faults)}: dva-sim storm {file}")
+
+
+def _progress(tally: Tally, hours: float | None) -> None:
+    of = f" of {hours:g}" if hours else ""
+    typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} hours of a team", err=True)
+
+
+def _tell(tally: Tally, known: int) -> None:
+    faults, touched = sum(tally.faults.values()), sum(tally.messages.values())
+    typer.echo(
+        f"{tally.storms} storms ({known} played before), {tally.hours:.1f} hours of a team, "
+        f"{faults} faults, {touched} messages touched; {tally.cpu_s:.0f} s of CPU time"
+    )
+    for kind, times in sorted(tally.faults.items()):
+        messages = f", {tally.messages[kind]} messages" if kind in tally.messages else ""
+        typer.echo(f"  {kind}: {times}{messages}")
+    typer.echo(
+        f"{len(tally.failures)} storms broke a rule; with 95 % confidence at most "
+        f"{tally.most_per_hour():.3g} in an hour"
+    )
