@@ -122,7 +122,7 @@ def _hunt(mutants: str, seeds: range, profile: str) -> ExitCode:
     missed = 0
     for mutant in named(mutants):
         found = hunt(mutant, seeds, profile)
-        missed += found.seeds is None
+        missed += not found.rules
         typer.echo(str(found))
     typer.echo(f"{missed} planted bugs were not found" if missed else "all were found")
     return ExitCode.DOES_NOT_HOLD if missed else ExitCode.OK

@@ -18,7 +18,7 @@ from dva_sim.storms import interference as i
 from dva_sim.storms.plan import Fault
 
 if TYPE_CHECKING:
-    from dva_sim.storms.storm import Storm
+    from dva_sim.storms.storm import Storm, StormRobot
 
 End = Callable[[], object]
 Begin = Callable[["Storm", Fault, random.Random], End | None]
@@ -150,16 +150,23 @@ def _hang(storm: Storm, fault: Fault, chance: random.Random) -> End:
 
 
 def _restart(storm: Storm, fault: Fault, chance: random.Random) -> None:
-    storm.robot(fault.target).agent.start_anew(chance.uniform(0.0, 1e5))
+    _start_anew(storm, storm.robot(fault.target), chance)
+
+
+def _start_anew(storm: Storm, robot: StormRobot, chance: random.Random) -> None:
+    """Restart the program of a robot, whose clock is another one then."""
+    storm.run.deafened(robot.id, True)
+    robot.agent.start_anew(chance.uniform(0.0, 1e5))
+    storm.run.deafened(robot.id, False)
 
 
 def _power(storm: Storm, fault: Fault, chance: random.Random) -> End:
-    agent = storm.robot(fault.target).agent
-    agent.power(False)
+    robot = storm.robot(fault.target)
+    robot.agent.power(False)
 
     def ends() -> None:
-        agent.power(True)
-        agent.start_anew(chance.uniform(0.0, 1e5))
+        robot.agent.power(True)
+        _start_anew(storm, robot, chance)
 
     return ends
 

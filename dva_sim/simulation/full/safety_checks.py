@@ -237,8 +237,9 @@ class SafetyAudit:
         return self._labels.get(device, device)
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
-        """See `Observer`: what reaches a robot that hangs, it does not hear."""
+        """See `Observer`: what reaches a robot that hangs, it does not hear; then it is idle."""
         (self._deaf.add if deaf else self._deaf.discard)(robot)
+        self.witness(robot).does = None
 
     def slowed(self, now: float, processing: float) -> None:
         """See `Observer`."""

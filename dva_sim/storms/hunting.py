@@ -1,0 +1,53 @@
+"""How soon storms find a planted bug."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from dva_sim.storms.drawing import draw
+from dva_sim.storms.mutants import MUTANTS, planted
+from dva_sim.storms.storm import play
+
+
+@dataclass(frozen=True)
+class Hunt:
+    """How long it took to find a planted bug.
+
+    Attributes:
+        mutant: Its name.
+        storms: Number of storms played.
+        rules: Rules that were broken when it was found; none: it was not.
+        acts: How often it has done the wrong thing.
+        first: What it did first.
+    """
+
+    mutant: str
+    storms: int
+    rules: tuple[str, ...]
+    acts: int
+    first: str
+
+    def __str__(self) -> str:
+        planted_for = MUTANTS[self.mutant].rule
+        acted = f"acted {self.acts} times ({self.first[:80]})" if self.acts else "did not act"
+        if self.rules:
+            found = f"found in storm {self.storms} by {', '.join(self.rules)}"
+        else:
+            found = f"not found in {self.storms} storms"
+        return f"{self.mutant} ({planted_for}): {found}; {acted}"
+
+
+def hunt(mutant: str, seeds: Iterable[int], profile: str) -> Hunt:
+    """Play storms with a planted bug until a rule breaks.
+
+    A rule that breaks before the bug has acted does not count.
+    """
+    acts, first, count = 0, "", 0
+    for count, seed in enumerate(seeds, 1):
+        with planted(mutant) as bug:
+            outcome = play(draw(seed, profile))
+        acts, first = acts + bug.acts, first or bug.first
+        if bug.acts and not outcome.is_clean:
+            return Hunt(mutant, count, tuple(sorted(outcome.signature)), acts, first)
+    return Hunt(mutant, count, (), acts, first)

@@ -1,0 +1,712 @@
+"""Planted bugs: each replaces one function of the program, and says when it acts.
+
+They show that the checkers find what they are there to find. A mutant whose function is gone
+fails as soon as it is planted; one that never does anything wrong counts for nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, Final
+
+from dva_sim.agents.robot.controller import STAND, Decision, Mode
+from dva_sim.core.events import State
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.errors import ProtocolError
+from dva_sim.worlds.bodies import TickTarget
+
+Original = Callable[..., Any]
+Make = Callable[[Original, "Bug"], Original]
+
+
+@dataclass
+class Bug:
+    """A planted bug while it is there.
+
+    Attributes:
+        name: Its name.
+        acts: How often it has done the wrong thing.
+        first: What it did first.
+    """
+
+    name: str
+    acts: int = 0
+    first: str = ""
+
+    def act(self, what: str) -> None:
+        """Note that the program has done the wrong thing."""
+        self.acts += 1
+        self.first = self.first or what
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A bug that can be planted.
+
+    Attributes:
+        rule: The rule that it breaks first.
+        words: What is wrong.
+        place: Module and function, such as `dva_sim.core.orders:Orders.found`.
+        make: Makes the wrong function from the right one.
+    """
+
+    rule: str
+    words: str
+    place: str
+    make: Make
+
+
+@contextmanager
+def planted(name: str) -> Iterator[Bug]:
+    """Plant a bug while the block lasts.
+
+    Raises:
+        ConfigError: no bug has that name.
+        AttributeError: its function is gone.
+    """
+    (one,) = named(name)
+    mutant, bug = MUTANTS[one], Bug(one)
+    module, _, path = mutant.place.partition(":")
+    owner: Any = importlib.import_module(module)
+    *way, attribute = path.split(".")
+    for step in way:
+        owner = getattr(owner, step)
+    original = owner.__dict__[attribute] if way else getattr(owner, attribute)
+    if not callable(original):
+        raise AttributeError(f"{mutant.place} is no function")
+    setattr(owner, attribute, wraps(original)(mutant.make(original, bug)))
+    try:
+        yield bug
+    finally:
+        setattr(owner, attribute, original)
+
+
+def named(name: str) -> list[str]:
+    """Return the names of the mutants that are meant: one, or all.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    if name == "all":
+        return list(MUTANTS)
+    if name not in MUTANTS:
+        raise ConfigError(unknown("mutant", name, MUTANTS))
+    return [name]
+
+
+RIGHT: Final = object()
+"""Stands for what the right function does."""
+
+# --- how they are made -----------------------------------------------------------------------
+
+
+def _instead(decide: Callable[..., Any]) -> Make:
+    """A function that returns something else where `decide` does not return `RIGHT`."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            other = decide(self, *args, **named_args)
+            if other is RIGHT:
+                return original(self, *args, **named_args)
+            bug.act(f"{type(self).__name__} at {getattr(self, 'id_tag', '')}: {args}")
+            return other
+
+        return wrong
+
+    return make
+
+
+def _afterwards(change: Callable[..., Any | None]) -> Make:
+    """A function whose result is changed where `change` returns something."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            result = original(self, *args, **named_args)
+            other = change(self, result, *args, **named_args)
+            if other is None:
+                return result
+            bug.act(f"{type(self).__name__}: {other}")
+            return other
+
+        return wrong
+
+    return make
+
+
+def _skipped(when: Callable[..., bool] = lambda *_, **__: True) -> Make:
+    """A function that does nothing where `when` holds."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            if not when(self, *args, **named_args):
+                return original(self, *args, **named_args)
+            bug.act(f"{type(self).__name__} does nothing: {args}")
+            return None
+
+        return wrong
+
+    return make
+
+
+def _with(**changed: Any) -> Make:
+    """A function that is called with other arguments than it was given, by name."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        code = getattr(original, "__code__")  # noqa: B009 - a name that types do not know
+        names = code.co_varnames[1 : code.co_argcount]
+
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            given = dict(zip(names, args, strict=False)) | named_args
+            other = {key: value for key, value in changed.items() if given.get(key) != value}
+            if other:
+                bug.act(f"{type(self).__name__}: {other} for {[given.get(key) for key in other]}")
+            return original(self, **(given | other))
+
+        return wrong
+
+    return make
+
+
+_ROBOT = "dva_sim.agents.robot.controller:RobotController"
+_SET_OUT: Final = Mode.TELEOPERATION, Mode.MISSION
+
+
+def _longer(self: Any, decision: Decision, *_: Any) -> Decision | None:
+    point = decision.set_point
+    if point is None or not point.speed:
+        return None
+    return decision._replace(set_point=point._replace(until=point.until + 2.0))
+
+
+def _ignores_age(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Any:
+        right = original(self, message, body, arrived, now)
+        if right.code != m.STALE:
+            return right
+        self.last_set_id -= 1
+        other = original(self, message, m.SetTeleOp(body.speed, body.turn_rate), arrived, now)
+        if other.code == m.OK:
+            bug.act(f"{self.id_tag} obeys a command that is too old")
+        return other
+
+    return wrong
+
+
+def _ignores_order(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, *args: Any) -> Any:
+        known = self.last_set_id
+        self.last_set_id = 0
+        decision = original(self, message, *args)
+        if decision.code == m.OK and message.message_id <= known:
+            bug.act(f"{self.id_tag} obeys command {message.message_id} after {known}")
+        self.last_set_id = max(known, self.last_set_id)
+        return decision
+
+    return wrong
+
+
+def _feeds_watchdog(kinds: tuple[type, ...]) -> Make:
+    """Anything its driver says keeps the robot going."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, message: m.Message, *args: Any, **named_args: Any) -> Any:
+            decision = original(self, message, *args, **named_args)
+            speed, _, until = self.body.asked
+            now = self.device.clock.now
+            if isinstance(message.body, kinds) and speed and until > now:
+                longer = self.set_point._replace(until=now + self.controller.limits.watchdog)
+                if self.controller.mode is Mode.TELEOPERATION:
+                    bug.act(f"{self.device.label} goes on because of {type(message.body).__name__}")
+                    self.move(longer)
+            return decision
+
+        return wrong
+
+    return make
+
+
+def _status_feeds_watchdog(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any) -> Any:
+        speed, _, until = self.body.asked
+        now = self.device.clock.now
+        if speed and until > now and self.controller.mode is Mode.TELEOPERATION:
+            bug.act(f"{self.device.label} goes on because it has told its status")
+            self.move(self.set_point._replace(until=now + self.controller.limits.watchdog))
+        return original(self)
+
+    return wrong
+
+
+def _forgets_refusal(code: int) -> Make:
+    """Nobody is refused for one reason."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, message: m.Message, level: str) -> Any:
+            refusal = original(self, message, level)
+            if refusal is None or refusal.code != code:
+                return refusal
+            bug.act(f"{self.id_tag} lets {message.source} act: {refusal.text}")
+            return None
+
+        return wrong
+
+    return make
+
+
+def _grants_unasked(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, body: m.PermissionGrant) -> Any:
+        decision = original(self, message, body)
+        if decision.code == m.OK and body.level != "sensors" and body != self.grant:
+            bug.act(f"{self.id_tag} believes that {body.holder} holds it")
+            return self._is_held(body)
+        return decision
+
+    return wrong
+
+
+def _keeps_driver(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, grant: m.PermissionGrant | None) -> Any:
+        held = self.grant
+        if self.owner is None or (grant and held and grant.session == held.session):
+            return original(self, grant)
+        bug.act(f"{self.id_tag} is driven on by {self.owner} though {grant} holds it")
+        self.grant = grant or held
+        return Decision(m.OK)
+
+    return wrong
+
+
+def _emergency_of_the_holder_only(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, *args: Any) -> Any:
+        if isinstance(message.body, m.Emergency) and message.source != self.owner:
+            bug.act(f"{self.id_tag} does not stop for {message.source}")
+            return Decision(m.NOT_PERMITTED, "only the holder")
+        return original(self, message, *args)
+
+    return wrong
+
+
+def _resumes(original: Original, bug: Bug) -> Original:
+    """After an emergency it goes on with what it did as soon as anybody asks for anything."""
+
+    def wrong(self: Any, now: float) -> Any:
+        mode, owner = self.mode, self.owner
+        decision = original(self, now)
+        if mode is Mode.TELEOPERATION:
+            bug.act(f"{self.id_tag} is still driven by {owner} after an emergency")
+            self.mode, self.owner = mode, owner
+        return decision
+
+    return wrong
+
+
+def _keeps_grant_over_restart(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, clock_offset: float) -> Any:
+        kept = self.grant, self.last_order_id, self.last_set_id, self._numbered
+        original(self, clock_offset)
+        if kept[0] is not None:
+            bug.act(f"{self.id_tag} starts anew and is still held by {kept[0].holder}")
+        self.grant, self.last_order_id, self.last_set_id, self._numbered = kept
+        self.mode = Mode.TELEOPERATION if kept[0] is not None else self.mode
+        self.owner = kept[0].holder if kept[0] is not None else None
+
+    return wrong
+
+
+def _by_message_id(original: Original, bug: Bug) -> Original:
+    """A reply cache that is keyed without the source."""
+    known: dict[Any, bytes] = {}
+
+    def wrong(sender: str | None, request: bytes) -> Any:
+        found = re.search(rb"<MessageID>(\d+)<", request)
+        key = found[1] if found else request
+        if known.setdefault(key, request) != request:
+            bug.act(f"a request counts as answered that has number {key!r} like another")
+        return sender, key
+
+    return wrong
+
+
+def _quiet_about(original: Original, bug: Bug) -> Original:
+    """A message that is none is dropped without a word and without a count."""
+
+    def wrong(self: Any, request: Any) -> Any:
+        try:
+            decode(request.data)
+        except ProtocolError:
+            bug.act(f"{self.label} drops a message")
+            return None
+        return original(self, request)
+
+    return wrong
+
+
+def _without_last(original: Original, bug: Bug) -> Original:
+    """Every fourth event is taken, and not kept."""
+    count = [0]
+
+    def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+        event = original(self, *args, **named_args)
+        count[0] += 1
+        if count[0] % 4 == 0:
+            bug.act(f"event {event.number} is forgotten")
+            self.open.pop(event.number)
+            self.waiting.pop(event.number, None)
+        return event
+
+    return wrong
+
+
+def _miscounts(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, event: Any, state: Any, now: float) -> Any:
+        was = event.state
+        original(self, event, state, now)
+        if str(state) == "confirmed":
+            bug.act(f"event {event.number} is counted twice")
+            self.counts[was] += 1
+
+    return wrong
+
+
+def _resets_timer(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, event: Any, severity: float) -> Any:
+        original(self, event, severity)
+        latest = max(event.times.values())
+        if event.waiting_since < latest + 1e9:
+            bug.act(f"event {event.number} waits from the beginning again")
+            event.waiting_since = 1e9
+
+    return wrong
+
+
+def _says_before_keeping(original: Original, bug: Bug) -> Original:
+    """What was promised is written down a second later, if the DVA lives by then."""
+
+    def wrong(self: Any) -> Any:
+        clock = self.device.clock
+        if self._memory is None or getattr(self, "_late", False):
+            return original(self)
+        memory, self._memory = self._memory, None
+        changed = self.desk.book.changes()
+        for event in changed:
+            self.desk.book.touch(event)
+        original(self)
+        for event in changed:
+            self.desk.book.touch(event)
+        self._memory = memory
+        bug.act("the DVA says what it has not kept yet")
+        self._late = True
+
+        def later() -> None:
+            if not self.is_gone:
+                original(self)
+            self._late = False
+
+        clock.call_after(5.0, later)
+        return None
+
+    return wrong
+
+
+def _writes_half(original: Original, bug: Bug) -> Original:
+    """Grants are not written down."""
+
+    def wrong(self: Any, dva: Any, sessions: Any, lasting: Any, now: float) -> Any:
+        if sessions["grants"]:
+            bug.act(f"{len(sessions['grants'])} permissions are not kept")
+        return original(self, dva, {**sessions, "grants": {}}, lasting, now)
+
+    return wrong
+
+
+def _loses_open(original: Original, bug: Bug) -> Original:
+    """A DVA that starts anew has forgotten every second open event."""
+
+    def wrong(self: Any, dva: Any, now: float) -> Any:
+        found = original(self, dva, now)
+        for number in list(dva.book.open)[::2]:
+            bug.act(f"event {number} is forgotten by the next life of the DVA")
+            dva.book.waiting.pop(number, None)
+            del dva.book.open[number]
+        return found
+
+    return wrong
+
+
+def _two_holders(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, robot: str, holder: str, level: str, *args: Any, **named: Any) -> Any:
+        held = self.grants.get(robot)
+        if level == "sensors" or held is None or held.holder in (holder, self.own):
+            return original(self, robot, holder, level, *args, **named)
+        bug.act(f"{robot} is given to {holder} while {held.holder} holds it")
+        del self.grants[robot]
+        return original(self, robot, holder, level, *args, **named)
+
+    return wrong
+
+
+def _anybody_confirms(original: Original, bug: Bug) -> Original:
+    """A report of a place near an event confirms it, whoever it is of."""
+
+    def wrong(self: Any, event: Any, severity: float) -> Any:
+        original(self, event, severity)
+        if str(event.state) in ("assigned", "on scene"):
+            bug.act(f"event {event.number} is confirmed by one more report")
+            self.move(event, State.CONFIRMED, max(event.times.values()))
+
+    return wrong
+
+
+def _unbounded(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, *args: Any, **named: Any) -> Any:
+        original(self, *args, **named)
+        bug.act("a reply cache keeps a hundred thousand replies to each")
+        self._each, self._room = 100_000, 10**9
+
+    return wrong
+
+
+MUTANTS: Final[dict[str, Mutant]] = {
+    "watchdog-too-long": Mutant(
+        "S1", "a command is in force two seconds too long", f"{_ROBOT}._set", _afterwards(_longer)
+    ),
+    "watchdog-fed-by-requests": Mutant(
+        "S1", "any request keeps a robot going",
+        "dva_sim.agents.robot.robot:RobotAgent._decide",
+        _feeds_watchdog((m.GetMissionStatus, m.GetSensorInfo, m.StartTeleOp, m.PermissionGrant)),
+    ),
+    "watchdog-fed-by-status": Mutant(
+        "S1", "a robot goes on as long as it tells its status",
+        "dva_sim.agents.robot.robot:RobotAgent._publish_status", _status_feeds_watchdog,
+    ),
+    "age-not-checked": Mutant("S1", "old commands are obeyed", f"{_ROBOT}._set", _ignores_age),
+    "order-not-checked": Mutant("S1", "commands act again", f"{_ROBOT}._set", _ignores_order),
+    "orders-act-again": Mutant(
+        "S1", "an old order acts again", f"{_ROBOT}._order", _instead(lambda self, message: (
+            None if message.message_id <= self.last_order_id else RIGHT
+        )),
+    ),
+    "stop-ignored": Mutant(
+        "S1", "StopTeleOp is answered, and changes nothing", f"{_ROBOT}._stop",
+        _instead(lambda self, *_: (
+            Decision(m.OK) if self.mode is Mode.TELEOPERATION else RIGHT
+        )),
+    ),
+    "cancel-ignored": Mutant(
+        "S1", "CancelMission is answered, and changes nothing", f"{_ROBOT}._cancel",
+        _instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.MISSION else RIGHT),
+    ),
+    "revocation-ignored": Mutant(
+        "S2", "a revocation is answered, and changes nothing", f"{_ROBOT}._revoked",
+        _instead(lambda self, message, body: (
+            Decision(m.OK) if self.grant and self.grant.session == body.session else RIGHT
+        )),
+    ),
+    "lease-never-ends": Mutant(
+        "S2", "a silent driver keeps the robot", f"{_ROBOT}.expire",
+        _instead(lambda self, now: (
+            False if self.mode in _SET_OUT and now - self.last_valid > 30.0 else RIGHT
+        )),
+    ),
+    "changes-hands-moving": Mutant(
+        "S2", "a robot that moves is handed over", f"{_ROBOT}._begin", _with(moving=False)
+    ),
+    "driven-on-by-the-former": Mutant(
+        "S2", "the former driver drives on", f"{_ROBOT}._is_held", _keeps_driver
+    ),
+    "hand-takes-held-robot": Mutant(
+        "S2", "a robot that somebody holds is taken by hand", f"{_ROBOT}.take_by_hand",
+        _instead(lambda self, who, now, moving: (
+            _taken(self, who, now) if self.grant is not None and not moving else RIGHT
+        )),
+    ),
+    "two-holders": Mutant(
+        "S2", "the DVA gives a robot to a second holder", "dva_sim.core.sessions:Permissions.request",
+        _two_holders,
+    ),
+    "silent-holder-keeps": Mutant(
+        "S2", "who is silent keeps its permissions",
+        "dva_sim.core.sessions:Sessions.take_back_all",
+        _skipped(lambda self, holder: any(
+            grant.holder == holder for grant in self.permissions.grants.values()
+        )),
+    ),
+    "emergency-forgotten": Mutant(
+        "S3", "an emergency is answered, and changes nothing", f"{_ROBOT}._emergency",
+        _instead(lambda self, now: (
+            Decision(m.OK, "stopped") if self.mode is not Mode.IDLE else RIGHT
+        )),
+    ),
+    "emergency-of-holder-only": Mutant(
+        "S3", "an emergency of a stranger is refused", f"{_ROBOT}._handle",
+        _emergency_of_the_holder_only,
+    ),
+    "emergency-resumes": Mutant(
+        "S3", "the drive goes on after an emergency", f"{_ROBOT}._emergency", _resumes
+    ),
+    "emergency-leaves-orders": Mutant(
+        "S3", "an order from before an emergency is obeyed", f"{_ROBOT}._begin",
+        _with(arrived=float("inf")),
+    ),
+    "speed-not-clamped": Mutant(
+        "S4", "motors are asked for more than they may",
+        "dva_sim.worlds.bodies:RobotBody.drive",
+        lambda original, bug: _unclamped(original, bug, 0.8),
+    ),
+    "drives-backwards": Mutant(
+        "S4", "motors are asked to go backwards", "dva_sim.worlds.bodies:RobotBody.drive",
+        lambda original, bug: _unclamped(original, bug, -0.3),
+    ),
+    "session-not-checked": Mutant(
+        "S5", "any session will do", f"{_ROBOT}._refusal", _forgets_refusal(m.BAD_SESSION)
+    ),
+    "holder-not-checked": Mutant(
+        "S5", "anybody may act", f"{_ROBOT}._refusal", _forgets_refusal(m.NOT_PERMITTED)
+    ),
+    "grant-not-confirmed": Mutant(
+        "S5", "a grant counts before the DVA has confirmed it", f"{_ROBOT}._granted",
+        _grants_unasked,
+    ),
+    "readers-not-checked": Mutant(
+        "S5", "anybody may read sensors", f"{_ROBOT}._subscription",
+        _afterwards(lambda self, decision, *_: None if decision.code == m.OK else Decision(m.OK)),
+    ),
+    "grant-kept-over-restart": Mutant(
+        "S1", "a robot that starts anew is still driven", f"{_ROBOT}.start_anew",
+        _keeps_grant_over_restart,
+    ),
+    "timer-reset-by-reports": Mutant(
+        "S6", "each report lets an event wait from the beginning",
+        "dva_sim.core.events:EventBook.merge", _resets_timer,
+    ),
+    "event-forgotten": Mutant(
+        "S6", "every fourth event is forgotten", "dva_sim.core.events:EventBook.add", _without_last
+    ),
+    "counts-wrong": Mutant(
+        "S6", "a confirmed event is counted twice", "dva_sim.core.events:EventBook.move", _miscounts
+    ),
+    "order-never-ends": Mutant(
+        "S6", "who has an order has it for ever", "dva_sim.core.orders:Orders.take_back",
+        _instead(lambda self, now: (
+            [] if any(self._order_ends(*pair) <= now for pair in self.engaged.pairs()) else RIGHT
+        )),
+    ),
+    "escalation-forgotten": Mutant(
+        "S6", "no event is escalated", "dva_sim.core.orders:Orders.escalate",
+        _instead(lambda self, event, now: []),
+    ),
+    "anybody-confirms": Mutant(
+        "S6", "one more report confirms an event", "dva_sim.core.events:EventBook.merge",
+        _anybody_confirms,
+    ),
+    "events-lost-in-a-restart": Mutant(
+        "S6", "a DVA that starts anew forgets open events", "dva_sim.core.store:Store._recall",
+        _loses_open,
+    ),
+    "grants-not-kept": Mutant(
+        "S2", "permissions do not survive the DVA", "dva_sim.core.store:Store._write", _writes_half
+    ),
+    "said-before-kept": Mutant(
+        "S6", "the DVA answers before it has written",
+        "dva_sim.simulation.full.dva_server:DvaAgent._keep_changes", _says_before_keeping,
+    ),
+    "times-out-of-order": Mutant(
+        "S7", "an arrival is noted before the order", "dva_sim.core.orders:Orders.arrived",
+        lambda original, bug: _too_early(original, bug),
+    ),
+    "never-registers-again": Mutant(
+        "S8", "who could not register gives up", "dva_sim.agents.device:AgentDevice._register",
+        lambda original, bug: _registers_once(original, bug),
+    ),
+    "stays-silent": Mutant(
+        "S8", "a restarted program says nothing", "dva_sim.agents.device:AgentDevice.start_anew",
+        lambda original, bug: _stays_silent(original, bug),
+    ),
+    "question-lost": Mutant(
+        "S8", "a question that was not answered is never asked again",
+        "dva_sim.agents.robot.inquiry:Inquiry.unanswered",
+        _skipped(lambda self: self.asked is not None),
+    ),
+    "replies-without-bound": Mutant(
+        "S10", "replies are kept for ever", "dva_sim.protocol.exchange:ReplyCache.__init__",
+        _unbounded,
+    ),
+    "strangers-fill-the-queue": Mutant(
+        "S10", "any number of messages may wait",
+        "dva_sim.agents.robot.command_queue:FairQueue._make_room",
+        _instead(lambda self, letter, standing: None if self.length >= 20 else RIGHT),
+    ),
+    "reply-cache-without-source": Mutant(
+        "S6", "a request with the number of another gets its answer",
+        "dva_sim.agents.device:key_of", _by_message_id,
+    ),
+    "bad-messages-uncounted": Mutant(
+        "S11", "what is no message is dropped without a word",
+        "dva_sim.agents.device:AgentDevice.admit", _quiet_about,
+    ),
+    "no-room-no-word": Mutant(
+        "S11", "a message for which there is no room is dropped without a word",
+        "dva_sim.agents.robot.robot:RobotAgent._turn_away", _skipped(),
+    ),
+}  # fmt: skip
+
+
+def _taken(controller: Any, who: str, now: float) -> Decision:
+    controller.by_hand, controller.last_valid = who, now
+    return Decision(m.OK, set_point=STAND)
+
+
+def _unclamped(original: Original, bug: Bug, speed: float) -> Original:
+    def wrong(self: Any, wanted: float, turn_rate: float, until: float) -> Any:
+        original(self, wanted, turn_rate, until)
+        if wanted > 0.1:
+            bug.act(f"motors are asked for {speed} m/s")
+            self._asked.put(self._world.next_tick(), TickTarget(speed, 0.0, self._world.tick_at(until)))
+
+    return wrong
+
+
+def _too_early(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, event: Any, device: str, now: float) -> Any:
+        original(self, event, device, now)
+        if "arrived" in event.times and "assigned" in event.times:
+            bug.act(f"event {event.number}: arrived before it was assigned")
+            event.times["arrived"] = event.times["assigned"] - 1.0
+
+    return wrong
+
+
+def _registers_once(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, then: Any, life: int) -> Any:
+        ask = self.ask
+
+        def asks(peer: str, body: Any, on_reply: Any, on_failure: Any, *rest: Any) -> Any:
+            def fails() -> None:
+                bug.act(f"{self.label} gives up to register")
+
+            return ask(peer, body, on_reply, fails, *rest)
+
+        self.ask = asks
+        try:
+            return original(self, then, life)
+        finally:
+            del self.ask
+
+    return wrong
+
+
+def _stays_silent(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any) -> Any:
+        original(self)
+        bug.act(f"{self.label} says nothing any more")
+        self.silent = True
+
+    return wrong
