@@ -35,6 +35,7 @@ OLDER = 1  # times by the wall clock
 MICROSECONDS = 1e6
 OPEN_WITHIN = 1.0  # that long somebody else may have the file to itself when it is opened [s]
 KEEPS_TIME = 1.0  # how often it is written how late it is while events are open [s]
+SOON = 0.1  # the desk looks once a second: what is nearly due is written now [s]
 IDLE = 10  # and so much more rarely while none is
 WRITE_WITHIN_MS = 50  # and when something is written; the DVA stands still meanwhile
 _TABLES = f"""
@@ -153,7 +154,8 @@ class Store:
         return None
 
     def _time_is_due(self, dva: Dva, now: float) -> bool:
-        return now > self._time_kept_at + self.keeps_time * (1 if dva.book.open else IDLE)
+        due = self._time_kept_at + self.keeps_time * (1 if dva.book.open else IDLE)
+        return now >= due - SOON
 
     def _write(
         self, dva: Dva, sessions: dict[str, dict[str, str]], lasting: set[str], now: float

@@ -147,6 +147,6 @@ def _ended(
     done, _ = wait(waiting, LOOK_EVERY, FIRST_COMPLETED)
     workers.look_after(not done)
     waiting -= done
-    for future in done:
-        journal.keep(profile, outcome := future.result())
+    for outcome in sorted((future.result() for future in done), key=lambda each: each.seed):
+        journal.keep(profile, outcome)
         yield outcome, False

@@ -58,13 +58,13 @@ def draw(seed: int, profile: str = "all") -> Plan:
 
 
 def _scenario(chance: random.Random) -> dict[str, Any]:
-    robots, guards = chance.randint(2, 6), chance.randint(1, 4)
+    robots, guards = chance.choice((2, 2, 3, 4, 6)), chance.choice((1, 1, 2, 4))
     return {
         "site": _site(chance),
         "robot": {"count": robots, "watchdog_s": chance.choice((1.0, 3.0, 3.0))},
-        "guard": {"count": guards, "mobilisation_s": chance.choice((5.0, 15.0))},
+        "guard": {"count": guards, "mobilisation_s": chance.choice((15.0, 60.0))},
         "operator": {
-            "count": chance.randint(1, min(4, robots)),
+            "count": chance.randint(min(2, robots), min(4, robots)),
             "strategy": chance.choice(("adaptive", "pursuit", "move_and_wait")),
             "span": chance.choice((1, 1, 2)),
             "person": chance.randrange(100),
@@ -125,7 +125,9 @@ def _fault(chance: random.Random, kinds: tuple[str, ...], scenario: dict[str, An
     source = _device(chance, ("", "operator", "dva", "robot"), scenario) if _passes(name) else ""
     lasts = _duration(chance, kind)
     at = round(chance.uniform(FIRST, STORM - lasts - 45.0), 3)
-    on = chance.choice(kind.on) if kind.on and chance.random() < 0.5 else ""
+    on = chance.choice(kind.on) if kind.on and chance.random() < 0.6 else ""
+    if on and target.startswith("robot") and chance.random() < 0.7:
+        target = "robot-*"
     return Fault(
         kind=name,
         at_s=at,

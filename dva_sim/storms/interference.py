@@ -53,7 +53,7 @@ class Interference:
     def __init__(self, clock: Clock, watch: Callable[[Passing], None]) -> None:
         self.clock, self.rules, self.counts = clock, list[Rule](), Counter[str]()
         self._watch, self.delivered = watch, 0
-        self._awaited: list[tuple[bytes, str, Callable[[], object]]] = []
+        self._awaited: list[tuple[bytes, str, Callable[[str], object]]] = []
         self._past: dict[str, deque[Passing]] = {}
 
     def __call__(self, source: str, to: str, payload: Any, take: Take) -> None:
@@ -81,22 +81,22 @@ class Interference:
         """Return the newest messages to a node."""
         return list(self._past.get(to, ()))
 
-    def await_message(self, kind: str, to: str, then: Callable[[], object]) -> None:
+    def await_message(self, kind: str, to: str, then: Callable[[str], object]) -> None:
         """Call `then` once, just before the next message of a kind reaches a node.
 
         Args:
             kind: Name of its element, such as `StartTeleOp`.
-            to: Id of the receiver; empty: any.
-            then: What happens.
+            to: How the id of the receiver begins.
+            then: Called with the id of the receiver.
         """
         self._awaited.append((b"<" + kind.encode(), to, then))
 
     def _look_out(self, passing: Passing) -> None:
         for waiting in tuple(self._awaited):
             kind, to, then = waiting
-            if to in ("", passing.to) and kind in passing.payload:
+            if passing.to.startswith(to) and kind in passing.payload:
                 self._awaited.remove(waiting)
-                then()
+                then(passing.to)
 
 
 # --- rules -------------------------------------------------------------------------------

@@ -36,7 +36,8 @@ class Fault:
         kind: Its name, as in `dva_sim.storms.faults.FAULTS`.
         at_s: When it begins at the earliest [s].
         for_s: How long it lasts [s]; 0: it is an act, and over at once.
-        target: Label of the device that it strikes, such as `robot-1`; empty: any.
+        target: Label of the device that it strikes, such as `robot-1`; empty: any; `robot-*`: the
+            robot that the message is for which it waits.
         source: Of faults of messages: label of the sender; empty: any.
         on: Waits for the first message of this kind to the target, such as `StartTeleOp`; empty:
             it begins at `at_s`.

@@ -6,9 +6,10 @@ import hashlib
 import random
 import tempfile
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,12 +20,13 @@ from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Accepted, Breach, Recorder
 from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.protocol.codec import decode
 from dva_sim.protocol.exchange import NOON
 from dva_sim.protocol.messages import PermissionGrant, Position
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.run import Run, Watched
-from dva_sim.simulation.full.stage import DVA
+from dva_sim.simulation.full.stage import DVA, id_of
 from dva_sim.storms.answers import Answers
 from dva_sim.storms.bounds import oversized
 from dva_sim.storms.dva_lives import DvaLives
@@ -189,13 +191,16 @@ class Storm:
             self._begin(fault)
             return
         # What never comes is not waited for beyond the storm.
-        waits = [True]
+        waits, kind = [True], fault.target.partition("-*")[0]
+        is_any = fault.target.endswith("-*")
+        to = id_of(kind, 1)[: len("02:00:00:01")] if is_any else self.id_of(fault.target)
 
-        def begin() -> None:
+        def begin(node: str) -> None:
             if waits[0] and self.now + fault.for_s <= self.plan.calm_s:
-                self._begin(fault)
+                target = self.run.stage.labels[node] if is_any else fault.target
+                self._begin(replace(fault, target=target))
 
-        self.interference.await_message(fault.on, self.id_of(fault.target), begin)
+        self.interference.await_message(fault.on, to, begin)
         self.run.clock.call_at(self.plan.calm_s, waits.__setitem__, 0, False)
 
     def _begin(self, fault: Fault) -> None:
@@ -246,8 +251,6 @@ class Storm:
             return
         self._digest.update(f"{now:.6f} {source} {to} ".encode() + payload)
         if source == DVA and b"<PermissionGrant" in payload:
-            from dva_sim.protocol.codec import decode
-
             body = decode(payload).body
             if isinstance(body, PermissionGrant):
                 self._sessions.setdefault(to, []).append(body.session)
@@ -285,8 +288,6 @@ def play(plan: Plan, before: Callable[[Storm], object] = lambda _: None) -> Outc
         plan: The storm.
         before: Called with the storm before it begins.
     """
-    import traceback
-
     with tempfile.TemporaryDirectory(prefix="dva-storm-") as folder:
         storm = Storm(plan, Path(folder))
         before(storm)

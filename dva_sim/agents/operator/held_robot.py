@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 from dva_sim.agents.device import STATUS, AgentDevice
@@ -41,6 +42,7 @@ class HeldRobot:
         tilt: Gives what makes commands of what the person wants, for the next drive.
         alert: Told what the person has to know.
         let_go: Told that the robot is in these hands no longer.
+        wanted: Tells whether the person has a robot in hand by now, by its id.
 
     Attributes:
         phase: Where it stands.
@@ -64,9 +66,10 @@ class HeldRobot:
         tilt: Callable[[], GivenTilt | TiltSources],
         alert: Callable[[str], object],
         let_go: Callable[[HeldRobot], object],
+        wanted: Callable[[str], bool],
     ) -> None:
         self.device, self.robot, self._console = device, robot, console
-        self._alert, self._let_go = alert, let_go
+        self._alert, self._let_go, self._wanted = alert, let_go, wanted
         self.phase: HeldPhase = "asking"
         self.session, self.event = 0, 0
         self._address, self._has_answered = "", False
@@ -124,6 +127,8 @@ class HeldRobot:
         def unreachable() -> None:
             self._be_gone()
             said(False, f"{self.label}: the DVA does not answer")
+            wanted = partial(self._wanted, self.robot)
+            steps.give_back_unanswered(self.device, self.robot, level, wanted)
 
         body = m.PermissionRequest(self.robot, level)
         self.device.ask(self.device.dva, body, answered, unreachable)

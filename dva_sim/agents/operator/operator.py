@@ -8,6 +8,8 @@ are driven, all but one stand until it is their turn.
 
 from __future__ import annotations
 
+from functools import partial
+
 from dva_sim.agents.operator import steps
 from dva_sim.agents.operator.attention import DriverSeat
 from dva_sim.agents.operator.drive import Teleoperation
@@ -185,8 +187,12 @@ class OperatorAgent:
             else:
                 drive.end("gave up", reply.text)
 
+        def unreachable() -> None:
+            drive.end("lost link", "the DVA does not answer")
+            wanted = partial(self._wants, drive.robot)
+            steps.give_back_unanswered(self.device, drive.robot, drive.level, wanted)
+
         body = m.PermissionRequest(drive.robot, drive.level)
-        unreachable = lambda: drive.end("lost link", "the DVA does not answer")  # noqa: E731
         self.device.ask(self.device.dva, body, answered, unreachable)
 
     def _turn_on_picture(self, drive: Work) -> None:
@@ -237,8 +243,17 @@ class OperatorAgent:
             elif drive.log.refusal in ASK_AGAIN and self._may_ask_again(drive):
                 self._waiting.insert(0, (device.clock.now, order))
             else:
-                device.progress(order.event_id, "done" if found else "failed")
+                # The DVA takes the robot back with the order, unless it has ended that before.
+                body = m.OrderProgress(order.event_id, "done" if found else "failed")
+                device.ask(device.dva, body, ended, unheard)
             self._be_free(drive)
+
+        def ended(reply: m.Reply) -> None:
+            if reply.code != m.OK:
+                unheard()
+
+        def unheard() -> None:
+            self._give_back(drive.robot, drive.session)
 
         if outcome == "lost link":
             # Whatever still gets through shall stop the robot; nobody waits for the answer.
@@ -251,8 +266,11 @@ class OperatorAgent:
 
     def _give_back(self, robot: str, session: int) -> None:
         """A permission is needed no longer, unless what is next is of the same robot."""
-        if session and robot not in {order.device for order in self._orders}:
+        if session and not self._wants(robot):
             steps.give_back(self.device, robot, session)
+
+    def _wants(self, robot: str) -> bool:
+        return robot in {order.device for order in self._orders}
 
     def _be_free(self, drive: Work) -> None:
         """The robot was told to stop: what is next?"""

@@ -107,7 +107,10 @@ class PersonAgent:
 
     def _hold(self, robot: str) -> HeldRobot:
         console, tilt = lambda: self.console, lambda: self._tilt()
-        return HeldRobot(self.device, robot, console, tilt, self._alert, self._let_go)
+        wanted = self.robots.__contains__
+        return HeldRobot(
+            self.device, robot, console, tilt, self._alert, let_go=self._let_go, wanted=wanted
+        )
 
     def release(self, said: Said) -> None:
         """Stop what is driven, give everything back, and leave the seat."""

@@ -14,6 +14,7 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 START_TRIES = 20
+GIVE_BACK_AGAIN = 2.0  # after nobody has answered [s]
 START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
 NOT_YET = (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION)  # what is then answered
 
@@ -116,8 +117,41 @@ def start(
 
 
 def give_back(device: AgentDevice, robot: str, session: int) -> None:
-    """Tell the DVA that a permission is needed no longer."""
-    device.ask(device.dva, m.PermissionRevocation(robot, device.id_tag, session))
+    """Tell the DVA that a permission is needed no longer, until it has heard that."""
+
+    def again() -> None:
+        device.clock.call_after(GIVE_BACK_AGAIN, give_back, device, robot, session)
+
+    body = m.PermissionRevocation(robot, device.id_tag, session)
+    device.ask(device.dva, body, on_failure=again)
+
+
+def give_back_unanswered(
+    device: AgentDevice, robot: str, level: str, is_wanted: Callable[[], bool]
+) -> None:
+    """Give back a permission that may have been granted by a request without an answer.
+
+    Who is alive keeps what it was granted, so the DVA is asked until it says what that was.
+
+    Args:
+        device: Whose permission.
+        robot: Of the robot.
+        level: As in the request.
+        is_wanted: Whether the robot is wanted again by now: then nothing is given back.
+    """
+
+    def answered(reply: m.Reply) -> None:
+        if isinstance(reply.content, m.Permission) and not is_wanted():
+            give_back(device, robot, reply.content.session)
+
+    def again() -> None:
+        device.clock.call_after(GIVE_BACK_AGAIN, ask)
+
+    def ask() -> None:
+        if not is_wanted():
+            device.ask(device.dva, m.PermissionRequest(robot, level), answered, again)
+
+    again()
 
 
 def ask_emergency(device: AgentDevice, robot: str, session: int, said: Said) -> None:

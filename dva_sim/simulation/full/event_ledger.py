@@ -205,16 +205,17 @@ class EventLedger:
 
     def check(self, now: float, page: Page) -> Iterator[Broken]:
         """What is wrong with the book now."""
-        book = self._book = page.book
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
         passed, self._now = now - self._now, now
+        yield from self._unheard(page.rights, now, page.works)
+        if not page.works:  # what it has not kept, nobody knows when it is back
+            self._let_no_time_pass(passed)
+            return
+        book = self._book = page.book
         if self._is_new:
             self._is_new = False
             self._adopt(now)
-        if not page.works:
-            self._let_no_time_pass(passed)
-        yield from self._unheard(page.rights, now, page.works)
         for report in self._taken:
             if not self._is_booked(report):
                 yield "S6", f"a {report.kind} was reported, but the DVA does not list it"

@@ -237,9 +237,11 @@ class SafetyAudit:
         return self._labels.get(device, device)
 
     def deafened(self, now: float, robot: str, deaf: bool) -> None:
-        """See `Observer`: what reaches a robot that hangs, it does not hear; then it is idle."""
+        """See `Observer`: a robot that hangs hears nothing, forgets what waits, and is idle."""
         (self._deaf.add if deaf else self._deaf.discard)(robot)
-        self.witness(robot).does = None
+        witness = self.witness(robot)
+        witness.does = None
+        witness.unanswered.clear()
 
     def slowed(self, now: float, processing: float) -> None:
         """See `Observer`."""
@@ -399,8 +401,10 @@ class SafetyAudit:
                 f"changed its driver to {message.source} while moving at {motion.speed:.2f} m/s",
             )
         witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
-        witness.ends("teleoperation", now)
-        witness.does = Doing(message.source, message.session, level)
+        does = Doing(message.source, message.session, level)
+        if does != witness.does:  # who drives, and starts once more, goes on
+            witness.ends("teleoperation", now)
+        witness.does = does
 
     # --- what robots accept ----------------------------------------------------------------
 
@@ -486,15 +490,15 @@ class SafetyAudit:
 
     def _overdue(self, witness: Witness, motion: RobotMotion, now: float) -> None:
         """What a robot has not answered in time counts as obeyed by then."""
+        if not motion.powered:
+            witness.unanswered.clear()  # it has not heard them
         if not witness.unanswered:
             return
         late = [k for k, v in witness.unanswered.items() if now > v.at + witness.obeys_within]
         for key in late:
             message, at, source = witness.unanswered.pop(key)
             body, by = message.body, at + witness.obeys_within
-            if not motion.powered:
-                pass  # it has not heard it
-            elif isinstance(body, m.Emergency):
+            if isinstance(body, m.Emergency):
                 witness.stands(by)
             elif source != self._dva:
                 pass

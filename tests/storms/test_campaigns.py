@@ -1,0 +1,73 @@
+"""Campaigns: a journal that can be gone on with, and the command."""
+
+import pytest
+from helpers.wording import unnamed
+
+from dva_sim.experiments.execution.executors import local
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.recorder import Breach
+from dva_sim.storms import campaign
+from dva_sim.storms.campaign import Journal, Tally, outcomes
+from dva_sim.storms.storm import Outcome
+
+
+def outcome(seed: int, **of: object) -> Outcome:
+    return Outcome(seed=seed, simulated_s=3600.0, digest="d", **of)
+
+
+@pytest.fixture
+def played(monkeypatch):
+    """The seeds that are really played; storms cost nothing."""
+    seeds = []
+    monkeypatch.setattr(
+        campaign, "play_seed", lambda seed, profile: seeds.append(seed) or outcome(seed)
+    )
+    return seeds
+
+
+def play_all(file, seeds, profile="all"):
+    return [o.seed for o, _ in outcomes(seeds, profile, Journal(file), local(1))]
+
+
+def test_what_was_played_is_not_played_again(tmp_path, played):
+    file = tmp_path / "storms.jsonl"
+    assert play_all(file, range(3)) == [0, 1, 2]
+    assert sorted(play_all(file, range(5))) == [0, 1, 2, 3, 4]
+    assert played == [0, 1, 2, 3, 4]
+    assert play_all(file, range(1), "nodes") == [0]
+    assert played[-1] == 0
+
+
+def test_a_journal_that_was_cut_short_loses_its_last_line_alone(tmp_path, played):
+    file = tmp_path / "storms.jsonl"
+    play_all(file, range(3))
+    file.write_bytes(file.read_bytes()[:-20])
+    assert sorted(key[1] for key in Journal(file).outcomes) == [0, 1]
+    play_all(file, range(3))
+    assert sorted(key[1] for key in Journal(file).outcomes) == [0, 1, 2]
+
+
+def test_a_file_that_is_no_journal_is_refused_and_stays(tmp_path):
+    file = tmp_path / "storms.jsonl"
+    file.write_text("{}\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as refused:
+        Journal(file)
+    assert unnamed(str(refused.value), "storms.jsonl") == []
+    assert file.read_text(encoding="utf-8") == "{}\n"
+
+
+def test_an_outcome_comes_back_from_the_journal(tmp_path):
+    whole = outcome(7, breaches=[Breach("S1", "robot-1", 2.5, "moves", 3)])
+    file = tmp_path / "storms.jsonl"
+    Journal(file).keep("all", whole)
+    assert Journal(file).outcomes["all", 7] == whole
+
+
+def test_the_upper_limit_of_failures_is_that_of_poisson():
+    tally = Tally()
+    for seed in range(100):
+        tally.add(outcome(seed))
+    assert tally.most_per_hour() == pytest.approx(0.02996, abs=1e-4)
+    tally.add(outcome(100, breaches=[Breach("S1", "robot-1", 2.5, "moves")]))
+    assert tally.failures == {100: ["S1"]}
+    assert tally.most_per_hour() == pytest.approx(4.744 / 101, abs=1e-4)

@@ -1,0 +1,106 @@
+"""Storms: drawn from a seed, the same in every process, and no rule breaks in them."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from helpers.wording import unnamed
+
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.storms.drawing import PROFILES, draw
+from dva_sim.storms.faults import FAULTS
+from dva_sim.storms.plan import Fault, Plan, load_plan
+from dva_sim.storms.storm import play
+
+FOUND = sorted((Path(__file__).parent / "found").glob("*.yaml"))
+SMALL = {
+    "robot": {"count": 1},
+    "operator": {"count": 1},
+    "guard": {"count": 1, "mobilisation_s": 60},
+    "link": {"delay_s": 0.05},
+    "camera": {"rate_hz": 2, "frame_bytes": 4000},
+    "events": [{"kind": "flood", "at_s": 5, "reported": True}],
+}
+
+
+def small(*faults: Fault, calm: float = 60.0) -> Plan:
+    """A storm of one robot, one operator and one guard."""
+    return Plan(1, SMALL, faults, calm)
+
+
+def test_a_plan_is_drawn_from_its_seed_and_read_again_from_its_file(tmp_path):
+    plan = draw(5)
+    assert draw(5) == plan != draw(6)
+    file = tmp_path / "plan.yaml"
+    file.write_text(plan.text(), encoding="utf-8")
+    assert load_plan(file).as_plain() == plan.as_plain()
+
+
+def test_every_kind_of_fault_is_drawn_and_ends_before_the_calm():
+    faults = [fault for seed in range(300) for fault in draw(seed).faults]
+    assert {fault.kind for fault in faults} == set(FAULTS)
+    assert all(fault.at_s + fault.for_s < draw(1).calm_s for fault in faults)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_profile_draws_its_own_kinds_alone(profile):
+    kinds = {fault.kind for seed in range(40) for fault in draw(seed, profile).faults}
+    assert kinds <= set(PROFILES[profile])
+
+
+def test_an_unknown_profile_is_refused():
+    with pytest.raises(ConfigError) as refused:
+        draw(1, "massages")
+    assert unnamed(str(refused.value), "massages", "messages") == []
+
+
+@pytest.mark.parametrize("text", ["seed: 1\n", "seed: 1\nfaults: [{kind: x}]\ncalm_s: 2\n", "[]\n"])
+def test_what_is_no_plan_is_refused(tmp_path, text):
+    file = tmp_path / "plan.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError):
+        load_plan(file)
+
+
+@pytest.mark.system
+def test_the_same_storm_is_the_same_in_two_processes(tmp_path):
+    plan = replace(draw(8), calm_s=90.0)
+    file = tmp_path / "plan.yaml"
+    file.write_text(plan.text(), encoding="utf-8")
+    code = (
+        "import sys; from pathlib import Path; from dva_sim.storms.plan import load_plan; "
+        "from dva_sim.storms.storm import play; print(play(load_plan(Path(sys.argv[1]))).digest)"
+    )
+    call = [sys.executable, "-c", code, str(file)]
+    first, second = (subprocess.run(call, capture_output=True, check=True) for _ in range(2))
+    assert first.stdout == second.stdout
+    assert len(first.stdout.strip()) == 24
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_each_fault_alone_is_survived(kind):
+    """It strikes while the robot is driven, at its lowest strength."""
+    what = FAULTS[kind]
+    target = {"robot": "robot-1", "operator": "operator-1", "guard": "guard-1"}
+    strikes = target.get(what.strikes[0], what.strikes[0])
+    fault = Fault(kind, 20.0, what.lasts[0], strikes, value=what.value[0])
+    outcome = play(replace(small(fault), calm_s=40.0))
+    assert outcome.faults[kind] == 1
+    assert (outcome.breaches, outcome.error) == ([], "")
+
+
+@pytest.mark.soak
+@pytest.mark.invariant("S1", "S2", "S3", "S4", "S5", "S6", "S7", "S8", "S10", "S11")
+@pytest.mark.parametrize("seed", range(1, 13))
+def test_no_rule_breaks_in_a_storm(seed):
+    outcome = play(draw(seed))
+    assert (outcome.breaches, outcome.error) == ([], "")
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("file", FOUND, ids=lambda file: file.stem)
+def test_what_a_storm_once_broke_holds_now(file):
+    outcome = play(load_plan(file))
+    assert (outcome.breaches, outcome.error) == ([], "")
