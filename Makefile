@@ -10,7 +10,7 @@ MIDDLEWARE := $(VENV)/.middleware
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-middleware test-long test-soak tools check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-middleware test-long test-soak storms tools check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -62,6 +62,9 @@ test-long: $(DEV)  ## long searches and whole studies, the same cases each time
 
 test-soak: $(DEV)  ## the same and all searches with 20 times as many cases, new ones each time
 	@DVA_SIM_SEARCH=20 $(PYTEST) -m "soak or hypothesis"
+
+storms: $(RUNTIME)  ## a hundred hours of a team in which much goes wrong; goes on where it stopped
+	@$(BIN)/dva-sim storm --hours $(or $(HOURS),100) -o results/storms
 
 tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript
 	@tests/install_tools.sh $(VENV)

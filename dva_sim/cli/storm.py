@@ -46,14 +46,14 @@ def storm(
     """Let faulty hours pass, and look whether any safety rule breaks.
 
     Each seed draws a team, a site, a link, people, events and up to sixty faults: messages that are
-    lost, late, doubled or altered, devices that hang, restart or vanish, a DVA that is killed between
-    two writes, revocations and emergencies at the worst moment, intruders, wrong clocks. Fourteen
-    minutes pass in virtual time. Rules S1 to S11 are judged by checkers that ask no agent anything;
-    two minutes after the last fault everything has to work again.
+    lost, late, doubled or altered, devices that hang, restart or vanish, a DVA that is killed
+    between two writes, revocations and emergencies at the worst moment, intruders, wrong clocks.
+    Fourteen minutes pass in virtual time. Rules S1 to S8, S10 and S11 are judged by checkers that
+    ask no agent anything; two minutes after the last fault everything has to work again.
 
     A storm that breaks a rule is cut down to the faults that matter. Its plan and its story are
-    kept in the folder, and the plan can be played again. The same seed is the same storm. Storms that
-    were played before are counted, and not played again.
+    kept in the folder, and the plan can be played again. The same seed is the same storm. Storms
+    that were played before are counted, and not played again.
 
     The exit code is 1 if a rule was broken, or with --mutants, if a planted bug was not found.
 

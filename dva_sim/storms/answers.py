@@ -47,7 +47,7 @@ class Answers:
         self._counted_for = 0
 
     def excuse(self, node: str, excused: bool) -> None:
-        """Expect nothing of a node that is down, and nothing of what it had not answered by then."""
+        """Expect nothing of a node that is down, nor of what it had not answered by then."""
         (self._excused.add if excused else self._excused.discard)(node)
         self._open = {each: None for each in self._open if each.node != node}
 

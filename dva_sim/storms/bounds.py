@@ -42,7 +42,7 @@ def oversized(roots: Iterable[object]) -> Iterator[tuple[str, int, int]]:
     seen, todo = set[int](), [("", root) for root in roots]
     while todo:
         name, each = todo.pop()
-        if isinstance(each, _ATOMS) or isinstance(each, _NOT_THEIRS) or id(each) in seen:
+        if isinstance(each, (*_ATOMS, *_NOT_THEIRS)) or id(each) in seen:
             continue
         seen.add(id(each))
         if isinstance(each, (dict, list, tuple, set, frozenset, deque)):

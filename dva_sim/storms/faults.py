@@ -13,7 +13,6 @@ from dva_sim.agents.robot.manual_control import ManualControl
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.protocol.messages import Position
-from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.storms import interference as i
 from dva_sim.storms.plan import Fault
@@ -162,19 +161,12 @@ def _start_anew(storm: Storm, robot: StormRobot, chance: random.Random) -> None:
 
 
 def _power(storm: Storm, fault: Fault, chance: random.Random) -> End:
-    robot, goes = storm.robot(fault.target), [True]
+    robot = storm.robot(fault.target)
+    robot.agent.drained = True
     robot.agent.power(False)
 
-    def stays() -> bool:
-        """Its battery, which is not empty, would give it power again."""
-        if goes[0]:
-            robot.agent.power(False)
-        return goes[0]
-
-    storm.run.clock.every(PHYSICS_TICK, stays)
-
     def ends() -> None:
-        goes[0] = False
+        robot.agent.drained = False
         robot.agent.power(True)
         _start_anew(storm, robot, chance)
 
@@ -257,7 +249,12 @@ def _kill_dva_writing(storm: Storm, fault: Fault, chance: random.Random) -> None
 def _silence_dva(storm: Storm, fault: Fault, chance: random.Random) -> End:
     silenced = storm.run.dva
     silenced.silence(True)
-    return lambda: silenced.is_gone or silenced.silence(False)
+
+    def ends() -> None:
+        if not silenced.is_gone:
+            silenced.silence(False)
+
+    return ends
 
 
 # --- people ------------------------------------------------------------------------------

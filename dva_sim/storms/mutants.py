@@ -529,7 +529,8 @@ MUTANTS: Final[dict[str, Mutant]] = {
         )),
     ),
     "two-holders": Mutant(
-        "S2", "the DVA gives a robot to a second holder", "dva_sim.core.sessions:Permissions.request",
+        "S2", "the DVA gives a robot to a second holder",
+        "dva_sim.core.sessions:Permissions.request",
         _two_holders,
     ),
     "silent-holder-keeps": Mutant(
@@ -669,7 +670,9 @@ def _unclamped(original: Original, bug: Bug, speed: float) -> Original:
         original(self, wanted, turn_rate, until)
         if wanted > 0.1:
             bug.act(f"motors are asked for {speed} m/s")
-            self._asked.put(self._world.next_tick(), TickTarget(speed, 0.0, self._world.tick_at(until)))
+            self._asked.put(
+                self._world.next_tick(), TickTarget(speed, 0.0, self._world.tick_at(until))
+            )
 
     return wrong
 

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
+from io import StringIO
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
+from ruamel.yaml import YAML
 
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.yaml_files import load_yaml
@@ -104,7 +105,9 @@ class Plan:
 
     def text(self) -> str:
         """Return its file."""
-        return yaml.safe_dump(self.as_plain(), sort_keys=False, width=100)
+        text = StringIO()
+        YAML().dump(self.as_plain(), text)
+        return text.getvalue()
 
 
 def load_plan(path: Path) -> Plan:

@@ -55,7 +55,7 @@ class Recovery:
             robots: Ids of the robots that have power.
             place: Where an event is reported.
         """
-        self._open = {robot: "gives nobody the robot" for robot in robots}
+        self._open = dict.fromkeys(robots, "gives nobody the robot")
         self._open[DVA] = "takes no report"
         self._clock.call_at(self._calm, self._probe.device.register)
         begins = self._calm + RECOVERS_WITHIN

@@ -37,6 +37,7 @@ from dva_sim.storms.plan import Fault, Plan
 from dva_sim.storms.recovery import Recovery
 
 LOOK_AT_BOUNDS = 60.0  # how often all containers are counted [s]
+QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
 SILENCED = frozenset(
     {"robot-hangs", "robot-without-power", "robot-restarts", "replies-lost", "vanishes"}
     | {"dva-silent", "messages-lost", "partition", "frozen"}
@@ -225,9 +226,8 @@ class Storm:
 
     def _arrives(self, passing: Passing) -> None:
         self._answers.watch(passing)
-        if passing.to == DVA and isinstance(passing.payload, bytes):
-            if not any(quiet in passing.payload for quiet in (b"<HBMsg>", b"<RobotStatus>")):
-                self.run.show_page()
+        if passing.to == DVA and not any(quiet in passing.payload for quiet in QUIET):
+            self.run.show_page()
 
     def _answered(self, node: str, to: str, reply: bytes) -> None:
         """Tell the audit what a node has answered, even if there is nobody who hears it."""
@@ -293,7 +293,7 @@ def play(plan: Plan, before: Callable[[Storm], object] = lambda _: None) -> Outc
         before(storm)
         try:
             return storm.play()
-        except Exception:  # noqa: BLE001 - an exception is a finding like any other
+        except Exception:
             return Outcome(
                 plan.seed,
                 list(storm.recorder.broken.values()),
@@ -302,4 +302,3 @@ def play(plan: Plan, before: Callable[[Storm], object] = lambda _: None) -> Outc
                 storm.interference.counts,
                 storm.now,
             )
-

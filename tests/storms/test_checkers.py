@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from storms.test_storms import SMALL
 
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request
@@ -13,7 +14,6 @@ from dva_sim.storms.bounds import MOST, oversized
 from dva_sim.storms.interference import Passing
 from dva_sim.storms.plan import Plan
 from dva_sim.storms.storm import Storm, play
-from storms.test_storms import SMALL
 
 ROBOT = "02:00:00:01:00:01"
 
@@ -23,9 +23,7 @@ class Asked:
 
     def __init__(self):
         self.now, self.recorder = 0.0, Recorder(False)
-        self.answers = Answers(
-            self.recorder, lambda: self.now, {ROBOT: "robot-1"}, lambda *_: None
-        )
+        self.answers = Answers(self.recorder, lambda: self.now, {ROBOT: "robot-1"}, lambda *_: None)
 
     def ask(self, service):
         """The robot gets a request, and its service does something with it."""

@@ -1,6 +1,7 @@
 """Planted bugs: each has a function to replace, acts, is found, and is gone afterwards."""
 
 import importlib
+from dataclasses import replace
 
 import pytest
 from helpers.wording import unnamed
@@ -8,7 +9,7 @@ from storms.test_storms import small
 
 from dva_sim.agents.robot.controller import RobotController
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.storms import mutants
+from dva_sim.storms import hunting, mutants
 from dva_sim.storms.hunting import hunt
 from dva_sim.storms.mutants import MUTANTS, Mutant, named, planted
 from dva_sim.storms.plan import Fault
@@ -55,6 +56,7 @@ def test_an_unknown_mutant_is_refused():
 def test_a_bug_that_does_nothing_is_not_found(monkeypatch):
     idle = Mutant("S1", "none", MUTANTS["stop-ignored"].place, lambda original, bug: original)
     monkeypatch.setitem(mutants.MUTANTS, "idle", idle)
+    monkeypatch.setattr(hunting, "draw", lambda *_: replace(small(), calm_s=5.0))
     assert hunt("idle", range(1), "none").rules == ()
 
 

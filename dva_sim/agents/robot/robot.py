@@ -101,6 +101,7 @@ class RobotAgent:
         trace: Told each decision, if there is one.
         refuses: Made to refuse every command with this code: a fault that is planted.
         blind: Whether it takes no pictures: another one.
+        drained: Whether its battery counts as empty, whatever is in it: another one.
         sensors: What it measures, by name; each may be given another port.
     """
 
@@ -125,7 +126,7 @@ class RobotAgent:
         self.filmed: Callable[[str, CameraFrame], object] | None = None
         self.trace: DecisionLog | None = None
         self.refuses: int | None = None
-        self.blind = False
+        self.blind = self.drained = False
         self._fared, self._held_since = m.OK, 0.0
         # Who holds it, and how that fares, as was published last.
         self._told: tuple[str | None, int] = (None, m.WRONG_MODE)
@@ -205,7 +206,7 @@ class RobotAgent:
     @property
     def charge(self) -> float:
         """Share of the battery's charge that is left."""
-        return self._setup.charge()
+        return 0.0 if self.drained else self._setup.charge()
 
     @property
     def holder(self) -> tuple[str | None, float]:

@@ -7,6 +7,7 @@ battery, sensors and a computer; people on foot share physics and air with it.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +108,7 @@ class TeamBuilder:
         )
         if registers:
             device.register(robot.start)
-        stage.clock.every(HOUSEKEEPING, lambda: self._look_after(robot, power))
+        stage.clock.every(HOUSEKEEPING, partial(self._look_after, robot))
         return robot
 
     def _setup(self, profile: RobotProfile, body: RobotBody, power: Power) -> RobotSetup:
@@ -140,11 +141,11 @@ class TeamBuilder:
             limit=scenario.zeromq.high_water_mark,
         )
 
-    def _look_after(self, robot: RobotAgent, power: Power) -> None:
+    def _look_after(self, robot: RobotAgent) -> None:
         """Once a second: is there power, does its drive answer, and is the floor wet?"""
         now, body = self._stage.clock.now, robot.body
         self._world.advance_to(now)
-        robot.power(power.share() > 0.0)
+        robot.power(robot.charge > 0.0)
         self._look_at_drive(robot)
         if self._around.may_be_wet:
             wet = self._around.at(body.x, body.y, now).water > WET
