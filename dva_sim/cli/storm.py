@@ -14,9 +14,9 @@ from dva_sim.cli.options import Jobs, Quiet, asks, folder, number, text
 from dva_sim.kernel.errors import ConfigError, ExitCode
 
 if TYPE_CHECKING:
-    from dva_sim.storms.campaign import Tally
-    from dva_sim.storms.plan import Plan
-    from dva_sim.storms.storm import Outcome
+    from dva_sim.storms.campaign import StormTally
+    from dva_sim.storms.plan import StormPlan
+    from dva_sim.storms.storm import StormOutcome
 
 OUT = Path("results/storms")
 AROUND = 20.0  # of a breach, in its story [s]
@@ -64,7 +64,7 @@ def storm(
         dva-sim storm --mutants all --seeds 1:32  # how soon planted bugs are found
     """
     from dva_sim.experiments.execution.executors import local  # late: start-up
-    from dva_sim.storms.campaign import Journal, Tally, outcomes  # late: start-up
+    from dva_sim.storms.campaign import Journal, StormTally, outcomes  # late: start-up
     from dva_sim.storms.drawing import draw  # late: start-up
     from dva_sim.storms.plan import load_plan  # late: start-up
 
@@ -75,7 +75,7 @@ def storm(
     if mutants:
         raise typer.Exit(_hunt(mutants, range(first, last + 1), profile))
     out.mkdir(parents=True, exist_ok=True)
-    tally, known = Tally(), 0
+    tally, known = StormTally(), 0
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
     for outcome, is_known in outcomes(numbers, profile, Journal(out / "storms.jsonl"), local(jobs)):
         tally.add(outcome)
@@ -99,7 +99,7 @@ def _range(seeds: str) -> tuple[int, int]:
     return int(first), int(last or first)
 
 
-def _replay(plan: Plan) -> ExitCode:
+def _replay(plan: StormPlan) -> ExitCode:
     """Play one storm, and tell its story."""
     from dva_sim.storms.storm import Storm, play  # late: start-up
 
@@ -128,7 +128,7 @@ def _hunt(mutants: str, seeds: range, profile: str) -> ExitCode:
     return ExitCode.DOES_NOT_HOLD if missed else ExitCode.OK
 
 
-def _tell_failure(outcome: Outcome, profile: str) -> None:
+def _tell_failure(outcome: StormOutcome, profile: str) -> None:
     where = f"seed {outcome.seed} ({profile}): " if profile else ""
     for breach in outcome.breaches:
         times = f", {breach.count} times" if breach.count > 1 else ""
@@ -140,7 +140,7 @@ def _tell_failure(outcome: Outcome, profile: str) -> None:
         typer.echo(f"{where}{outcome.error}")
 
 
-def _keep_failure(plan: Plan, outcome: Outcome, folder: Path, profile: str) -> None:
+def _keep_failure(plan: StormPlan, outcome: StormOutcome, folder: Path, profile: str) -> None:
     """Cut a failure down, and keep its plan and its story."""
     from dva_sim.storms.shrinking import Shrinker  # late: start-up
     from dva_sim.storms.storm import Storm, play  # late: start-up
@@ -162,12 +162,12 @@ def _keep_failure(plan: Plan, outcome: Outcome, folder: Path, profile: str) -> N
     typer.echo(f"  {len(plan.faults)} faults cut to {len(small.faults)}: dva-sim storm {file}")
 
 
-def _progress(tally: Tally, hours: float | None) -> None:
+def _progress(tally: StormTally, hours: float | None) -> None:
     of = f" of {hours:g}" if hours else ""
     typer.echo(f"{tally.storms} storms, {tally.hours:.1f}{of} hours of a team", err=True)
 
 
-def _tell(tally: Tally, known: int) -> None:
+def _tell(tally: StormTally, known: int) -> None:
     faults, touched = sum(tally.faults.values()), sum(tally.messages.values())
     typer.echo(
         f"{tally.storms} storms ({known} played before), {tally.hours:.1f} hours of a team, "

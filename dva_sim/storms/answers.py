@@ -10,7 +10,7 @@ from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request, Service
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
-from dva_sim.storms.interference import Passing
+from dva_sim.storms.interference import PassingMessage
 
 ANSWERED_WITHIN = 60.0  # a full queue of a robot that takes 3 s for a message is cut by then [s]
 
@@ -24,7 +24,7 @@ class _Open:
     refused: int
 
 
-class Answers:
+class AnswerWatch:
     """Sees what reaches the DVA and the robots, and what they answer.
 
     Args:
@@ -51,7 +51,7 @@ class Answers:
         (self._excused.add if excused else self._excused.discard)(node)
         self._open = {each: None for each in self._open if each.node != node}
 
-    def watch(self, passing: Passing) -> None:
+    def watch(self, passing: PassingMessage) -> None:
         """Let a message reach its receiver; one that is none has to be answered or counted."""
         is_judged = passing.to in self._nodes and passing.to not in self._excused
         if not is_judged or not isinstance(passing.payload, bytes) or is_message(passing.payload):
@@ -107,7 +107,7 @@ class Answers:
 class _Tap:
     """Sees the requests to one node; see `RequestTap`."""
 
-    def __init__(self, answers: Answers, node: str) -> None:
+    def __init__(self, answers: AnswerWatch, node: str) -> None:
         self._answers, self._node = answers, node
 
     def serve(self, service: Service, request: Request) -> None:

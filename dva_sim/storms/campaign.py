@@ -16,7 +16,7 @@ from dva_sim.experiments.execution.executors import Workers
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms.drawing import draw
-from dva_sim.storms.storm import Outcome, play
+from dva_sim.storms.storm import StormOutcome, play
 
 HOUR = 3600.0
 CONFIDENCE: Final = 0.95
@@ -24,7 +24,7 @@ LOOK_EVERY = 1.0  # after the processes [s]
 
 
 @dataclass
-class Tally:
+class StormTally:
     """What many storms add up to.
 
     Attributes:
@@ -43,7 +43,7 @@ class Tally:
     messages: Counter[str] = field(default_factory=Counter)
     failures: dict[int, list[str]] = field(default_factory=dict)
 
-    def add(self, outcome: Outcome) -> None:
+    def add(self, outcome: StormOutcome) -> None:
         """Count one more storm."""
         self.storms += 1
         self.hours += outcome.simulated_s / HOUR
@@ -60,7 +60,7 @@ class Tally:
         return float(chi2.ppf(CONFIDENCE, 2 * (len(self.failures) + 1)) / 2 / self.hours)
 
 
-def play_seed(seed: int, profile: str) -> Outcome:
+def play_seed(seed: int, profile: str) -> StormOutcome:
     """Play the storm of a seed."""
     return play(draw(seed, profile))
 
@@ -77,7 +77,7 @@ class Journal:
 
     def __init__(self, file: Path) -> None:
         self._file = file
-        self.outcomes: dict[tuple[str, int], Outcome] = {}
+        self.outcomes: dict[tuple[str, int], StormOutcome] = {}
         if not file.exists():
             return
         whole = file.read_bytes()
@@ -91,7 +91,7 @@ class Journal:
         if rest:  # of a process that was killed while it wrote
             file.write_bytes(lines + b"\n" if lines else b"")
 
-    def keep(self, profile: str, outcome: Outcome) -> None:
+    def keep(self, profile: str, outcome: StormOutcome) -> None:
         """Write down the outcome of a storm."""
         self.outcomes[profile, outcome.seed] = outcome
         line = json.dumps({"profile": profile, **plain(outcome)})
@@ -99,7 +99,7 @@ class Journal:
             file.write(line + "\n")
 
 
-def plain(outcome: Outcome) -> dict[str, Any]:
+def plain(outcome: StormOutcome) -> dict[str, Any]:
     """Return an outcome as JSON has it."""
     return {
         **{key: value for key, value in vars(outcome).items() if key != "breaches"},
@@ -107,17 +107,17 @@ def plain(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def outcome_of(kept: dict[str, Any]) -> Outcome:
+def outcome_of(kept: dict[str, Any]) -> StormOutcome:
     """Return an outcome from JSON."""
     fields = {key: value for key, value in kept.items() if key not in ("profile", "breaches")}
     for counted in ("faults", "messages"):
         fields[counted] = Counter(fields[counted])
-    return Outcome(**fields, breaches=[Breach(**each) for each in kept["breaches"]])
+    return StormOutcome(**fields, breaches=[Breach(**each) for each in kept["breaches"]])
 
 
 def outcomes(
     seeds: Iterable[int], profile: str, journal: Journal, workers: Workers
-) -> Iterator[tuple[Outcome, bool]]:
+) -> Iterator[tuple[StormOutcome, bool]]:
     """Yield the outcomes of storms, and whether each was known before, as they come.
 
     Args:
@@ -126,7 +126,7 @@ def outcomes(
         journal: Keeps them.
         workers: Who plays them.
     """
-    waiting = set[Future[Outcome]]()
+    waiting = set[Future[StormOutcome]]()
     with workers.executor(workers.width, play_seed) as executor:
         for seed in seeds:
             known = journal.outcomes.get((profile, seed))
@@ -141,8 +141,8 @@ def outcomes(
 
 
 def _ended(
-    waiting: set[Future[Outcome]], profile: str, journal: Journal, workers: Workers
-) -> Iterator[tuple[Outcome, bool]]:
+    waiting: set[Future[StormOutcome]], profile: str, journal: Journal, workers: Workers
+) -> Iterator[tuple[StormOutcome, bool]]:
     """Yield the outcomes of storms that have ended, and wait for them no longer."""
     done, _ = wait(waiting, LOOK_EVERY, FIRST_COMPLETED)
     workers.look_after(not done)

@@ -10,7 +10,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.patterns import PATTERNS
 from dva_sim.storms.faults import FAULTS, FaultKind
-from dva_sim.storms.plan import Fault, Plan
+from dva_sim.storms.plan import Fault, StormPlan
 
 FIRST, STORM = 15.0, 600.0  # faults begin and have ended [s]
 DEADLINES: Final = (3.0, 6.0, 9.0, 10.0, 27.0, 30.0)
@@ -35,7 +35,7 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
 """Which kinds of faults a profile draws from."""
 
 
-def draw(seed: int, profile: str = "all") -> Plan:
+def draw(seed: int, profile: str = "all") -> StormPlan:
     """Draw a storm.
 
     Args:
@@ -54,7 +54,7 @@ def draw(seed: int, profile: str = "all") -> Plan:
     faults = sorted(
         (_fault(chance, kinds, scenario) for _ in range(count)), key=lambda each: each.at_s
     )
-    return Plan(seed, scenario, tuple(faults), STORM)
+    return StormPlan(seed, scenario, tuple(faults), STORM)
 
 
 def _scenario(chance: random.Random) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.robot.faults import SLOWEST
@@ -16,12 +16,10 @@ from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.storms import interference as i
 from dva_sim.storms.plan import Fault
-
-if TYPE_CHECKING:
-    from dva_sim.storms.storm import Storm, StormRobot
+from dva_sim.storms.scene import StormScene, StormRobot
 
 End = Callable[[], object]
-Begin = Callable[["Storm", Fault, random.Random], End | None]
+Begin = Callable[[StormScene, Fault, random.Random], End | None]
 ANY: Final = ("robot", "operator", "guard", "dva")
 ON_DRIVING: Final = ("StartTeleOp", "SetTeleOp", "PermissionGrant", "PermissionRevocation", "Reply")
 DRIFT: Final = 200e-6  # of a robot's clock; a quartz is off by less, one that is slewed by more
@@ -58,11 +56,11 @@ class FaultKind:
 def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Begin:
     """A rule for the messages between some nodes."""
 
-    def begin(storm: Storm, fault: Fault, chance: random.Random) -> End:
+    def begin(storm: StormScene, fault: Fault, chance: random.Random) -> End:
         source, to = storm.id_of(fault.source), storm.id_of(fault.target)
         rule, interference = make(fault.value, chance), storm.interference
 
-        def meets(passing: i.Passing) -> bool:
+        def meets(passing: i.PassingMessage) -> bool:
             if source not in ("", passing.source) or to not in ("", passing.to):
                 return False
             before = interference.delivered
@@ -77,11 +75,15 @@ def _messages(make: Callable[[float, random.Random], Callable[..., bool]]) -> Be
     return begin
 
 
-def _freeze(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """A process that is stopped: what comes and goes waits, and is there all at once."""
-    node, held, interference = storm.id_of(fault.target), list[i.Passing](), storm.interference
+    node, held, interference = (
+        storm.id_of(fault.target),
+        list[i.PassingMessage](),
+        storm.interference,
+    )
 
-    def meets(passing: i.Passing) -> bool:
+    def meets(passing: i.PassingMessage) -> bool:
         if node not in (passing.source, passing.to):
             return False
         held.append(passing)
@@ -97,14 +99,14 @@ def _freeze(storm: Storm, fault: Fault, chance: random.Random) -> End:
     return ends
 
 
-def _replay(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """Some of the last messages reach a node again."""
     past = storm.interference.past(storm.id_of(fault.target))
     for passing in chance.sample(past, min(len(past), max(1, round(fault.value)))):
         storm.interference.deliver(passing)
 
 
-def _replay_by_another(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An intruder sends some of the last messages again, over a connection of its own."""
     to = storm.id_of(fault.target)
     past = storm.interference.past(to)
@@ -112,7 +114,7 @@ def _replay_by_another(storm: Storm, fault: Fault, chance: random.Random) -> Non
         storm.intruder.send(to, passing.payload)
 
 
-def _junk(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _junk(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An intruder sends what is no message, or one that asks for what cannot be."""
     to = storm.id_of(fault.target)
     for _ in range(max(1, round(fault.value))):
@@ -137,7 +139,7 @@ def _set_to(to: str, speed: str) -> bytes:
 # --- robots ------------------------------------------------------------------------------
 
 
-def _hang(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _hang(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     robot = storm.robot(fault.target)
     robot.faults.freeze(True)
     storm.run.deafened(robot.id, True)
@@ -149,18 +151,18 @@ def _hang(storm: Storm, fault: Fault, chance: random.Random) -> End:
     return ends
 
 
-def _restart(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _restart(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     _start_anew(storm, storm.robot(fault.target), chance)
 
 
-def _start_anew(storm: Storm, robot: StormRobot, chance: random.Random) -> None:
+def _start_anew(storm: StormScene, robot: StormRobot, chance: random.Random) -> None:
     """Restart the program of a robot, whose clock is another one then."""
     storm.run.deafened(robot.id, True)
     robot.agent.start_anew(chance.uniform(0.0, 1e5))
     storm.run.deafened(robot.id, False)
 
 
-def _power(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _power(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     robot = storm.robot(fault.target)
     robot.agent.drained = True
     robot.agent.power(False)
@@ -173,26 +175,26 @@ def _power(storm: Storm, fault: Fault, chance: random.Random) -> End:
     return ends
 
 
-def _slow(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _slow(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     robot = storm.robot(fault.target)
     robot.faults.slow_down(fault.value)
     storm.run.slowed(fault.value)
     return lambda: robot.faults.slow_down(None)
 
 
-def _drop_replies(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _drop_replies(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     faults = storm.robot(fault.target).faults
     faults.drop_replies(True)
     return lambda: faults.drop_replies(False)
 
 
-def _blind(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _blind(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     faults = storm.robot(fault.target).faults
     faults.lose_camera(True)
     return lambda: faults.lose_camera(False)
 
 
-def _lie(storm: Storm, fault: Fault, chance: random.Random) -> End | None:
+def _lie(storm: StormScene, fault: Fault, chance: random.Random) -> End | None:
     """A sensor that says anything."""
     sensors = storm.robot(fault.target).agent.sensors
     if not sensors:
@@ -204,7 +206,7 @@ def _lie(storm: Storm, fault: Fault, chance: random.Random) -> End | None:
     return lambda: sensors.update({name: port})
 
 
-def _drift(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _drift(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     controller, clock, goes = storm.robot(fault.target).agent.controller, storm.run.clock, [True]
     rate = chance.choice((-DRIFT, DRIFT))
 
@@ -216,7 +218,7 @@ def _drift(storm: Storm, fault: Fault, chance: random.Random) -> End:
     return lambda: goes.__setitem__(0, False)
 
 
-def _by_hand(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """Somebody takes the robot at the robot itself, if it lets them, and drives about."""
     hand, goes = ManualControl(storm.robot(fault.target).agent), [True]
     hand.take(HAND)
@@ -237,16 +239,16 @@ def _by_hand(storm: Storm, fault: Fault, chance: random.Random) -> End:
 # --- the DVA -----------------------------------------------------------------------------
 
 
-def _kill_dva(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _kill_dva(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     storm.dva.kill(fault.value)
 
 
-def _kill_dva_writing(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _kill_dva_writing(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """Kill it between two writes of its memory: at which is drawn."""
     storm.dva.kill_at_write(chance.randrange(40), fault.value)
 
 
-def _silence_dva(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _silence_dva(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     silenced = storm.run.dva
     silenced.silence(True)
 
@@ -260,25 +262,25 @@ def _silence_dva(storm: Storm, fault: Fault, chance: random.Random) -> End:
 # --- people ------------------------------------------------------------------------------
 
 
-def _set_clock(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _set_clock(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     storm.device(fault.target).outbox.set_clock(fault.value)
 
 
-def _vanish(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _vanish(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     device = storm.device(fault.target)
     device.silent = True
     return lambda: setattr(device, "silent", False)
 
 
-def _emergency(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _emergency(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     storm.intruder.ask(storm.id_of(fault.target), m.Emergency())
 
 
-def _revoke(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     storm.run.dva.revoke(storm.id_of(fault.target), None, chance.random() < 0.5)
 
 
-def _take_over(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """Somebody else is given the robot, unasked, and gives it back a little later."""
     robot, dva = storm.id_of(fault.target), storm.run.dva
     others = [device for device in storm.labelled if device.startswith("operator")]
@@ -289,7 +291,7 @@ def _take_over(storm: Storm, fault: Fault, chance: random.Random) -> None:
         _give_back(storm, taker, m.PermissionRevocation(robot, taker.id_tag, grant.session))
 
 
-def _give_back(storm: Storm, device: AgentDevice, held: m.PermissionRevocation) -> None:
+def _give_back(storm: StormScene, device: AgentDevice, held: m.PermissionRevocation) -> None:
     """Give a permission back a little later, until the DVA has heard it."""
     clock = storm.run.clock
 
@@ -299,7 +301,7 @@ def _give_back(storm: Storm, device: AgentDevice, held: m.PermissionRevocation) 
     again()
 
 
-def _ask_twice(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An operator asks for a robot in the midst of whatever it does, more than once.
 
     What it gets so it gives back, whether it drives by that or not.
@@ -315,7 +317,7 @@ def _ask_twice(storm: Storm, fault: Fault, chance: random.Random) -> None:
         device.ask(DVA, m.PermissionRequest(robot.id, "teleoperation"), answered)
 
 
-def _old_session(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An operator acts by sessions of before, or that never were."""
     device, robot = storm.device(fault.target), chance.choice(storm.robots)
     for body in (m.StartTeleOp(), m.SetTeleOp(0.4, 0.1), m.StopTeleOp(), m.CancelMission()):
@@ -323,12 +325,12 @@ def _old_session(storm: Storm, fault: Fault, chance: random.Random) -> None:
         device.ask(robot.id, body, session=session)
 
 
-def _second_driver(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _second_driver(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """An intruder that is registered asks for the robot, and drives it as soon as it may."""
     return storm.intruder.drive(storm.id_of(fault.target), fault.value)
 
 
-def _flood(storm: Storm, fault: Fault, chance: random.Random) -> End:
+def _flood(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     """An intruder sends so many requests a second."""
     to, goes, clock = storm.id_of(fault.target), [True], storm.run.clock
     bodies = m.GetMissionStatus(), m.StartTeleOp(), m.GetSensorInfo(), m.SetTeleOp(0.5, 0.0)
@@ -344,14 +346,14 @@ def _flood(storm: Storm, fault: Fault, chance: random.Random) -> End:
 # --- events ------------------------------------------------------------------------------
 
 
-def _report(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _report(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """Events are reported that may be anywhere: in a wall, outside, at one place."""
     kind = chance.choice(("fire", "gas_leak", "flood"))
     for _ in range(max(1, round(fault.value))):
         storm.intruder.report(kind, storm.anywhere(chance))
 
 
-def _report_twice(storm: Storm, fault: Fault, chance: random.Random) -> None:
+def _report_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     kind, place = chance.choice(("fire", "gas_leak")), storm.anywhere(chance)
     for _ in range(max(2, round(fault.value))):
         storm.intruder.report(kind, Position(place.latitude, place.longitude))
@@ -360,90 +362,158 @@ def _report_twice(storm: Storm, fault: Fault, chance: random.Random) -> None:
 _LONG, _SHORT, _SHARE = (2.0, 60.0), (0.5, 15.0), (0.1, 0.9)
 FAULTS: Final[dict[str, FaultKind]] = {
     "messages-lost": FaultKind(
-        "a share of the messages is lost", ANY, _messages(i.loses), _SHORT, _SHARE, ON_DRIVING, 2.0
+        "a share of the messages is lost",
+        ANY,
+        _messages(i.loses),
+        lasts=_SHORT,
+        value=_SHARE,
+        on=ON_DRIVING,
+        weight=2.0,
     ),
     "messages-late": FaultKind(
-        "messages are late, by up to so many seconds", ANY, _messages(i.delays), _LONG, (0.1, 8.0),
-        ON_DRIVING, 2.0,
+        "messages are late, by up to so many seconds",
+        ANY,
+        _messages(i.delays),
+        lasts=_LONG,
+        value=(0.1, 8.0),
+        on=ON_DRIVING,
+        weight=2.0,
     ),
     "messages-doubled": FaultKind(
-        "each message comes again, within so many seconds", ANY, _messages(i.doubles), _LONG,
-        (0.0, 10.0), ON_DRIVING, 2.0,
+        "each message comes again, within so many seconds",
+        ANY,
+        _messages(i.doubles),
+        lasts=_LONG,
+        value=(0.0, 10.0),
+        on=ON_DRIVING,
+        weight=2.0,
     ),
     "messages-reordered": FaultKind(
-        "messages overtake each other, by up to so many seconds", ANY, _messages(i.reorders),
-        _LONG, (0.1, 4.0),
+        "messages overtake each other, by up to so many seconds",
+        ANY,
+        _messages(i.reorders),
+        lasts=_LONG,
+        value=(0.1, 4.0),
     ),
     "messages-corrupted": FaultKind(
-        "a share of the messages has a wrong byte", ANY, _messages(i.corrupts), _LONG, _SHARE
+        "a share of the messages has a wrong byte",
+        ANY,
+        _messages(i.corrupts),
+        lasts=_LONG,
+        value=_SHARE,
     ),
     "messages-lost-in-bursts": FaultKind(
-        "a share of the quarter seconds loses everything", ANY, _messages(i.loses_in_bursts),
-        _LONG, _SHARE,
+        "a share of the quarter seconds loses everything",
+        ANY,
+        _messages(i.loses_in_bursts),
+        lasts=_LONG,
+        value=_SHARE,
     ),
     "partition": FaultKind(
-        "nothing gets from one device to another", ANY,
-        _messages(lambda _, chance: i.loses(1.0, chance)), _LONG, (0.0, 0.0), ON_DRIVING, 2.0,
+        "nothing gets from one device to another",
+        ANY,
+        _messages(lambda _, chance: i.loses(1.0, chance)),
+        lasts=_LONG,
+        value=(0.0, 0.0),
+        on=ON_DRIVING,
+        weight=2.0,
     ),
     "frozen": FaultKind(
-        "a process stands still: what comes and goes waits", ANY, _freeze, _SHORT, (0.0, 0.0),
-        ON_DRIVING,
+        "a process stands still: what comes and goes waits",
+        ANY,
+        _freeze,
+        lasts=_SHORT,
+        value=(0.0, 0.0),
+        on=ON_DRIVING,
     ),
     "replay": FaultKind(
         "so many of the last messages arrive again", ANY, _replay, value=(1.0, 64.0), on=ON_DRIVING
     ),
     "replay-by-another": FaultKind(
-        "an intruder sends so many of the last messages again", ("robot", "dva"),
-        _replay_by_another, value=(1.0, 64.0), on=ON_DRIVING,
+        "an intruder sends so many of the last messages again",
+        ("robot", "dva"),
+        _replay_by_another,
+        value=(1.0, 64.0),
+        on=ON_DRIVING,
     ),
     "junk": FaultKind(
-        "an intruder sends so many messages that are none", ("robot", "dva"), _junk,
+        "an intruder sends so many messages that are none",
+        ("robot", "dva"),
+        _junk,
         value=(1.0, 100.0),
     ),
     "robot-hangs": FaultKind(
-        "a robot's computer hangs, and starts again idle", ("robot",), _hang, _SHORT,
-        on=ON_DRIVING, weight=2.0,
+        "a robot's computer hangs, and starts again idle",
+        ("robot",),
+        _hang,
+        lasts=_SHORT,
+        on=ON_DRIVING,
+        weight=2.0,
     ),
     "robot-restarts": FaultKind(
         "a robot's program starts anew", ("robot",), _restart, on=ON_DRIVING, weight=2.0
     ),
     "robot-without-power": FaultKind(
-        "a robot's battery is empty, and is exchanged", ("robot",), _power, _LONG, on=ON_DRIVING
+        "a robot's battery is empty, and is exchanged",
+        ("robot",),
+        _power,
+        lasts=_LONG,
+        on=ON_DRIVING,
     ),
     "robot-slow": FaultKind(
-        "a message takes a robot's computer so many seconds", ("robot",), _slow, _LONG,
-        (0.2, SLOWEST),
+        "a message takes a robot's computer so many seconds",
+        ("robot",),
+        _slow,
+        lasts=_LONG,
+        value=(0.2, SLOWEST),
     ),
     "replies-lost": FaultKind(
-        "all replies of a robot are lost", ("robot",), _drop_replies, _LONG, on=ON_DRIVING
+        "all replies of a robot are lost", ("robot",), _drop_replies, lasts=_LONG, on=ON_DRIVING
     ),
-    "camera-lost": FaultKind("a camera takes no pictures", ("robot",), _blind, _LONG),
+    "camera-lost": FaultKind("a camera takes no pictures", ("robot",), _blind, lasts=_LONG),
     "camera-lies": FaultKind(
-        "a camera shows an old picture as new", ("",), _messages(i.freezes_pictures), _LONG
+        "a camera shows an old picture as new", ("",), _messages(i.freezes_pictures), lasts=_LONG
     ),
-    "sensor-lies": FaultKind("a sensor of a robot says anything", ("robot",), _lie, _LONG),
-    "clock-drifts": FaultKind("a robot's clock runs fast or slow", ("robot",), _drift, _LONG),
+    "sensor-lies": FaultKind("a sensor of a robot says anything", ("robot",), _lie, lasts=_LONG),
+    "clock-drifts": FaultKind("a robot's clock runs fast or slow", ("robot",), _drift, lasts=_LONG),
     "clock-jumps": FaultKind(
-        "a device's clock is set, by so many seconds", ("robot", "operator", "guard"), _set_clock,
+        "a device's clock is set, by so many seconds",
+        ("robot", "operator", "guard"),
+        _set_clock,
         value=(-4000.0, 4000.0),
     ),
     "taken-by-hand": FaultKind(
-        "somebody drives a robot by hand, at the robot", ("robot",), _by_hand, _LONG,
+        "somebody drives a robot by hand, at the robot",
+        ("robot",),
+        _by_hand,
+        lasts=_LONG,
         on=("StartTeleOp", "PermissionRevocation"),
     ),
     "dva-killed": FaultKind(
-        "the DVA is killed, and is back after so many seconds", ("dva",), _kill_dva,
-        value=(0.5, 40.0), on=("EventReport", "PermissionRequest", "GetGrant", "OrderProgress"),
+        "the DVA is killed, and is back after so many seconds",
+        ("dva",),
+        _kill_dva,
+        value=(0.5, 40.0),
+        on=("EventReport", "PermissionRequest", "GetGrant", "OrderProgress"),
         weight=2.0,
     ),
     "dva-killed-writing": FaultKind(
-        "the DVA is killed between two writes, and is back after so many seconds", ("dva",),
-        _kill_dva_writing, value=(0.5, 20.0), weight=2.0,
+        "the DVA is killed between two writes, and is back after so many seconds",
+        ("dva",),
+        _kill_dva_writing,
+        value=(0.5, 20.0),
+        weight=2.0,
     ),
-    "dva-silent": FaultKind("the DVA says and decides nothing", ("dva",), _silence_dva, _LONG),
+    "dva-silent": FaultKind(
+        "the DVA says and decides nothing", ("dva",), _silence_dva, lasts=_LONG
+    ),
     "vanishes": FaultKind(
-        "somebody is silent, and comes back", ("operator", "guard"), _vanish, _LONG,
-        on=("PermissionGrant", "Order"), weight=2.0,
+        "somebody is silent, and comes back",
+        ("operator", "guard"),
+        _vanish,
+        lasts=_LONG,
+        on=("PermissionGrant", "Order"),
+        weight=2.0,
     ),
     "emergency": FaultKind(
         "somebody stops a robot", ("robot",), _emergency, on=ON_DRIVING, weight=3.0
@@ -461,18 +531,33 @@ FAULTS: Final[dict[str, FaultKind]] = {
         "an operator acts by an old session", ("operator",), _old_session, weight=2.0
     ),
     "held-tilt": FaultKind(
-        "all commands say the same speed", ("",), _messages(i.holds_tilt), (10.0, 60.0), (0.1, 0.5)
+        "all commands say the same speed",
+        ("",),
+        _messages(i.holds_tilt),
+        lasts=(10.0, 60.0),
+        value=(0.1, 0.5),
     ),
     "second-driver": FaultKind(
-        "an intruder asks for a robot, and sends so many commands a second", ("robot",),
-        _second_driver, (5.0, 60.0), (1.0, 20.0), on=("StartTeleOp", "StopTeleOp"), weight=2.0,
+        "an intruder asks for a robot, and sends so many commands a second",
+        ("robot",),
+        _second_driver,
+        lasts=(5.0, 60.0),
+        value=(1.0, 20.0),
+        on=("StartTeleOp", "StopTeleOp"),
+        weight=2.0,
     ),
     "flood": FaultKind(
-        "an intruder sends so many requests a second", ("robot", "dva"), _flood, _SHORT,
-        (20.0, 200.0),
+        "an intruder sends so many requests a second",
+        ("robot", "dva"),
+        _flood,
+        lasts=_SHORT,
+        value=(20.0, 200.0),
     ),
     "event-anywhere": FaultKind(
-        "so many events are reported, in walls and elsewhere", ("",), _report, value=(1.0, 4.0),
+        "so many events are reported, in walls and elsewhere",
+        ("",),
+        _report,
+        value=(1.0, 4.0),
     ),
     "event-doubled": FaultKind(
         "one event is reported so many times", ("",), _report_twice, value=(2.0, 6.0)
@@ -480,4 +565,4 @@ FAULTS: Final[dict[str, FaultKind]] = {
     "events-by-the-hundred": FaultKind(
         "so many events are reported at once", ("",), _report, value=(100.0, 1000.0), weight=0.1
     ),
-}  # fmt: skip
+}

@@ -17,7 +17,7 @@ from dva_sim.protocol.errors import ProtocolError
 REMEMBERED = 64  # messages to a node that may be replayed
 
 
-class Passing(NamedTuple):
+class PassingMessage(NamedTuple):
     """A message that is about to reach a node.
 
     Attributes:
@@ -33,7 +33,7 @@ class Passing(NamedTuple):
     take: Take
 
 
-Rule = Callable[[Passing], bool]
+Rule = Callable[[PassingMessage], bool]
 """Takes a message that is passing; True if nothing else is to happen to it."""
 
 
@@ -50,15 +50,15 @@ class Interference:
         delivered: Number of messages that have reached somebody.
     """
 
-    def __init__(self, clock: Clock, watch: Callable[[Passing], None]) -> None:
+    def __init__(self, clock: Clock, watch: Callable[[PassingMessage], None]) -> None:
         self.clock, self.rules, self.counts = clock, list[Rule](), Counter[str]()
         self._watch, self.delivered = watch, 0
         self._awaited: list[tuple[bytes, str, Callable[[str], object]]] = []
-        self._past: dict[str, deque[Passing]] = {}
+        self._past: dict[str, deque[PassingMessage]] = {}
 
     def __call__(self, source: str, to: str, payload: Any, take: Take) -> None:
         """See `VirtualNetwork.interference`."""
-        passing = Passing(source, to, payload, take)
+        passing = PassingMessage(source, to, payload, take)
         if isinstance(payload, bytes):
             self._past.setdefault(to, deque(maxlen=REMEMBERED)).append(passing)
             if self._awaited:
@@ -68,16 +68,16 @@ class Interference:
                 return
         self.deliver(passing)
 
-    def deliver(self, passing: Passing) -> None:
+    def deliver(self, passing: PassingMessage) -> None:
         """Let a message reach its receiver now."""
         self.delivered += 1
         self._watch(passing)
 
-    def later(self, passing: Passing, delay: float) -> None:
+    def later(self, passing: PassingMessage, delay: float) -> None:
         """Let a message reach its receiver after a delay [s]."""
         self.clock.call_after(delay, self.deliver, passing)
 
-    def past(self, to: str) -> list[Passing]:
+    def past(self, to: str) -> list[PassingMessage]:
         """Return the newest messages to a node."""
         return list(self._past.get(to, ()))
 
@@ -91,7 +91,7 @@ class Interference:
         """
         self._awaited.append((b"<" + kind.encode(), to, then))
 
-    def _look_out(self, passing: Passing) -> None:
+    def _look_out(self, passing: PassingMessage) -> None:
         for waiting in tuple(self._awaited):
             kind, to, then = waiting
             if passing.to.startswith(to) and kind in passing.payload:
@@ -99,28 +99,32 @@ class Interference:
                 then(passing.to)
 
 
+Meddling = Callable[[Interference, PassingMessage], bool]
+"""Does something to a message that is passing; True if nothing else is to happen to it."""
+
+
 # --- rules -------------------------------------------------------------------------------
 
 
-def loses(share: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def loses(share: float, chance: random.Random) -> Meddling:
     """Lose a share of the messages."""
     return lambda interference, passing: chance.random() < share
 
 
-def delays(longest: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def delays(longest: float, chance: random.Random) -> Meddling:
     """Delay each message by up to so much [s]; they overtake each other."""
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         interference.later(passing, longest * chance.random())
         return True
 
     return rule
 
 
-def doubles(longest: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def doubles(longest: float, chance: random.Random) -> Meddling:
     """Let each message pass, and a copy of it up to so much later [s]."""
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         interference.deliver(passing)
         interference.later(passing, longest * chance.random())
         return True
@@ -128,10 +132,10 @@ def doubles(longest: float, chance: random.Random) -> Callable[[Interference, Pa
     return rule
 
 
-def reorders(longest: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def reorders(longest: float, chance: random.Random) -> Meddling:
     """Hold back every second message, at random, by up to so much [s]."""
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         if chance.random() < 0.5:
             return False
         interference.later(passing, longest * chance.random())
@@ -140,10 +144,10 @@ def reorders(longest: float, chance: random.Random) -> Callable[[Interference, P
     return rule
 
 
-def corrupts(share: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def corrupts(share: float, chance: random.Random) -> Meddling:
     """Alter a share of the messages: a byte is changed, lost, or another one inserted."""
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         if not isinstance(passing.payload, bytes) or chance.random() >= share:
             return False
         data, place = passing.payload, chance.randrange(len(passing.payload))
@@ -155,18 +159,18 @@ def corrupts(share: float, chance: random.Random) -> Callable[[Interference, Pas
     return rule
 
 
-def loses_in_bursts(share: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def loses_in_bursts(share: float, chance: random.Random) -> Meddling:
     """Lose all messages in a share of the quarters of a second."""
     first = chance.randrange(1 << 30)
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         slot = int(interference.clock.now * 4)
         return random.Random(first + slot).random() < share
 
     return rule
 
 
-def holds_tilt(speed: float, chance: random.Random) -> Callable[[Interference, Passing], bool]:
+def holds_tilt(speed: float, chance: random.Random) -> Meddling:
     """Make all commands say the same, as of somebody who has put the phone aside.
 
     Args:
@@ -175,7 +179,7 @@ def holds_tilt(speed: float, chance: random.Random) -> Callable[[Interference, P
     """
     turn = chance.uniform(-0.5, 0.5)
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         message = _read(passing.payload) if b"<SetTeleOp" in _bytes(passing.payload) else None
         if message is None or not isinstance(message.body, m.SetTeleOp):
             return False
@@ -187,11 +191,11 @@ def holds_tilt(speed: float, chance: random.Random) -> Callable[[Interference, P
     return rule
 
 
-def freezes_pictures(_: float, __: random.Random) -> Callable[[Interference, Passing], bool]:
+def freezes_pictures(_: float, __: random.Random) -> Meddling:
     """Show the first picture for ever, each time with the tick of the present one: a lie."""
     shown: dict[str, CameraFrame] = {}
 
-    def rule(interference: Interference, passing: Passing) -> bool:
+    def rule(interference: Interference, passing: PassingMessage) -> bool:
         frame = passing.payload
         if not isinstance(frame, CameraFrame):
             return False

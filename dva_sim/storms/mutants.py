@@ -479,42 +479,56 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S1", "a command is in force two seconds too long", f"{_ROBOT}._set", _afterwards(_longer)
     ),
     "watchdog-fed-by-requests": Mutant(
-        "S1", "any request keeps a robot going",
+        "S1",
+        "any request keeps a robot going",
         "dva_sim.agents.robot.robot:RobotAgent._decide",
         _feeds_watchdog((m.GetMissionStatus, m.GetSensorInfo, m.StartTeleOp, m.PermissionGrant)),
     ),
     "watchdog-fed-by-status": Mutant(
-        "S1", "a robot goes on as long as it tells its status",
-        "dva_sim.agents.robot.robot:RobotAgent._publish_status", _status_feeds_watchdog,
+        "S1",
+        "a robot goes on as long as it tells its status",
+        "dva_sim.agents.robot.robot:RobotAgent._publish_status",
+        _status_feeds_watchdog,
     ),
     "age-not-checked": Mutant("S1", "old commands are obeyed", f"{_ROBOT}._set", _ignores_age),
     "order-not-checked": Mutant("S1", "commands act again", f"{_ROBOT}._set", _ignores_order),
     "orders-act-again": Mutant(
-        "S1", "an old order acts again", f"{_ROBOT}._order", _instead(lambda self, message: (
-            None if message.message_id <= self.last_order_id else RIGHT
-        )),
+        "S1",
+        "an old order acts again",
+        f"{_ROBOT}._order",
+        _instead(lambda self, message: None if message.message_id <= self.last_order_id else RIGHT),
     ),
     "stop-ignored": Mutant(
-        "S1", "StopTeleOp is answered, and changes nothing", f"{_ROBOT}._stop",
-        _instead(lambda self, *_: (
-            Decision(m.OK) if self.mode is Mode.TELEOPERATION else RIGHT
-        )),
+        "S1",
+        "StopTeleOp is answered, and changes nothing",
+        f"{_ROBOT}._stop",
+        _instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.TELEOPERATION else RIGHT),
     ),
     "cancel-ignored": Mutant(
-        "S1", "CancelMission is answered, and changes nothing", f"{_ROBOT}._cancel",
+        "S1",
+        "CancelMission is answered, and changes nothing",
+        f"{_ROBOT}._cancel",
         _instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.MISSION else RIGHT),
     ),
     "revocation-ignored": Mutant(
-        "S2", "a revocation is answered, and changes nothing", f"{_ROBOT}._revoked",
-        _instead(lambda self, message, body: (
-            Decision(m.OK) if self.grant and self.grant.session == body.session else RIGHT
-        )),
+        "S2",
+        "a revocation is answered, and changes nothing",
+        f"{_ROBOT}._revoked",
+        _instead(
+            lambda self, message, body: (
+                Decision(m.OK) if self.grant and self.grant.session == body.session else RIGHT
+            )
+        ),
     ),
     "lease-never-ends": Mutant(
-        "S2", "a silent driver keeps the robot", f"{_ROBOT}.expire",
-        _instead(lambda self, now: (
-            False if self.mode in _SET_OUT and now - self.last_valid > 30.0 else RIGHT
-        )),
+        "S2",
+        "a silent driver keeps the robot",
+        f"{_ROBOT}.expire",
+        _instead(
+            lambda self, now: (
+                False if self.mode in _SET_OUT and now - self.last_valid > 30.0 else RIGHT
+            )
+        ),
     ),
     "changes-hands-moving": Mutant(
         "S2", "a robot that moves is handed over", f"{_ROBOT}._begin", _with(moving=False)
@@ -523,47 +537,64 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S2", "the former driver drives on", f"{_ROBOT}._is_held", _keeps_driver
     ),
     "hand-takes-held-robot": Mutant(
-        "S2", "a robot that somebody holds is taken by hand", f"{_ROBOT}.take_by_hand",
-        _instead(lambda self, who, now, moving: (
-            _taken(self, who, now) if self.grant is not None and not moving else RIGHT
-        )),
+        "S2",
+        "a robot that somebody holds is taken by hand",
+        f"{_ROBOT}.take_by_hand",
+        _instead(
+            lambda self, who, now, moving: (
+                _taken(self, who, now) if self.grant is not None and not moving else RIGHT
+            )
+        ),
     ),
     "two-holders": Mutant(
-        "S2", "the DVA gives a robot to a second holder",
+        "S2",
+        "the DVA gives a robot to a second holder",
         "dva_sim.core.sessions:Permissions.request",
         _two_holders,
     ),
     "silent-holder-keeps": Mutant(
-        "S2", "who is silent keeps its permissions",
+        "S2",
+        "who is silent keeps its permissions",
         "dva_sim.core.sessions:Sessions.take_back_all",
-        _skipped(lambda self, holder: any(
-            grant.holder == holder for grant in self.permissions.grants.values()
-        )),
+        _skipped(
+            lambda self, holder: any(
+                grant.holder == holder for grant in self.permissions.grants.values()
+            )
+        ),
     ),
     "emergency-forgotten": Mutant(
-        "S3", "an emergency is answered, and changes nothing", f"{_ROBOT}._emergency",
-        _instead(lambda self, now: (
-            Decision(m.OK, "stopped") if self.mode is not Mode.IDLE else RIGHT
-        )),
+        "S3",
+        "an emergency is answered, and changes nothing",
+        f"{_ROBOT}._emergency",
+        _instead(
+            lambda self, now: Decision(m.OK, "stopped") if self.mode is not Mode.IDLE else RIGHT
+        ),
     ),
     "emergency-of-holder-only": Mutant(
-        "S3", "an emergency of a stranger is refused", f"{_ROBOT}._handle",
+        "S3",
+        "an emergency of a stranger is refused",
+        f"{_ROBOT}._handle",
         _emergency_of_the_holder_only,
     ),
     "emergency-resumes": Mutant(
         "S3", "the drive goes on after an emergency", f"{_ROBOT}._emergency", _resumes
     ),
     "emergency-leaves-orders": Mutant(
-        "S3", "an order from before an emergency is obeyed", f"{_ROBOT}._begin",
+        "S3",
+        "an order from before an emergency is obeyed",
+        f"{_ROBOT}._begin",
         _with(arrived=float("inf")),
     ),
     "speed-not-clamped": Mutant(
-        "S4", "motors are asked for more than they may",
+        "S4",
+        "motors are asked for more than they may",
         "dva_sim.worlds.bodies:RobotBody.drive",
         lambda original, bug: _unclamped(original, bug, 0.8),
     ),
     "drives-backwards": Mutant(
-        "S4", "motors are asked to go backwards", "dva_sim.worlds.bodies:RobotBody.drive",
+        "S4",
+        "motors are asked to go backwards",
+        "dva_sim.worlds.bodies:RobotBody.drive",
         lambda original, bug: _unclamped(original, bug, -0.3),
     ),
     "session-not-checked": Mutant(
@@ -573,20 +604,28 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S5", "anybody may act", f"{_ROBOT}._refusal", _forgets_refusal(m.NOT_PERMITTED)
     ),
     "grant-not-confirmed": Mutant(
-        "S5", "a grant counts before the DVA has confirmed it", f"{_ROBOT}._granted",
+        "S5",
+        "a grant counts before the DVA has confirmed it",
+        f"{_ROBOT}._granted",
         _grants_unasked,
     ),
     "readers-not-checked": Mutant(
-        "S5", "anybody may read sensors", f"{_ROBOT}._subscription",
+        "S5",
+        "anybody may read sensors",
+        f"{_ROBOT}._subscription",
         _afterwards(lambda self, decision, *_: None if decision.code == m.OK else Decision(m.OK)),
     ),
     "grant-kept-over-restart": Mutant(
-        "S1", "a robot that starts anew is still driven", f"{_ROBOT}.start_anew",
+        "S1",
+        "a robot that starts anew is still driven",
+        f"{_ROBOT}.start_anew",
         _keeps_grant_over_restart,
     ),
     "timer-reset-by-reports": Mutant(
-        "S6", "each report lets an event wait from the beginning",
-        "dva_sim.core.events:EventBook.merge", _resets_timer,
+        "S6",
+        "each report lets an event wait from the beginning",
+        "dva_sim.core.events:EventBook.merge",
+        _resets_timer,
     ),
     "event-forgotten": Mutant(
         "S6", "every fourth event is forgotten", "dva_sim.core.events:EventBook.add", _without_last
@@ -595,69 +634,99 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S6", "a confirmed event is counted twice", "dva_sim.core.events:EventBook.move", _miscounts
     ),
     "order-never-ends": Mutant(
-        "S6", "who has an order has it for ever", "dva_sim.core.orders:Orders.take_back",
-        _instead(lambda self, now: (
-            [] if any(self._order_ends(*pair) <= now for pair in self.engaged.pairs()) else RIGHT
-        )),
+        "S6",
+        "who has an order has it for ever",
+        "dva_sim.core.orders:Orders.take_back",
+        _instead(
+            lambda self, now: (
+                []
+                if any(self._order_ends(*pair) <= now for pair in self.engaged.pairs())
+                else RIGHT
+            )
+        ),
     ),
     "escalation-forgotten": Mutant(
-        "S6", "no event is escalated", "dva_sim.core.orders:Orders.escalate",
+        "S6",
+        "no event is escalated",
+        "dva_sim.core.orders:Orders.escalate",
         _instead(lambda self, event, now: []),
     ),
     "anybody-confirms": Mutant(
-        "S6", "one more report confirms an event", "dva_sim.core.events:EventBook.merge",
+        "S6",
+        "one more report confirms an event",
+        "dva_sim.core.events:EventBook.merge",
         _anybody_confirms,
     ),
     "events-lost-in-a-restart": Mutant(
-        "S6", "a DVA that starts anew forgets open events", "dva_sim.core.store:Store._recall",
+        "S6",
+        "a DVA that starts anew forgets open events",
+        "dva_sim.core.store:Store._recall",
         _loses_open,
     ),
     "grants-not-kept": Mutant(
         "S2", "permissions do not survive the DVA", "dva_sim.core.store:Store._write", _writes_half
     ),
     "said-before-kept": Mutant(
-        "S6", "the DVA answers before it has written",
-        "dva_sim.simulation.full.dva_server:DvaAgent._keep_changes", _says_before_keeping,
+        "S6",
+        "the DVA answers before it has written",
+        "dva_sim.simulation.full.dva_server:DvaAgent._keep_changes",
+        _says_before_keeping,
     ),
     "times-out-of-order": Mutant(
-        "S7", "an arrival is noted before the order", "dva_sim.core.orders:Orders.arrived",
+        "S7",
+        "an arrival is noted before the order",
+        "dva_sim.core.orders:Orders.arrived",
         lambda original, bug: _too_early(original, bug),
     ),
     "never-registers-again": Mutant(
-        "S8", "who could not register gives up", "dva_sim.agents.device:AgentDevice._register",
+        "S8",
+        "who could not register gives up",
+        "dva_sim.agents.device:AgentDevice._register",
         lambda original, bug: _registers_once(original, bug),
     ),
     "stays-silent": Mutant(
-        "S8", "a restarted program says nothing", "dva_sim.agents.device:AgentDevice.start_anew",
+        "S8",
+        "a restarted program says nothing",
+        "dva_sim.agents.device:AgentDevice.start_anew",
         lambda original, bug: _stays_silent(original, bug),
     ),
     "question-lost": Mutant(
-        "S8", "a question that was not answered is never asked again",
+        "S8",
+        "a question that was not answered is never asked again",
         "dva_sim.agents.robot.inquiry:Inquiry.unanswered",
         _skipped(lambda self: self.asked is not None),
     ),
     "replies-without-bound": Mutant(
-        "S10", "replies are kept for ever", "dva_sim.protocol.exchange:ReplyCache.__init__",
+        "S10",
+        "replies are kept for ever",
+        "dva_sim.protocol.exchange:ReplyCache.__init__",
         _unbounded,
     ),
     "strangers-fill-the-queue": Mutant(
-        "S10", "any number of messages may wait",
+        "S10",
+        "any number of messages may wait",
         "dva_sim.agents.robot.command_queue:FairQueue._make_room",
         _instead(lambda self, letter, standing: None if self.length >= 20 else RIGHT),
     ),
     "reply-cache-without-source": Mutant(
-        "S6", "a request with the number of another gets its answer",
-        "dva_sim.agents.device:key_of", _by_message_id,
+        "S6",
+        "a request with the number of another gets its answer",
+        "dva_sim.agents.device:key_of",
+        _by_message_id,
     ),
     "bad-messages-uncounted": Mutant(
-        "S11", "what is no message is dropped without a word",
-        "dva_sim.agents.device:AgentDevice.admit", _quiet_about,
+        "S11",
+        "what is no message is dropped without a word",
+        "dva_sim.agents.device:AgentDevice.admit",
+        _quiet_about,
     ),
     "no-room-no-word": Mutant(
-        "S11", "a message for which there is no room is dropped without a word",
-        "dva_sim.agents.robot.robot:RobotAgent._turn_away", _skipped(),
+        "S11",
+        "a message for which there is no room is dropped without a word",
+        "dva_sim.agents.robot.robot:RobotAgent._turn_away",
+        _skipped(),
     ),
-}  # fmt: skip
+}
 
 
 def _taken(controller: Any, who: str, now: float) -> Decision:

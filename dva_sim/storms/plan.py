@@ -60,7 +60,7 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Plan:
+class StormPlan:
     """A storm.
 
     Attributes:
@@ -90,7 +90,7 @@ class Plan:
         assert isinstance(scenario, Scenario)
         return scenario
 
-    def with_faults(self, faults: tuple[Fault, ...]) -> Plan:
+    def with_faults(self, faults: tuple[Fault, ...]) -> StormPlan:
         """Return the same storm with other faults."""
         return replace(self, faults=faults)
 
@@ -110,7 +110,7 @@ class Plan:
         return text.getvalue()
 
 
-def load_plan(path: Path) -> Plan:
+def load_plan(path: Path) -> StormPlan:
     """Read a plan from its file.
 
     Raises:
@@ -119,7 +119,7 @@ def load_plan(path: Path) -> Plan:
     data = load_yaml(path).data
     try:
         faults = tuple(Fault(**fault) for fault in data["faults"])
-        plan = Plan(int(data["seed"]), data["scenario"], faults, float(data["calm_s"]))
+        plan = StormPlan(int(data["seed"]), data["scenario"], faults, float(data["calm_s"]))
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(f"is not the plan of a storm: {error}", path) from None
     plan.built()

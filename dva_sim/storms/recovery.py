@@ -23,7 +23,7 @@ STANDS_AFTER = 5.0  # an emergency was answered [s]
 BYSTANDER = NUMBER + 50
 
 
-class Recovery:
+class RecoveryProbes:
     """Probes whether everything works again.
 
     Args:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any, Final
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.storms.plan import Fault, Plan
-from dva_sim.storms.storm import Outcome, Storm, play
+from dva_sim.storms.plan import Fault, StormPlan
+from dva_sim.storms.storm import Storm, StormOutcome, play
 
 TRIES: Final = 120
 """So many smaller storms are tried at most."""
@@ -39,15 +39,15 @@ class Shrinker:
 
     def __init__(
         self,
-        plan: Plan,
-        outcome: Outcome,
+        plan: StormPlan,
+        outcome: StormOutcome,
         before: Callable[[Storm], object] = lambda _: None,
         tries: int = TRIES,
     ) -> None:
         self.plan, self.outcome, self.left = plan, outcome, tries
         self._before, self._wanted = before, outcome.signature
 
-    def shrink(self) -> Plan:
+    def shrink(self) -> StormPlan:
         """Return the smallest storm that still breaks one of the same rules."""
         self._drop_faults()
         for smaller in self._simpler():
@@ -55,7 +55,7 @@ class Shrinker:
         self._drop_faults()
         return self.plan
 
-    def _try(self, plan: Plan) -> bool:
+    def _try(self, plan: StormPlan) -> bool:
         """Play a smaller storm; keep it if it fails in the same way."""
         if self.left <= 0 or plan == self.plan:
             return False
@@ -76,7 +76,7 @@ class Shrinker:
             if not any(self._try(self.plan.with_faults(f)) for f in _without(self.plan, size)):
                 size = size // 2 if size > 1 else 0
 
-    def _simpler(self) -> Iterator[Plan]:
+    def _simpler(self) -> Iterator[StormPlan]:
         """Yield storms with fewer events and agents, and a plainer scenario, one step each."""
         while len(self.plan.scenario["events"]) > 1:
             before = self.plan
@@ -97,11 +97,11 @@ class Shrinker:
         for key, plain in _PLAINER:
             yield self._with(key, plain)
 
-    def _with(self, key: str, value: Any) -> Plan:
+    def _with(self, key: str, value: Any) -> StormPlan:
         return replace(self.plan, scenario={**self.plan.scenario, key: value})
 
 
-def _without(plan: Plan, size: int) -> Iterator[tuple[Fault, ...]]:
+def _without(plan: StormPlan, size: int) -> Iterator[tuple[Fault, ...]]:
     """Yield the faults without so many neighbours, from each place."""
     for first in range(0, len(plan.faults), size):
         yield plan.faults[:first] + plan.faults[first + size :]

@@ -10,31 +10,22 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from dva_sim.agents.device import AgentDevice
-from dva_sim.agents.robot.faults import RobotFaults
-from dva_sim.agents.robot.robot import RobotAgent
-from dva_sim.kernel.clock import Clock
-from dva_sim.kernel.recorder import Accepted, Breach, Recorder
-from dva_sim.network.virtual_network import VirtualNetwork
-from dva_sim.protocol.codec import decode
-from dva_sim.protocol.exchange import NOON
-from dva_sim.protocol.messages import PermissionGrant, Position
+from typing_extensions import override
+
+from dva_sim.kernel.recorder import Accepted, Breach
 from dva_sim.simulation.full.observations import RobotMotion, motion_of
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
-from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.storms.answers import Answers
+from dva_sim.storms.answers import AnswerWatch
 from dva_sim.storms.bounds import oversized
-from dva_sim.storms.dva_lives import DvaLives
 from dva_sim.storms.faults import FAULTS
-from dva_sim.storms.interference import Interference, Passing
-from dva_sim.storms.intruder import Intruder
-from dva_sim.storms.plan import Fault, Plan
-from dva_sim.storms.recovery import Recovery
+from dva_sim.storms.interference import PassingMessage
+from dva_sim.storms.plan import Fault, StormPlan
+from dva_sim.storms.recovery import RecoveryProbes
+from dva_sim.storms.scene import StormScene
 
 LOOK_AT_BOUNDS = 60.0  # how often all containers are counted [s]
 QUIET = b"<HBMsg>", b"<RobotStatus>"  # of messages that only say that somebody is there
@@ -45,16 +36,8 @@ SILENCED = frozenset(
 """Faults after which what was asked may stay without an answer."""
 
 
-class StormRobot(NamedTuple):
-    """A robot of a storm."""
-
-    id: str
-    agent: RobotAgent
-    faults: RobotFaults
-
-
 @dataclass
-class Outcome:
+class StormOutcome:
     """What a storm was, and what broke.
 
     Attributes:
@@ -90,7 +73,7 @@ class Outcome:
         return not self.breaches and not self.error
 
 
-class Storm:
+class Storm(StormScene):
     """A run that a plan's faults strike.
 
     Args:
@@ -98,37 +81,17 @@ class Storm:
         folder: For the DVA's memory.
 
     Attributes:
-        run: The run.
-        recorder: What happened.
-        interference: What reaches whom.
-        intruder: Does what no honest device does.
-        dva: Kills the DVA, and starts it anew.
-        robots: All robots.
+        begun: Number of faults that have struck, by kind.
     """
 
-    def __init__(self, plan: Plan, folder: Path) -> None:
-        self.plan, self.recorder = plan, Recorder(False)
-        self.dva = DvaLives(folder / "dva.sqlite", partial(self._excuse, DVA))
-        clock = Clock()
-        watched = Watched(
-            clock, self.recorder, memory=self.dva.memory, time_of_day=(NOON, True), keeps=False
-        )
-        self.run = run = Run(plan.built(), plan.seed, watched=watched)
-        self.dva.begin(run)
-        self.labelled = {label: id_tag for id_tag, label in run.stage.labels.items()}
-        self.robots = [
-            StormRobot(i, r, RobotFaults(r, self._lost)) for i, r in run.field.robots.items()
-        ]
+    def __init__(self, plan: StormPlan, folder: Path) -> None:
+        super().__init__(plan, folder)
+        run, clock = self.run, self.run.clock
         nodes = {DVA: "dva"} | {robot.id: robot.agent.device.label for robot in self.robots}
-        self._answers = Answers(self.recorder, lambda: clock.now, nodes, self._answered)
-        self.interference = Interference(clock, self._arrives)
-        assert isinstance(run.network, VirtualNetwork)
-        run.network.interference = self.interference
+        self._answers = AnswerWatch(self.recorder, lambda: clock.now, nodes, self.answered)
         run.network.taps |= {node: self._answers.tap(node) for node in nodes}
-        self.intruder = Intruder(run.stage)
-        self._recovery = Recovery(run.stage, self.recorder, self._motion, plan.calm_s)
+        self._recovery = RecoveryProbes(run.stage, self.recorder, self._motion, plan.calm_s)
         self._digest = hashlib.blake2b(digest_size=12)
-        self._sessions: dict[str, list[int]] = {}
         self.begun: Counter[str] = Counter()
         run.observe(_Witness(self))
         clock.every(PHYSICS_TICK, run.show_motions)
@@ -138,13 +101,13 @@ class Storm:
             clock.call_at(fault.at_s, self._await, fault)
         self._recovery.begin([robot.id for robot in self.robots], self.anywhere(_chance(plan)))
 
-    def play(self) -> Outcome:
+    def play(self) -> StormOutcome:
         """Let the storm pass, and judge it."""
         began = time.process_time()
         self.dva.survive(self.plan.horizon_s)
         self._recovery.end()
         self._look_at_bounds()
-        return Outcome(
+        return StormOutcome(
             seed=self.plan.seed,
             breaches=list(self.recorder.broken.values()),
             faults=self.begun,
@@ -153,37 +116,6 @@ class Storm:
             cpu_s=time.process_time() - began,
             digest=self._digest.hexdigest(),
         )
-
-    # --- what faults make use of -----------------------------------------------------------
-
-    @property
-    def now(self) -> float:
-        """Time [s]."""
-        return self.run.clock.now
-
-    def id_of(self, label: str) -> str:
-        """Return the id of a device by its label; of none, none."""
-        return self.labelled[label] if label else ""
-
-    def robot(self, label: str) -> StormRobot:
-        """Return a robot by its label."""
-        return next(robot for robot in self.robots if robot.id == self.labelled[label])
-
-    def device(self, label: str) -> AgentDevice:
-        """Return a device by its label."""
-        id_tag = self.labelled[label]
-        return next(d for d in reversed(self.run.stage.devices) if d.id_tag == id_tag)
-
-    def anywhere(self, chance: random.Random) -> Position:
-        """Draw a place within the bounds of the site, in walls or not."""
-        site = self.run.stage.site
-        low_x, low_y, high_x, high_y = site.extent
-        x, y = chance.uniform(low_x, high_x), chance.uniform(low_y, high_y)
-        return Position(*site.frame.to_latlon(x, y))
-
-    def sessions_seen(self, robot: str) -> list[int]:
-        """Return the newest sessions in which a robot was granted to somebody."""
-        return self._sessions.get(robot, [])[-8:]
 
     # --- faults ------------------------------------------------------------------------------
 
@@ -224,17 +156,15 @@ class Storm:
 
     # --- what is seen --------------------------------------------------------------------------
 
-    def _arrives(self, passing: Passing) -> None:
+    @override
+    def arrives(self, passing: PassingMessage) -> None:
         self._answers.watch(passing)
         if passing.to == DVA and not any(quiet in passing.payload for quiet in QUIET):
             self.run.show_page()
 
-    def _answered(self, node: str, to: str, reply: bytes) -> None:
-        """Tell the audit what a node has answered, even if there is nobody who hears it."""
-        self.run.audit.sent(self.now, node, to, reply)
-
-    def _lost(self, robot: str, reply: bytes) -> None:
-        self._answered(robot, "", reply)
+    @override
+    def dva_is_down(self, is_down: bool) -> None:
+        self._excuse(DVA, is_down)
 
     def _motion(self, robot: str) -> Any:
         return motion_of(self.run.field.robots[robot])
@@ -246,14 +176,11 @@ class Storm:
             self.recorder.violated("S10", self.now, "dva" if "Dva" in name else "robots", what)
 
     def sent(self, now: float, source: str, to: str, payload: Any) -> None:
-        """Note what was sent, for the digest, and which sessions there are."""
+        """Note what was sent."""
         if not isinstance(payload, bytes):
             return
         self._digest.update(f"{now:.6f} {source} {to} ".encode() + payload)
-        if source == DVA and b"<PermissionGrant" in payload:
-            body = decode(payload).body
-            if isinstance(body, PermissionGrant):
-                self._sessions.setdefault(to, []).append(body.session)
+        self.note_session(source, to, payload)
 
     def accepted(self, command: Accepted) -> None:
         """Note that a robot obeys."""
@@ -276,12 +203,12 @@ class _Witness:
     delivered = by_hand = shows = deafened = slowed = _nothing
 
 
-def _chance(plan: Plan, fault: Fault | None = None) -> random.Random:
+def _chance(plan: StormPlan, fault: Fault | None = None) -> random.Random:
     """Return the chance of one fault: the same whatever other faults there are."""
     return random.Random(f"{plan.seed} {fault!r}")
 
 
-def play(plan: Plan, before: Callable[[Storm], object] = lambda _: None) -> Outcome:
+def play(plan: StormPlan, before: Callable[[Storm], object] = lambda _: None) -> StormOutcome:
     """Play a storm to its end, whatever happens.
 
     Args:
@@ -294,7 +221,7 @@ def play(plan: Plan, before: Callable[[Storm], object] = lambda _: None) -> Outc
         try:
             return storm.play()
         except Exception:
-            return Outcome(
+            return StormOutcome(
                 plan.seed,
                 list(storm.recorder.broken.values()),
                 traceback.format_exc(),

@@ -36,7 +36,7 @@ COMMANDS = {
     "episode": "episode drive-to-event --set horizon_s=1",
     **{name: f"{name} {NOBODY}" for name in ("run", "register", "tune", "report", "replay")},
     "phone-log": f"phone-log {NOBODY}",
-    **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate")},
+    **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate", "storm")},
     "robot": f"robot {NOBODY}",
     "link": f"link {NOBODY} --near true --far true",
 }

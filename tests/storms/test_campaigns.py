@@ -7,12 +7,12 @@ from dva_sim.experiments.execution.executors import local
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Breach
 from dva_sim.storms import campaign
-from dva_sim.storms.campaign import Journal, Tally, outcomes
-from dva_sim.storms.storm import Outcome
+from dva_sim.storms.campaign import Journal, StormTally, outcomes
+from dva_sim.storms.storm import StormOutcome
 
 
-def outcome(seed: int, **of: object) -> Outcome:
-    return Outcome(seed=seed, simulated_s=3600.0, digest="d", **of)
+def outcome(seed: int, **of: object) -> StormOutcome:
+    return StormOutcome(seed=seed, simulated_s=3600.0, digest="d", **of)
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_an_outcome_comes_back_from_the_journal(tmp_path):
 
 
 def test_the_upper_limit_of_failures_is_that_of_poisson():
-    tally = Tally()
+    tally = StormTally()
     for seed in range(100):
         tally.add(outcome(seed))
     assert tally.most_per_hour() == pytest.approx(0.02996, abs=1e-4)

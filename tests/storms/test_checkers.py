@@ -9,10 +9,10 @@ from storms.test_storms import SMALL
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.messaging import Request
 from dva_sim.protocol import messages as m
-from dva_sim.storms.answers import ANSWERED_WITHIN, Answers
+from dva_sim.storms.answers import ANSWERED_WITHIN, AnswerWatch
 from dva_sim.storms.bounds import MOST, oversized
-from dva_sim.storms.interference import Passing
-from dva_sim.storms.plan import Plan
+from dva_sim.storms.interference import PassingMessage
+from dva_sim.storms.plan import StormPlan
 from dva_sim.storms.storm import Storm, play
 
 ROBOT = "02:00:00:01:00:01"
@@ -23,7 +23,9 @@ class Asked:
 
     def __init__(self):
         self.now, self.recorder = 0.0, Recorder(False)
-        self.answers = Answers(self.recorder, lambda: self.now, {ROBOT: "robot-1"}, lambda *_: None)
+        self.answers = AnswerWatch(
+            self.recorder, lambda: self.now, {ROBOT: "robot-1"}, lambda *_: None
+        )
 
     def ask(self, service):
         """The robot gets a request, and its service does something with it."""
@@ -75,7 +77,7 @@ def test_nothing_is_expected_of_a_robot_that_is_down():
 def test_what_is_no_message_has_to_be_counted_or_answered(counted, broken):
     asked = Asked()
     take = (lambda _: count(asked)) if counted else (lambda _: None)
-    asked.answers.watch(Passing("x", ROBOT, b"<no message", take))
+    asked.answers.watch(PassingMessage("x", ROBOT, b"<no message", take))
     assert set(asked.recorder.violations) == broken
 
 
@@ -100,7 +102,7 @@ def test_a_container_beyond_its_bound_is_found(many, found):
 
 def unrecovered(spoil):
     """What has not recovered in a storm without faults, in which a test spoils something."""
-    plan = replace(Plan(1, SMALL, (), 0.0), calm_s=60.0)
+    plan = replace(StormPlan(1, SMALL, (), 0.0), calm_s=60.0)
     outcome = play(plan, lambda storm: storm.run.clock.call_at(90.0, spoil, storm))
     return {(breach.rule, breach.who) for breach in outcome.breaches}
 

@@ -12,7 +12,7 @@ from helpers.wording import unnamed
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.storms.drawing import PROFILES, draw
 from dva_sim.storms.faults import FAULTS
-from dva_sim.storms.plan import Fault, Plan, load_plan
+from dva_sim.storms.plan import Fault, StormPlan, load_plan
 from dva_sim.storms.storm import play
 
 FOUND = sorted((Path(__file__).parent / "found").glob("*.yaml"))
@@ -26,9 +26,9 @@ SMALL: dict[str, Any] = {
 }
 
 
-def small(*faults: Fault, calm: float = 60.0) -> Plan:
+def small(*faults: Fault, calm: float = 60.0) -> StormPlan:
     """A storm of one robot, one operator and one guard."""
-    return Plan(1, SMALL, faults, calm)
+    return StormPlan(1, SMALL, faults, calm)
 
 
 def test_a_plan_is_drawn_from_its_seed_and_read_again_from_its_file(tmp_path):

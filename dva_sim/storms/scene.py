@@ -1,0 +1,118 @@
+"""What faults find in a storm: the run, its devices by label, an intruder, the DVA's lives."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import NamedTuple
+
+from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.robot.faults import RobotFaults
+from dva_sim.agents.robot.robot import RobotAgent
+from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.virtual_network import VirtualNetwork
+from dva_sim.protocol.codec import decode
+from dva_sim.protocol.exchange import NOON
+from dva_sim.protocol.messages import PermissionGrant, Position
+from dva_sim.simulation.full.run import Run, Watched
+from dva_sim.simulation.full.stage import DVA
+from dva_sim.storms.dva_lives import DvaLives
+from dva_sim.storms.interference import Interference, PassingMessage
+from dva_sim.storms.intruder import Intruder
+from dva_sim.storms.plan import StormPlan
+
+
+class StormRobot(NamedTuple):
+    """A robot of a storm."""
+
+    id: str
+    agent: RobotAgent
+    faults: RobotFaults
+
+
+class StormScene:
+    """A run in virtual time in which anything may be made to go wrong.
+
+    Args:
+        plan: The storm.
+        folder: For the DVA's memory.
+
+    Attributes:
+        run: The run.
+        recorder: What happened.
+        interference: What reaches whom.
+        intruder: Does what no honest device does.
+        dva: Kills the DVA, and starts it anew.
+        robots: All robots.
+        labelled: Ids by label.
+    """
+
+    def __init__(self, plan: StormPlan, folder: Path) -> None:
+        self.plan, self.recorder = plan, Recorder(False)
+        self.dva = DvaLives(folder / "dva.sqlite", self.dva_is_down)
+        clock = Clock()
+        watched = Watched(
+            clock, self.recorder, memory=self.dva.memory, time_of_day=(NOON, True), keeps=False
+        )
+        self.run = run = Run(plan.built(), plan.seed, watched=watched)
+        self.dva.begin(run)
+        self.labelled = {label: id_tag for id_tag, label in run.stage.labels.items()}
+        self.robots = [
+            StormRobot(i, r, RobotFaults(r, self._lost)) for i, r in run.field.robots.items()
+        ]
+        self.interference = Interference(clock, self.arrives)
+        assert isinstance(run.network, VirtualNetwork)
+        run.network.interference = self.interference
+        self.intruder = Intruder(run.stage)
+        self._sessions: dict[str, list[int]] = {}
+
+    def arrives(self, passing: PassingMessage) -> None:
+        """Let a message reach its receiver."""
+        passing.take(passing.payload)
+
+    def answered(self, node: str, to: str, reply: bytes) -> None:
+        """Tell the audit what a node has answered, even if there is nobody who hears it."""
+        self.run.audit.sent(self.now, node, to, reply)
+
+    def dva_is_down(self, is_down: bool) -> None:
+        """Note that the DVA was killed, or is back."""
+
+    def _lost(self, robot: str, reply: bytes) -> None:
+        self.answered(robot, "", reply)
+
+    @property
+    def now(self) -> float:
+        """Time [s]."""
+        return self.run.clock.now
+
+    def id_of(self, label: str) -> str:
+        """Return the id of a device by its label; of none, none."""
+        return self.labelled[label] if label else ""
+
+    def robot(self, label: str) -> StormRobot:
+        """Return a robot by its label."""
+        return next(robot for robot in self.robots if robot.id == self.labelled[label])
+
+    def device(self, label: str) -> AgentDevice:
+        """Return a device by its label."""
+        id_tag = self.labelled[label]
+        return next(d for d in reversed(self.run.stage.devices) if d.id_tag == id_tag)
+
+    def anywhere(self, chance: random.Random) -> Position:
+        """Draw a place within the bounds of the site, in walls or not."""
+        site = self.run.stage.site
+        low_x, low_y, high_x, high_y = site.extent
+        x, y = chance.uniform(low_x, high_x), chance.uniform(low_y, high_y)
+        return Position(*site.frame.to_latlon(x, y))
+
+    def sessions_seen(self, robot: str) -> list[int]:
+        """Return the newest sessions in which a robot was granted to somebody."""
+        return self._sessions.get(robot, [])[-8:]
+
+    def note_session(self, source: str, to: str, data: bytes) -> None:
+        """Note a session in which the DVA grants a robot to somebody."""
+        if source == DVA and b"<PermissionGrant" in data:
+            body = decode(data).body
+            if isinstance(body, PermissionGrant):
+                self._sessions.setdefault(to, []).append(body.session)
