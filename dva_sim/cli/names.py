@@ -6,12 +6,12 @@ that are listed are loaded.
 
 from __future__ import annotations
 
-import inspect
 import re
 import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -179,10 +179,9 @@ def _described(path: Path) -> str:
 
 def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
     """Shipped and installed classes; an installed one is loaded only when it is used."""
-    plugins = trial.load_plugins()
-    told = {entry.name: f"of {entry.value}" for entry in plugins.installed()}
-    for name in plugins.shipped.keys() - plugins.hidden:
-        summary = (inspect.getdoc(plugins.shipped[name]) or "").partition("\n\n")[0]
+    told = {entry.name: f"of {entry.value}" for entry in entry_points(group=trial.group)}
+    for name, words in trial.words().items():
+        summary = words.partition("\n\n")[0]
         told[name] = _first(" ".join(summary.split())) or told.get(name, "")
     for name, description in sorted(told.items()):
         yield NamedThing(name, description)

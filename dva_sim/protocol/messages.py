@@ -8,7 +8,7 @@ as `70:1A:04:F9:81:D6`, with capital letters, so that one device has one spellin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 from dva_sim.kernel.makers import maker
 from dva_sim.protocol.control_room import (
@@ -35,6 +35,7 @@ from dva_sim.protocol.control_room import (
     SetDispatch,
     TakeOff,
 )
+from dva_sim.protocol.event_kinds import EVENT_KINDS, EventKind
 from dva_sim.protocol.missions import (
     CancelMission,
     GetMissionStatus,
@@ -62,10 +63,6 @@ from dva_sim.protocol.reply_codes import (
     UNKNOWN_SENSOR,
     WRONG_MODE,
 )
-
-EventKind = Literal["fire", "gas_leak", "flood"]
-EVENT_KINDS: Final[tuple[str, ...]] = get_args(EventKind)
-"""What messages call what happens; whatever else happens is told of as one of these."""
 
 
 @dataclass(frozen=True, slots=True)

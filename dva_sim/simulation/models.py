@@ -184,8 +184,6 @@ class _Operated(Model[Operated]):
 
 
 class _Full(_Operated[Scenario]):
-    """Robots, people, phones and every byte on the network."""
-
     scenario = Scenario
     columns: ClassVar[Columns] = {
         "runs": of_full.RUN_COLUMNS,
@@ -214,8 +212,6 @@ class _Full(_Operated[Scenario]):
 
 
 class _Timed(Model[TimedScenario]):
-    """Whole shifts of the DVA, responders as travel and service times."""
-
     scenario = TimedScenario
     columns: ClassVar[Columns] = {
         "runs": of_timed.RUN_COLUMNS,
@@ -234,8 +230,6 @@ class _Timed(Model[TimedScenario]):
 
 
 class _Task(_Operated[TaskScenario]):
-    """A block of trials of one person at a task of the literature."""
-
     scenario = TaskScenario
     columns: ClassVar[Columns] = {"runs": of_task.RUN_COLUMNS, "trials": of_task.TRIAL_COLUMNS}
     build = staticmethod(task.build)
@@ -252,8 +246,6 @@ class _Task(_Operated[TaskScenario]):
 
 
 class _Transports(_Operated[TransportScenario]):
-    """A session beside TCP flows on a congested link, and one drive of one person over it."""
-
     scenario = TransportScenario
     columns: ClassVar[Columns] = {
         "runs": of_transports.RUN_COLUMNS,
@@ -270,8 +262,6 @@ class _Transports(_Operated[TransportScenario]):
 
 
 class _Middleware(Model[MiddlewareScenario]):
-    """Commands over real middleware and an emulated link, in real time."""
-
     scenario = MiddlewareScenario
     columns: ClassVar[Columns] = {
         "runs": of_middleware.RUN_COLUMNS,

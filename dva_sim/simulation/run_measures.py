@@ -15,7 +15,6 @@ from typing import Any, Final
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.measure import Measure
 from dva_sim.kernel.plugins import FAILURES, Plugins, said, stamp_of
-from dva_sim.simulation.full.scenes import trait_off, way_off
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]{0,59}")
 
@@ -53,6 +52,8 @@ class CautionOff(RunMeasure):
 
     def of(self, recording: Any) -> float:
         """The same in each run of a person."""
+        from dva_sim.simulation.full.scenes import trait_off  # late: start-up
+
         return trait_off(recording.scenario, "caution")
 
 
@@ -69,6 +70,8 @@ class WayOff(RunMeasure):
 
     def of(self, recording: Any) -> float | None:
         """The same in each run of a seed."""
+        from dva_sim.simulation.full.scenes import way_off  # late: start-up
+
         return way_off(recording.scenario, recording.seed)
 
 

@@ -28,7 +28,7 @@ from dva_sim.core.dispatch import (
     load_policy,
 )
 from dva_sim.kernel.plugins import FAILURES
-from dva_sim.protocol.messages import EVENT_KINDS
+from dva_sim.protocol.event_kinds import EVENT_KINDS
 from dva_sim.testing.promises import Case, Outcome, is_slow, kept, line, said
 
 _PLACE: Final = 400.0  # edge of the site [m]

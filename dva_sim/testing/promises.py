@@ -6,6 +6,7 @@ asked for. To add a kind, add it there, and the module whose `check_KIND` tries 
 
 from __future__ import annotations
 
+import inspect
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -122,6 +123,7 @@ class CheckedKind:
         told: How it was tried, in words, with `{tries}`, and `{ms}` or `{us}` of the slowest.
         folder: Of the files that are named, where it is not the class itself that is.
         class_word: The word for a class of it, where that is another.
+        worded: The module whose `WORDS` describe the shipped ones, where loading these takes long.
     """
 
     kind: str
@@ -130,6 +132,7 @@ class CheckedKind:
     told: str
     folder: str = ""
     class_word: str = ""
+    worded: str = ""
 
     @property
     def classes(self) -> str:
@@ -145,6 +148,19 @@ class CheckedKind:
         """What users may add of this kind."""
         found: Plugins[Any] = import_module(f"dva_sim.{self.room}").PLUGINS
         return found
+
+    @property
+    def group(self) -> str:
+        """Entry points of installed packages."""
+        return f"dva_sim.{self.classes}"
+
+    def words(self) -> dict[str, str]:
+        """The shipped ones by name, each with what it is, in a sentence at first."""
+        if self.worded:
+            return dict(import_module(f"dva_sim.{self.worded}").WORDS)
+        plugins = self.load_plugins()
+        names = plugins.shipped.keys() - plugins.hidden
+        return {name: inspect.getdoc(plugins.shipped[name]) or "" for name in names}
 
     def known(self) -> list[str]:
         """Names that are shipped or installed."""
@@ -182,8 +198,14 @@ TRIALS: Final[dict[str, CheckedKind]] = {
         ("mapping", "agents.tilt.mappings", "tilt", f"{{tries}} runs, {_READINGS}"),
         ("hazard", "worlds.hazards", "hazards", f"{{tries}} questions, {_US} an answer"),
         ("measure", "simulation.run_measures", "measures", "{tries} answers, slowest {ms:.1f} ms"),
-        ("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
-        ("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),
+        (
+            *("model", "simulation.models", "models", "{tries} runs, slowest {ms:.0f} ms"),
+            *("", "", "simulation.model_words"),
+        ),
+        (
+            *("figure", _FIGURES, "figures", "{tries} drawings, slowest {ms:.0f} ms"),
+            *("", "", "experiments.report.figure_words"),
+        ),
         (
             *("robot", "worlds.drives", "robots", f"{{tries}} drives, {_US} a tick"),
             *("agents/robots", "drive"),

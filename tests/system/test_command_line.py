@@ -86,6 +86,17 @@ def test_help_and_lists_of_files_import_nothing_heavy():
     assert modules & HEAVY == set()
 
 
+def test_the_list_of_all_is_made_without_what_simulates_and_analyses():
+    program = (
+        "import sys\nfrom dva_sim.cli.names import everything\neverything()\nprint(*sys.modules)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    rooms = {".".join(name.split(".")[:3]) for name in loaded.stdout.split()}
+    assert "dva_sim.worlds.hazards" in rooms
+    heavy = {"simulation.full", "simulation.models", "experiments.analysis", "protocol.messages"}
+    assert rooms & {f"dva_sim.{name}" for name in heavy} == set()
+
+
 def test_a_study_gives_the_same_bytes_with_any_number_of_processes(ran):
     assert run(ran, jobs="2").returncode == 0
     one, two = bytes_of(ran / "1"), bytes_of(ran / "2")

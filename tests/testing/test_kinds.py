@@ -28,6 +28,8 @@ def test_every_kind_has_plugins_and_a_function_that_tries_it(kind):
     assert trial.known() or plugins.files()
     assert getattr(testing, f"check_{kind}") is trial.load_check()
     assert f"check_{kind}" in dir(testing)
+    assert trial.group == plugins.group
+    assert trial.words().keys() == plugins.shipped.keys() - plugins.hidden
     assert "2 " in trial.ways(testing.Outcome((), (), 2, 0.001))
 
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from dva_sim.agents.population import Trait
 from dva_sim.kernel.config import Config, Key
-from dva_sim.protocol.messages import EventKind
+from dva_sim.protocol.event_kinds import EventKind
 
 RoleName = Literal["look", "drive", "dispatch", "supervise"]
 Share = Annotated[float, Field(ge=0, le=1)]

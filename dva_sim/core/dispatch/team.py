@@ -10,7 +10,7 @@ import numpy as np
 from dva_sim.core.dispatch.greedy import Free, serve, waiting
 from dva_sim.core.dispatch.situation import Advice, Assignment, Floats, Policy, Situation
 from dva_sim.kernel import options
-from dva_sim.protocol.messages import EVENT_KINDS
+from dva_sim.protocol.event_kinds import EVENT_KINDS
 
 _REMEMBERED: Final = 1000  # events
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
+from html import escape
 from typing import Any, Final
-from xml.sax.saxutils import quoteattr
 
 from typing_extensions import override
 
@@ -108,8 +108,8 @@ def _configuration(place: Rendezvous, is_near: bool) -> str:
     here, there = (place.near, place.far)[:: 1 if is_near else -1]
     return (
         "<CycloneDDS><Domain id='any'><General><Interfaces>"
-        f"<NetworkInterface address={quoteattr(here)} multicast='false'/></Interfaces>"
+        f"<NetworkInterface address='{escape(here)}' multicast='false'/></Interfaces>"
         "<AllowMulticast>false</AllowMulticast></General>"
         "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
-        f"<Peers><Peer Address={quoteattr(there)}/></Peers></Discovery></Domain></CycloneDDS>"
+        f"<Peers><Peer Address='{escape(there)}'/></Peers></Discovery></Domain></CycloneDDS>"
     )

@@ -18,7 +18,7 @@ from dva_sim.kernel.config import Config, Fail, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.kernel.yaml_files import Document, KeyPath
-from dva_sim.protocol.messages import EventKind
+from dva_sim.protocol.event_kinds import EventKind
 from dva_sim.simulation.scenario import check_policy, locate_files
 from dva_sim.simulation.timed.distributions import ZERO, Constant, Law
 from dva_sim.worlds.site import load_site

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from dva_sim.kernel.config import Config, first_mistake
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.protocol.messages import EVENT_KINDS
+from dva_sim.protocol.event_kinds import EVENT_KINDS
 from dva_sim.worlds.hazards.building import Floats, SitePoints, building_of
 from dva_sim.worlds.hazards.conditions import QUANTITIES, Conditions
 from dva_sim.worlds.hazards.detectors import LATEST, DetectorAlarm, alarm_in

@@ -32,8 +32,6 @@ _LEAST_SHARE = 0.02  # of the height, below which what is too small to matter is
 
 
 class AnswerFigure(style.ReportFigure):
-    """The difference that answers the question."""
-
     name = "answer"
     title = "The declared contrast"
 

@@ -31,8 +31,6 @@ _QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
 class CommandAge(style.ReportFigure):
-    """How old a command is when it takes effect, as quantile ranges."""
-
     name = "command_age"
     title = "Age of commands when they take effect"
     pages = ("driving",)
@@ -61,8 +59,6 @@ class CommandAge(style.ReportFigure):
 
 
 class CommandRate(style.ReportFigure):
-    """Commands applied per second, beside what arithmetic allows request/reply."""
-
     name = "command_rate"
     title = "Commands applied per second"
     pages = ("driving",)

@@ -40,8 +40,6 @@ _MEASURED = "loop_delay_measured_s"
 
 
 class DelayBudget(style.ReportFigure):
-    """The delay from a picture to its effect, as the sum it is and as it was measured."""
-
     name = "delay_budget"
     title = "Where the delay comes from"
     pages = ("driving",)

@@ -29,8 +29,6 @@ _GOLDEN = 0.6180339887498949
 
 
 class Distributions(style.ReportFigure):
-    """Every run as a dot, with median and middle half."""
-
     name = "distributions"
     title = "Every run"
     pages = ("driving",)

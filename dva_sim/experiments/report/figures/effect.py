@@ -35,8 +35,6 @@ _STEP = 0.12  # between the bars of two lines, in stops
 
 
 class Differences(style.ReportFigure):
-    """Each level minus the baseline, paired, with the band that covers all stops at once."""
-
     name = "differences"
     title = "Difference of each level against another"
     pages = ("driving", "transport")

@@ -33,8 +33,6 @@ _TITLE = 70  # characters that the width holds
 
 
 class EndingsInTime(style.ReportFigure):
-    """Cumulative incidence of each way, stacked; None where all went right."""
-
     name = "endings"
     title = "How it ended, and when"
     pages = ("driving",)

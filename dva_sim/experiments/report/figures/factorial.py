@@ -29,8 +29,6 @@ _ARROW = "→"
 
 
 class FactorialEffects(style.ReportFigure):
-    """Main effects and two-way interactions of a full factorial, with simultaneous intervals."""
-
     name = "factorial_effects"
     title = "Main effects and two-way interactions"
     pages = ("driving",)

@@ -58,8 +58,6 @@ class EffectField:
 
 
 class HeatMap(style.ReportFigure):
-    """The declared contrast over two factors; None where there is no second one worth it."""
-
     name = "heat_map"
     title = "The contrast over two factors"
     pages = ("driving",)

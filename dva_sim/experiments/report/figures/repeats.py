@@ -26,8 +26,6 @@ _GAP = 1.5  # rows between two strategies
 
 
 class RepeatsFigure(style.ReportFigure):
-    """Effect and interval of every repeat, by strategy, sorted; the study's own as a band."""
-
     name = "robustness"
     title = "The contrast under other models of the persons"
     pages = ("driving",)

@@ -96,8 +96,6 @@ def _clouds(view: StudyView, part: RunGrid, panel: Setting) -> list[Cloud]:
 
 
 class Scatter(style.ReportFigure):
-    """A panel for each factor: a dot for each point, the mean over all its runs."""
-
     name = "scatter"
     title = "The outcome against each continuous factor"
     pages = ("driving",)
@@ -178,8 +176,6 @@ def trend(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
 
 # --- Sobol's indices -------------------------------------------------------------------------
 class Sobol(style.ReportFigure):
-    """A panel for each cloud: how much of the variance over the ranges is each factor's."""
-
     name = "sobol"
     title = "Which factors the outcome varies with: Sobol' indices"
     pages = ("driving",)

@@ -57,8 +57,6 @@ def _looks(shifts: Shifts) -> dict[Level, Look]:
 
 # --- the trade -----------------------------------------------------------------------------
 class Trade(ShiftFigure):
-    """Response against exposure, a mark for each policy, a panel for each load."""
-
     name = "trade"
     title = "The trade: how soon somebody is there, against how long people stand in danger"
 
@@ -73,8 +71,6 @@ class Trade(ShiftFigure):
 
 
 class Stages(ShiftFigure):
-    """Response against containment: who looks first contains later."""
-
     name = "stages"
     title = "Looking first or containing first: response against containment"
     columns = ("containment_mean_s",)
@@ -155,8 +151,6 @@ def _frontier(ax: Axes, x: Any, y: Any) -> None:
 
 # --- what becomes of them --------------------------------------------------------------------
 class FatesOfEvents(ShiftFigure):
-    """Cumulative incidence by cause, stacked, for some policies at every load."""
-
     name = "fates"
     title = "What becomes of events, and when"
     tables = ("runs", "events")
@@ -198,8 +192,6 @@ def chosen_policies(shifts: Shifts) -> list[str]:
 
 # --- one line per policy ---------------------------------------------------------------------
 class WayToBest(ShiftFigure):
-    """How far of the way from the floor to the best possible each policy gets."""
-
     name = "way"
     title = "How much of what can be gained in response each policy gains"
 
@@ -230,8 +222,6 @@ class WayToBest(ShiftFigure):
 
 
 class Percentiles(ShiftFigure):
-    """Half, nine tenths and 95 % of all events had somebody on scene by ..."""
-
     name = "percentiles"
     title = "Percentiles of the time to response"
     tables = ("runs", "events")
@@ -270,8 +260,6 @@ class Percentiles(ShiftFigure):
 
 
 class Burden(ShiftFigure):
-    """Who works how much, and how evenly work and service are spread."""
-
     name = "burden"
     title = "How busy people are, and how evenly work and service are spread"
 

@@ -147,8 +147,6 @@ class _Story(style.ReportFigure):
 
 
 class StoryTimes(_Story):
-    """Times of the events that were reached, guards and robots apart; of those who came."""
-
     name = "story_times"
     title = "Response, by who responded"
 
@@ -178,8 +176,6 @@ class StoryTimes(_Story):
 
 
 class StoryOutcomes(_Story):
-    """What became of every event, as shares that add up to one; None if all met one fate."""
-
     name = "story_outcomes"
     title = "What became of the events"
 

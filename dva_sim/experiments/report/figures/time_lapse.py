@@ -127,16 +127,12 @@ class _TimeLapse(ReportFigure):
 
 
 class TypicalRun(_TimeLapse):
-    """The run in the middle."""
-
     name = "time_lapse_typical"
     title = "A typical run"
     which = "typical"
 
 
 class WorstRun(_TimeLapse):
-    """The run that took most."""
-
     name = "time_lapse_worst"
     title = "The worst run"
     which = "worst"

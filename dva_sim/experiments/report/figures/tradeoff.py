@@ -32,8 +32,6 @@ RESPONSES = ("response_mean_s", "confirmation_mean_s", "response_s", "drive_time
 
 
 class TradeOff(style.ReportFigure):
-    """Response over exposure, a line for each level of the compared factor through its stops."""
-
     name = "tradeoff"
     title = "The trade-off: response against exposure"
     pages = ("driving",)

@@ -34,8 +34,6 @@ _TITLE = 76  # characters of titles that stand abreast
 
 
 class Trajectories(ReportFigure):
-    """One person, one trial: the ways taken under each line, at the first and the last stop."""
-
     name = "trajectories"
     title = "Ways taken"
     pages = ("driving",)

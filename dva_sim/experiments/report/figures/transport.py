@@ -74,16 +74,12 @@ class _Measures(style.ReportFigure):
 
 
 class Brought(_Measures):
-    """What a session gets over each transport, and how the drive over it went."""
-
     name = "brought"
     title = "What each transport brings, and how one drives with it"
     shown = FELT + BROUGHT
 
 
 class Taken(_Measures):
-    """What a session takes of the line, and what is left to others."""
-
     name = "taken"
     title = "What each transport takes, and what it leaves to TCP"
     shown = TAKEN

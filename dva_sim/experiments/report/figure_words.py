@@ -1,0 +1,51 @@
+"""The figures of a report in words, by name: what `dva-sim list` says of them.
+
+They stand here since the figures themselves bring all that studies are analysed with.
+"""
+
+from typing import Final
+
+WORDS: Final = {
+    "answer": "The difference that answers the question.",
+    "distributions": "Every run as a dot, with median and middle half.",
+    "differences": (
+        "Each level minus the baseline, paired, with the band that covers all stops at once."
+    ),
+    "heat_map": "The declared contrast over two factors.",
+    "factorial_effects": (
+        "Main effects and two-way interactions of a full factorial, with simultaneous intervals."
+    ),
+    "scatter": "A panel for each factor: a dot for each point, the mean over all its runs.",
+    "sobol": "A panel for each cloud: how much of the variance over the ranges is each factor's.",
+    "robustness": (
+        "Effect and interval of every repeat, by strategy, sorted; the study's own as a band."
+    ),
+    "delay_budget": (
+        "The delay from a picture to its effect, as the sum it is and as it was measured."
+    ),
+    "command_age": "The age of commands when they take effect, as quantile ranges.",
+    "command_rate": "Commands applied per second, beside what arithmetic allows request/reply.",
+    "tradeoff": (
+        "Response over exposure, a line for each level of the compared factor through its stops."
+    ),
+    "endings": (
+        "How runs and events ended, and when: cumulative incidence of each way to end, stacked."
+    ),
+    "trajectories": (
+        "One person, one trial: the ways taken under each line, at the first and the last stop."
+    ),
+    "time_lapse_typical": "Where everybody was at some moments of the run in the middle.",
+    "time_lapse_worst": "Where everybody was at some moments of the run that took most.",
+    "story_times": "Times of the events that were reached, guards and robots apart.",
+    "story_outcomes": "What became of every event, as shares that add up to one.",
+    "trade": "Response against exposure, a mark for each policy, a panel for each load.",
+    "stages": "Response against containment: who looks first contains later.",
+    "fates": "Cumulative incidence by cause, stacked, for some policies at every load.",
+    "way": "How far each policy gets from the floor to the best possible response.",
+    "percentiles": (
+        "The time after which half, nine tenths and 95 % of all events had somebody on scene."
+    ),
+    "burden": "How much each person works, and how evenly work and service are spread.",
+    "brought": "The service a session gets over each transport, and how the drive over it went.",
+    "taken": "The share of the line that a session takes, and the rest that is left to others.",
+}
