@@ -12,6 +12,13 @@ from dva_sim.console.attached.decisions import AttachedDecisions
 from dva_sim.console.attached.pages import AttachedPages
 from dva_sim.console.events.alarm_actions import AlarmActions
 from dva_sim.console.wire.actions import ActionPlace, Asked
+from dva_sim.console.wire.arguments import (
+    FakeAsked,
+    LogsLooked,
+    OfDevice,
+    OfSome,
+    RobotsWatched,
+)
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.protocol import messages as m
 
@@ -40,11 +47,11 @@ class AttachedActions:
         self.take = dispatcher.take
 
     @does("look")
-    def _look(self, _: str, line: Asked) -> None:
+    def _look(self, _: str, line: LogsLooked) -> None:
         self._pages.looked = "devices" in line["tables"]
 
     @does("watch")
-    def _watch(self, _: str, line: Asked) -> None:
+    def _watch(self, _: str, line: RobotsWatched) -> None:
         self._pages.sensors.watch(line["robots"])
 
     def _tell(self, answer: DoneLine) -> None:
@@ -58,7 +65,7 @@ class AttachedActions:
         said(True, "released")
 
     @does("emergency")
-    def _emergency(self, _: str, line: Asked, said: Said) -> None:
+    def _emergency(self, _: str, line: OfSome, said: Said) -> None:
         """Each robot is told by a connection of its own; who does not answer is named."""
         system, wanted = self._system, line.get("robots", "all")
         robots = system.robots()
@@ -82,7 +89,7 @@ class AttachedActions:
             system.device.ask(robot, m.Emergency(), lambda _, ok=ok: ok(), failed)  # type: ignore[misc]
 
     @does("revoke")
-    def _revoke(self, _: str, line: Asked, said: Said) -> None:
+    def _revoke(self, _: str, line: OfDevice, said: Said) -> None:
         robot = line["device"]
         if robot not in self._system.robots():
             raise Refused(f"the DVA has listed no robot {robot}")
@@ -94,7 +101,7 @@ class AttachedActions:
         self._system.agent.ask(m.Revoke(robot), answered, partial(unanswered, said))
 
     @does("fake_add")
-    def _add_fake(self, _: str, line: Asked, said: Said) -> None:
+    def _add_fake(self, _: str, line: FakeAsked, said: Said) -> None:
         if self._system.options.keys is not None:
             raise Refused(
                 "with keys nobody can pretend to be a device: it would need one of its own"
@@ -102,6 +109,6 @@ class AttachedActions:
         self._system.fakes.add(line, said)
 
     @does("fake_remove")
-    def _remove_fake(self, _: str, line: Asked, said: Said) -> None:
+    def _remove_fake(self, _: str, line: OfDevice, said: Said) -> None:
         label = self._system.fakes.remove(line["device"])
         said(True, f"{label} speaks no more: the DVA takes it from its list within some seconds")

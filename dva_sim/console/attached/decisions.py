@@ -16,6 +16,7 @@ from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, 
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.takeover import Takeover
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import MissionAsked, ReportAsked, RoomName, TakeoverAsked
 from dva_sim.protocol import messages as m
 
 
@@ -31,7 +32,7 @@ class AttachedDecisions:
         self._system, self._people = system, people
 
     @does("room_join")
-    def _join(self, client: str, line: Asked, said: Said) -> None:
+    def _join(self, client: str, line: RoomName, said: Said) -> None:
         """All who decide here share the console's own control room, each by an own name."""
         if not self._system.answers:
             raise Refused(NO_ANSWER)
@@ -40,7 +41,7 @@ class AttachedDecisions:
         said(True, f"you are {name}, and may {self._system.role}")
 
     @does("event_raise")
-    def _raise(self, _: str, line: Asked, said: Said) -> None:
+    def _raise(self, _: str, line: ReportAsked, said: Said) -> None:
         place = self._system.place_of(line["x_m"], line["y_m"])
         self._ask(*report_of(line, place), said)
 
@@ -52,7 +53,7 @@ class AttachedDecisions:
     # --- robots ------------------------------------------------------------------------------
 
     @does("mission")
-    def _mission(self, _: str, line: Asked, said: Said) -> None:
+    def _mission(self, _: str, line: MissionAsked, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._system.agent.events.get(line["event"])
         if status is None:
@@ -64,7 +65,7 @@ class AttachedDecisions:
         send_on_mission(self._system.device, robot, label, inspection_of(status), said)
 
     @does("take_over")
-    def _take_over(self, _: str, line: Asked, said: Said) -> None:
+    def _take_over(self, _: str, line: TakeoverAsked, said: Said) -> None:
         """Take a robot from whoever holds it; it goes by itself where it was sent to."""
         robot, agent = self._robot(line["robot"]), self._system.agent
         label = self._system.label_of(robot)

@@ -12,6 +12,7 @@ from dva_sim.console.dva.dva_port import DvaPort
 from dva_sim.console.dva.fake_devices import NOWHERE, FakeDevices
 from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import FakeAsked, OfDevice, PortAsked
 from dva_sim.console.wire.rows import DevicesLine
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA, address_of, id_of
@@ -55,7 +56,7 @@ class DvaPages:
         return {"k": "devices", "t": now_ms, "devices": rows}
 
     @does("server_start")
-    def _start(self, _: str, line: Asked, said: Said) -> None:
+    def _start(self, _: str, line: PortAsked, said: Said) -> None:
         self.port.start(line["port"])
         self._moved(self.port.address)
         said(True, f"the server listens on {self.port.address}")
@@ -66,7 +67,7 @@ class DvaPages:
         said(True, "the server is stopped")
 
     @does("revoke")
-    def _revoke(self, _: str, line: Asked, said: Said) -> None:
+    def _revoke(self, _: str, line: OfDevice, said: Said) -> None:
         robot = line["device"]
         grant = self._run.dva.desk.sessions.permissions.grants.get(robot)
         if grant is None:
@@ -79,11 +80,11 @@ class DvaPages:
         )
 
     @does("fake_add")
-    def _add(self, _: str, line: Asked, said: Said) -> None:
+    def _add(self, _: str, line: FakeAsked, said: Said) -> None:
         self._fakes.add(line, said)
 
     @does("fake_remove")
-    def _remove(self, _: str, line: Asked, said: Said) -> None:
+    def _remove(self, _: str, line: OfDevice, said: Said) -> None:
         said(True, f"{self._fakes.remove(line['device'])} is removed")
 
     # --- fake devices ----------------------------------------------------------------------

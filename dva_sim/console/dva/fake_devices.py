@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.console.asking.refusal import Refused, Said, unanswered
+from dva_sim.console.wire.arguments import FakeAsked
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.errors import ProtocolError
 from dva_sim.protocol.limits import pattern
@@ -47,7 +48,7 @@ class FakeDevices:
         self._make, self._is_known, self._id_of, self._dismiss = make, is_known, id_of, dismiss
         self.devices: dict[str, AgentDevice] = {}
 
-    def add(self, line: dict[str, Any], said: Said) -> None:
+    def add(self, line: FakeAsked, said: Said) -> None:
         """Add one; `said` hears whether the DVA has taken it.
 
         Raises:
@@ -105,7 +106,7 @@ class FakeDevices:
         if device.id_tag not in self.devices:
             self._dismiss(device.id_tag)
 
-    def _identity(self, line: dict[str, Any]) -> tuple[str, str]:
+    def _identity(self, line: FakeAsked) -> tuple[str, str]:
         """Id and address, made where they were not given.
 
         Raises:

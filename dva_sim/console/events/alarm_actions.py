@@ -9,6 +9,7 @@ from dva_sim.console.asking.dispatcher import Doer, does
 from dva_sim.console.asking.refusal import Said
 from dva_sim.console.events.alarm_desk import AlarmDesk
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import OfAlarm, ShelveAsked
 
 
 class AlarmActions:
@@ -41,12 +42,12 @@ class AlarmActions:
             self._acknowledge_event(client, who | about, answers)
 
     @does("alarm_shelve")
-    def _shelve(self, client: str, line: Asked, said: Said) -> None:
+    def _shelve(self, client: str, line: ShelveAsked, said: Said) -> None:
         keys = self._desk.members(line["alarm"])
         self._desk.shelve(keys, line["for_s"], self._author(client))
         said(True, f"shelved for {line['for_s'] / 60:.0f} minutes")
 
     @does("alarm_unshelve")
-    def _unshelve(self, client: str, line: Asked, said: Said) -> None:
+    def _unshelve(self, client: str, line: OfAlarm, said: Said) -> None:
         self._desk.unshelve(self._desk.members(line["alarm"]))
         said(True, "back in the list")

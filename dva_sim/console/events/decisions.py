@@ -7,6 +7,7 @@ from typing import Final
 
 from dva_sim.agents.people.person_guard import SEVERITIES
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import ReportAsked
 from dva_sim.console.wire.events import DecidedShown, DispatchShown, EventDecisions
 from dva_sim.console.wire.scenes import LabelledMoment
 from dva_sim.console.wire.seats import Answered, CandidateShown
@@ -60,7 +61,7 @@ def decision_of(
     return m.SetDispatch(mode, reason), asks
 
 
-def report_of(line: Asked, place: m.Position) -> tuple[m.EventReport, str]:
+def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]:
     """The report of an event that somebody at a page raises, and what is told if it is done."""
     kind, severity = str(line["kind"]), SEVERITIES[line["severity"]]
     report = m.EventReport(None, kind, place, severity, CERTAIN, "detected")

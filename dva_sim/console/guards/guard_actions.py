@@ -7,6 +7,13 @@ from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import (
+    GuardAnswer,
+    GuardAsked,
+    GuardWord,
+    PlaceAsked,
+    ReportAsked,
+)
 from dva_sim.worlds.site import Site
 
 
@@ -28,7 +35,7 @@ class GuardActions:
         return guard
 
     @does("guard_join")
-    def _join(self, client: str, line: Asked, said: Said) -> None:
+    def _join(self, client: str, line: GuardAsked, said: Said) -> None:
         label = line["guard"]
         guard = self._guards.named(label)
         if guard is None:
@@ -48,23 +55,23 @@ class GuardActions:
         said(True, "nobody plays the guard now")
 
     @does("guard_answer")
-    def _answer(self, client: str, line: Asked, said: Said) -> None:
+    def _answer(self, client: str, line: GuardAnswer, said: Said) -> None:
         self._guard(client).answer(line["accept"], line["reason"], said)
 
     @does("guard_say")
-    def _say(self, client: str, line: Asked, said: Said) -> None:
+    def _say(self, client: str, line: GuardWord, said: Said) -> None:
         self._guard(client).say(line["what"], said)
 
     @does("guard_place")
-    def _place(self, client: str, line: Asked, said: Said) -> None:
+    def _place(self, client: str, line: PlaceAsked, said: Said) -> None:
         self._guard(client).stand_at(*self._point(line), said)
 
     @does("guard_report")
-    def _report(self, client: str, line: Asked, said: Said) -> None:
+    def _report(self, client: str, line: ReportAsked, said: Said) -> None:
         point = self._point(line)
         self._guard(client).report(line["kind"], *point, line["severity"], said)
 
-    def _point(self, line: Asked) -> tuple[float, float]:
+    def _point(self, line: PlaceAsked) -> tuple[float, float]:
         """A place on the site [m].
 
         Raises:

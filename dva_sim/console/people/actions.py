@@ -22,7 +22,21 @@ from dva_sim.console.people.tour import tour_of
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.run.sliders import change_pattern
 from dva_sim.console.wire.actions import ActionPlace, Asked
-from dva_sim.console.wire.arguments import FASTEST
+from dva_sim.console.wire.arguments import (
+    FASTEST,
+    LinkChange,
+    LogsLooked,
+    MarkAsked,
+    Nothing,
+    OfRobots,
+    OfSome,
+    PaceChange,
+    PatternChoice,
+    RobotsWatched,
+    SampleBatch,
+    TourTime,
+    Wish,
+)
 from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.console.world.world import ConsoleWorld
@@ -77,7 +91,7 @@ class Actions:
         return self._world.person(seat.number)
 
     @does("take")
-    def _take(self, client: str, line: Asked, said: Said) -> None:
+    def _take(self, client: str, line: OfRobots, said: Said) -> None:
         robots = self._robots(line)
         number = self._seats.sit(client, self._world.seat_of_order(robots))
         if number is None:
@@ -144,7 +158,7 @@ class Actions:
         held = {robot for person in self._world.persons for robot in person.robots}
         self._world.screens.hold(held)
 
-    def _robots(self, line: Asked) -> list[str]:
+    def _robots(self, line: OfRobots | OfSome) -> list[str]:
         """Ids of the robots that a line names by their numbers or labels."""
         given = line.get("robots", "all")
         if given == "all":
@@ -182,7 +196,7 @@ class Actions:
         self._person(client).stop(said)
 
     @does("emergency")
-    def _emergency(self, client: str, line: Asked, said: Said) -> None:
+    def _emergency(self, client: str, line: OfSome, said: Said) -> None:
         seat = self._seats.taken.get(client)
         if "robots" not in line and seat is not None:
             line = {"robots": list(self._world.person(seat.number).robots)}
@@ -195,22 +209,23 @@ class Actions:
                 person.ended_by_others(robots)
         own.emergency(robots, said)
 
-    def _drew(self, client: str, line: Asked) -> None:
+    def _drew(self, client: str, line: SampleBatch | Wish) -> None:
         """Note which picture of each robot a page has drawn last, if it says so."""
         seat = self._seats.taken.get(client)
         if seat is None or "seen" not in line:
             return
-        drawn = dict(line["seen"])
+        drawn = {int(number): int(taken) for number, taken in line["seen"]}
         for robot, held in self._world.person(seat.number).robots.items():
-            held.drew(drawn.get(self._world.feed.numbers.get(robot)))
+            number = self._world.feed.numbers.get(robot)
+            held.drew(None if number is None else drawn.get(number))
 
     @does("samples")
-    def _samples(self, client: str, line: Asked) -> None:
+    def _samples(self, client: str, line: SampleBatch) -> None:
         self._drew(client, line)
         self._phones.samples(client, line)
 
     @does("input")
-    def _input(self, client: str, line: Asked) -> None:
+    def _input(self, client: str, line: Wish) -> None:
         """Steer as a person wants now; a stick that is let go asks for a stop."""
         self._drew(client, line)
         held = line["held"]
@@ -282,11 +297,11 @@ class Actions:
     # --- what can be changed ---------------------------------------------------------------
 
     @does("link")
-    def _link(self, _: str, line: Asked, said: Said) -> None:
+    def _link(self, _: str, line: LinkChange, said: Said) -> None:
         said(True, self._world.change_link(line))
 
     @does("pattern")
-    def _pattern(self, _: str, line: Asked, said: Said) -> None:
+    def _pattern(self, _: str, line: PatternChoice, said: Said) -> None:
         robot, name = self._robot(line.get("robot")), line.get("name")
         world = self._world
         if name not in PATTERNS and name != world.scenario.pattern:
@@ -299,7 +314,7 @@ class Actions:
         change_pattern(world.run, world.persons, robot, str(name), changed)
 
     @does("pace")
-    def _pace(self, _: str, line: Asked, said: Said) -> None:
+    def _pace(self, _: str, line: PaceChange, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if self._world.run.is_real:
             raise Refused("the links are real: time goes by as it does outside")
@@ -313,7 +328,7 @@ class Actions:
         said(True, now)
 
     @does("tour")
-    def _tour(self, _: str, line: Asked, said: Said) -> None:
+    def _tour(self, _: str, line: Nothing, said: Said) -> None:
         plan = tour_of(self._world.run, self._world.feed.numbers)
         if plan is None:
             raise Refused(
@@ -322,7 +337,7 @@ class Actions:
         said(True, "two goals", tour=plan)
 
     @does("tour_time")
-    def _tour_time(self, client: str, line: Asked, said: Said) -> None:
+    def _tour_time(self, client: str, line: TourTime, said: Said) -> None:
         robot, took = self._robot(line["robot"]), line["took_s"]
         log = self._world.recorder.newest_drive.get(robot)
         if log is None or log.operator != self._person(client).device.id_tag:
@@ -331,18 +346,18 @@ class Actions:
         said(True, f"{took:.1f} s noted")
 
     @does("mark")
-    def _mark(self, client: str, line: Asked, said: Said) -> None:
+    def _mark(self, client: str, line: MarkAsked, said: Said) -> None:
         world = self._world
         world.recorder.tell(world.clock.now, world.author(client), f"marks: {line['text']}")
         said(True, "marked")
 
     @does("watch")
-    def _watch(self, _: str, line: Asked) -> None:
+    def _watch(self, _: str, line: RobotsWatched) -> None:
         ids = {t["id"] for t in self._world.feed.things.all if t["i"] in line["robots"]}
         self._world.screens.watch(ids)
 
     @does("look")
-    def _look(self, _: str, line: Asked) -> None:
+    def _look(self, _: str, line: LogsLooked) -> None:
         self._world.logs.look(line["logs"])
         self._world.dva.looked = "devices" in line["tables"]
 

@@ -17,6 +17,7 @@ from dva_sim.console.asking.seats import Seats
 from dva_sim.console.phones.phone_input import samples_of, settings_of
 from dva_sim.console.phones.phone_seat import PhoneSeat
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import CalibrationAsked, PhoneIdentity, PhoneWish, SampleBatch
 from dva_sim.console.wire.seats import DeviceShown
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.protocol import messages as m
@@ -62,7 +63,7 @@ class PhoneActions:
         if phone is not None:
             phone.tilt.let_go()
 
-    def samples(self, client: str, line: Asked) -> None:
+    def samples(self, client: str, line: SampleBatch) -> None:
         """Samples of a phone have come."""
         said, phone = samples_of(line), self._phones.seat(client)
         if phone is None:
@@ -96,7 +97,7 @@ class PhoneActions:
     # --- who it is -------------------------------------------------------------------------
 
     @does("phone_register")
-    def _register(self, client: str, line: Asked, said: Said) -> None:
+    def _register(self, client: str, line: PhoneIdentity, said: Said) -> None:
         label, kind = line["label"], line["type"]
         address = f"{line['server'].strip()}:{line['port']}"
         seat = self._seats.taken.get(client)
@@ -174,7 +175,7 @@ class PhoneActions:
         device.ask(device.dva, m.GetDeviceList(), answered, lambda: said(False, NO_ANSWER))
 
     @does("phone_permission")
-    def _permission(self, client: str, line: Asked, said: Said) -> None:
+    def _permission(self, client: str, line: PhoneWish, said: Said) -> None:
         _, person = self._device(client)
         level, robot = line["level"], self._asked(line["device"])
         held = person.robots.get(robot)
@@ -201,7 +202,7 @@ class PhoneActions:
         return given if given in self._world.run.stage.labels else self._robot(given)
 
     @does("phone_calibrate")
-    def _calibrate(self, client: str, line: Asked, said: Said) -> None:
+    def _calibrate(self, client: str, line: CalibrationAsked, said: Said) -> None:
         phone = self._phone(client)
         settings = settings_of(line)
         kept = self._phones.keep_motion(phone, settings.keep)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Unpack
 
-from dva_sim.console.asking.dispatcher import Doer, does
+from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.asking.seats import Seats
 from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
@@ -14,6 +14,14 @@ from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.rooms import ConsoleRoom
 from dva_sim.console.events.takeover import Takeover
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import (
+    MissionAsked,
+    OfRobots,
+    PlaceAsked,
+    ReportAsked,
+    RoomName,
+    TakeoverAsked,
+)
 from dva_sim.console.wire.seats import Answered
 from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.protocol import messages as m
@@ -34,7 +42,7 @@ class RoomActions:
         world: ConsoleWorld,
         seats: Seats,
         robot: Callable[[Any], str],
-        take: Doer,
+        take: Callable[[str, OfRobots, Said], object],
     ) -> None:
         self._world, self._rooms, self._seats = world, world.rooms, seats
         self._robot, self._take = robot, take
@@ -46,12 +54,16 @@ class RoomActions:
     # --- who asks ---------------------------------------------------------------------------
 
     @does("room_join")
-    def _join(self, client: str, line: Asked, said: Said) -> None:
+    def _join(self, client: str, line: RoomName, said: Said) -> None:
         name = line["name"].strip()
         self._rooms.join(client, str(line.get("role", "look")), name, said)
 
     def _room(
-        self, client: str, line: Asked, said: Said, then: Callable[[ConsoleRoom, Said], object]
+        self,
+        client: str,
+        line: Mapping[str, Any],
+        said: Said,
+        then: Callable[[ConsoleRoom, Said], object],
     ) -> None:
         """The control room of a page; it gets one with its first decision."""
         room = self._rooms.by_client.get(client)
@@ -71,7 +83,7 @@ class RoomActions:
     def _ask(
         self,
         client: str,
-        line: Asked,
+        line: Mapping[str, Any],
         said: Said,
         body: m.Body,
         done: str,
@@ -88,7 +100,7 @@ class RoomActions:
         self._ask(client, line, said, body, done, lambda reply: answer_of(reply, self._is_robot))
 
     @does("event_raise")
-    def _raise(self, client: str, line: Asked, said: Said) -> None:
+    def _raise(self, client: str, line: ReportAsked, said: Said) -> None:
         body, done = report_of(line, self._place(line))
 
         def then(_: m.Reply) -> Answered:
@@ -97,7 +109,7 @@ class RoomActions:
 
         self._ask(client, line, said, body, done, then)
 
-    def _place(self, line: Asked) -> m.Position:
+    def _place(self, line: PlaceAsked) -> m.Position:
         """Where on earth a place of the site lies.
 
         Raises:
@@ -129,7 +141,7 @@ class RoomActions:
     # --- robots -----------------------------------------------------------------------------
 
     @does("mission")
-    def _mission(self, client: str, line: Asked, said: Said) -> None:
+    def _mission(self, client: str, line: MissionAsked, said: Said) -> None:
         """Have a robot go to an event by itself, and look at it."""
         status = self._rooms.listener.events.get(line["event"])
         if status is None:
@@ -143,7 +155,7 @@ class RoomActions:
         self._room(client, line, said, send)
 
     @does("take_over")
-    def _take_over(self, client: str, line: Asked, said: Said) -> None:
+    def _take_over(self, client: str, line: TakeoverAsked, said: Said) -> None:
         """Take a robot from whoever holds it, with what it was sent to, into the own seat."""
         robot, reason = self._robot(line["robot"]), line["reason"]
 
@@ -154,7 +166,7 @@ class RoomActions:
                 return
             seat = self._world.person(number)
             label = self._world.run.stage.labels[robot]
-            take = partial(self._take, client, line | {"robots": [label]})
+            take = partial(self._take, client, OfRobots(robots=[label]))
 
             def ended(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
                 if not ok and not seat.robots:

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 
 from dva_sim.agents.tilt import known_filters, known_mappings
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
+from dva_sim.console.wire.arguments import CalibrationAsked, SampleBatch
 from dva_sim.kernel.errors import ConfigError
 
 PIPELINES: Final = ("default", "dissertation")
@@ -55,14 +56,14 @@ class PhoneSettings:
     keep: bool = False
 
 
-def samples_of(line: dict[str, Any]) -> Samples:
+def samples_of(line: SampleBatch) -> Samples:
     """The samples of a message."""
     times = [when / 1000.0 for when in line["at"]]
     whole = [(x, y, z) for x, y, z in line["xyz"]]
     return Samples(line["n"], times, whole, line["hand"], line["orientation"])
 
 
-def settings_of(line: dict[str, Any]) -> PhoneSettings:
+def settings_of(line: CalibrationAsked) -> PhoneSettings:
     """Read a calibration.
 
     Raises:

@@ -17,7 +17,14 @@ from dva_sim.console.replay.audit import RecordedAudit
 from dva_sim.console.replay.exchanges import ExchangeLog
 from dva_sim.console.replay.recorded_run import RecordedRun
 from dva_sim.console.replay.shelf import Shelf
-from dva_sim.console.wire.actions import ActionPlace, Asked
+from dva_sim.console.wire.actions import ActionPlace
+from dva_sim.console.wire.arguments import (
+    LogsLooked,
+    MomentAsked,
+    PaceChange,
+    RecordingAsked,
+    RobotsWatched,
+)
 from dva_sim.console.wire.lines import Tell
 from dva_sim.console.wire.rows import ClockShown, RowsLine
 from dva_sim.console.wire.seats import DoneLine
@@ -224,7 +231,7 @@ class Player:
         self.tell({**answer, "t": round(1000 * self.now)})
 
     @does("pace")
-    def _pace(self, _: str, line: Asked, said: Said) -> None:
+    def _pace(self, _: str, line: PaceChange, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if paused is False and self.now >= self._duration:
             self._go_to(0.0)
@@ -234,7 +241,7 @@ class Player:
         said(True, now)
 
     @does("seek")
-    def _seek(self, _: str, line: Asked, said: Said) -> None:
+    def _seek(self, _: str, line: MomentAsked, said: Said) -> None:
         self._go_to(line["t_ms"] / 1000)
         self.tell_now()
         said(True, f"at {self.now:.1f} s")
@@ -245,7 +252,7 @@ class Player:
         self._told = dict.fromkeys(self._told, -1)
 
     @does("open_recording")
-    def _open(self, _: str, line: Asked, said: Said) -> None:
+    def _open(self, _: str, line: RecordingAsked, said: Said) -> None:
         if self.shelf is None:
             raise Refused("there are no other recordings")
         path = self.shelf.find(line["name"])
@@ -258,13 +265,13 @@ class Player:
         said(True, f"{path.name} is played")
 
     @does("watch")
-    def _watch(self, _: str, line: Asked) -> None:
+    def _watch(self, _: str, line: RobotsWatched) -> None:
         things = () if self.run is None else self.run.things.all
         watched = (t for t in things if t["i"] in line["robots"])
         self._watched = {t["id"] for t in watched if t["kind"] == "robot"}
 
     @does("look")
-    def _look(self, _: str, line: Asked) -> None:
+    def _look(self, _: str, line: LogsLooked) -> None:
         """Pages look at these logs; those that are new to them are told from the beginning."""
         self._looks_at_devices = "devices" in line["tables"]
         self._tell_devices()

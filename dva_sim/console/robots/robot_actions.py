@@ -16,6 +16,7 @@ from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.robots.robot_windows import RobotWindow, RobotWindows
 from dva_sim.console.wire.actions import Asked
+from dva_sim.console.wire.arguments import FaultSwitch, OfRobot, Wish
 from dva_sim.console.wire.limits import SILENT_AFTER
 from dva_sim.protocol import messages as m
 
@@ -65,7 +66,7 @@ class RobotActions:
     # --- by hand -----------------------------------------------------------------------
 
     @does("manual_take")
-    def _take(self, client: str, line: Asked, said: Said) -> None:
+    def _take(self, client: str, line: OfRobot, said: Said) -> None:
         robot = self._robot(line["robot"])
         window = self._windows.by_id[robot]
         if why := self._why_not():
@@ -108,7 +109,7 @@ class RobotActions:
             window.number = None
 
     @does("manual")
-    def input(self, client: str, line: Asked) -> None:
+    def input(self, client: str, line: Wish) -> None:
         """Steer as a hand wants now, in shares of the limits; letting go asks for a stop."""
         hand = self._hands.get(client)
         if hand is None:
@@ -159,7 +160,7 @@ class RobotActions:
     # --- faults ------------------------------------------------------------------------
 
     @does("fault")
-    def _fault(self, _: str, line: Asked, said: Said) -> None:
+    def _fault(self, _: str, line: FaultSwitch, said: Said) -> None:
         robot, what = self._robot(line["robot"]), line["what"]
         window, on = self._windows.by_id[robot], line["on"]
         if what == "processing":
@@ -174,11 +175,10 @@ class RobotActions:
         elif what == "camera":
             window.faults.lose_camera(on)
         else:
-            self._stick(window, line, on)
+            self._stick(window, line.get("sensor", ""), on)
         said(True, f"{what}: {'on' if on else 'off'}")
 
-    def _stick(self, window: RobotWindow, line: Asked, on: bool) -> None:
-        sensor = line.get("sensor", "")
+    def _stick(self, window: RobotWindow, sensor: str, on: bool) -> None:
         if sensor not in window.robot.sensors:
             there = ", ".join(window.robot.sensors) or "none"
             raise Refused(f"there is no sensor {sensor!r}; sensors: {there}")

@@ -7,6 +7,14 @@ from dva_sim.console.asking.refusal import Said
 from dva_sim.console.robots.robot_actions import RobotActions
 from dva_sim.console.simulator.robot_world import RobotWorld
 from dva_sim.console.wire.actions import ActionPlace, Asked
+from dva_sim.console.wire.arguments import (
+    LogsLooked,
+    Nothing,
+    OfRobot,
+    OfSome,
+    RegistrationAsked,
+    RobotsWatched,
+)
 from dva_sim.console.wire.seats import DoneLine
 from dva_sim.network.addresses import check_address
 
@@ -46,29 +54,29 @@ class RobotDesk:
         self._world.tell_now()
 
     @does("emergency")
-    def _emergency(self, _: str, line: Asked, said: Said) -> None:
+    def _emergency(self, _: str, line: OfSome, said: Said) -> None:
         self._hands.stop(self._world.field.robots)
         self._hands.press_emergency(self._world.robot.device.id_tag)
         said(True, f"{self._world.robot.device.label} has stopped")
 
     @does("robot_register")
-    def _register(self, _: str, line: Asked, said: Said) -> None:
+    def _register(self, _: str, line: RegistrationAsked, said: Said) -> None:
         dva = line["dva"].strip()
         check_address(dva)
         self._world.station.register(dva, said)
 
     @does("robot_listen")
-    def _listen(self, _: str, line: Asked, said: Said) -> None:
+    def _listen(self, _: str, line: OfRobot, said: Said) -> None:
         self._world.station.listen()
         said(True, f"listens on {self._world.robot.device.address}")
 
     @does("robot_off")
-    def _off(self, _: str, line: Asked, said: Said) -> None:
+    def _off(self, _: str, line: OfRobot, said: Said) -> None:
         self._world.station.switch_off()
         said(True, "it is off")
 
     @does("release")
-    def _release(self, _: str, line: Asked, said: Said) -> None:
+    def _release(self, _: str, line: Nothing, said: Said) -> None:
         """Nothing is in hand but by `manual_take`."""
         said(True, "released")
 
@@ -77,10 +85,10 @@ class RobotDesk:
         self._hands.gone(client)
 
     @does("watch")
-    def _watch(self, _: str, line: Asked) -> None:
+    def _watch(self, _: str, line: RobotsWatched) -> None:
         own = {self._world.robot.device.id_tag}
         self._world.screens.watch(own if line["robots"] else set())
 
     @does("look")
-    def _look(self, _: str, line: Asked) -> None:
+    def _look(self, _: str, line: LogsLooked) -> None:
         self._world.logs.look(line["logs"])

@@ -1,25 +1,30 @@
 """One declaration for each action: what is checked, kept, waited for and shown follows from it."""
 
+import inspect
 import re
-from typing import Annotated, Literal, get_args, get_origin
+from importlib import import_module
+from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
 import pytest
 from helpers.console.simulated_console import Page
 from helpers.paths import ROOT
 
-from dva_sim.console.asking.dispatcher import ActionDispatcher
+from dva_sim.console.asking.dispatcher import _KNOWN, ActionDispatcher
 from dva_sim.console.audit.audit_keeper import AuditKeeper
 from dva_sim.console.audit.audited import Audited
 from dva_sim.console.simulator.robot_desk import RobotDesk
 from dva_sim.console.web.outbox import OutgoingLines
 from dva_sim.console.wire import generated
-from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Audit
+from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Asked, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS
 from dva_sim.console.wire.kinds import BadMessage, Kind, hints_of
 from dva_sim.console.wire.limits import LONG, PATIENCE
 from dva_sim.network import realtime
 from dva_sim.recordings.audit_log import read_rows
 
+MODULES = [
+    path for path in (ROOT / "dva_sim/console").rglob("*.py") if "    @does(" in path.read_text()
+]
 LABELS = {"robot-1": 0}
 ASKED = [one for one in ACTIONS.values() if one.has_answer]
 OWN = [one for one in ASKED if one.audit is Audit.OWN and ActionPlace.WORLD in one.at]
@@ -46,6 +51,19 @@ def example(hint):
 def arguments_of(action):
     hints = hints_of(action.arguments)
     return {name: example(hints[name]) for name in action.arguments.__required_keys__}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
+def test_what_does_an_action_has_its_arguments_by_their_declared_type(path):
+    """Those that need more of a request, such as who asks, take it as it is."""
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    kinds = [one for one in vars(import_module(name)).values() if inspect.isclass(one)]
+    methods = [one for kind in kinds for one in vars(kind).values() if hasattr(one, "does")]
+    assert methods
+    for method in methods:
+        given = get_type_hints(method).get("line", Asked)
+        for does in method.does:
+            assert given in (Asked, _KNOWN[does].arguments), (method, does)
 
 
 @pytest.mark.parametrize("action", ACTIONS.values(), ids=lambda one: one.name)
