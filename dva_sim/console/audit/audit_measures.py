@@ -9,14 +9,13 @@ from collections.abc import Iterable, Sequence
 from statistics import median
 from typing import Any
 
+from dva_sim.console.wire.audit_answers import AuditMeasures, Override, TimesTaken
 from dva_sim.recordings.audit_log import AuditRow
 
 MOST_OVERRIDES = 50  # of the last that are told one by one
 
-Line = dict[str, Any]
 
-
-def measured(rows: Iterable[AuditRow]) -> Line:
+def measured(rows: Iterable[AuditRow]) -> AuditMeasures:
     """Times to acknowledge and to assign, and what people did otherwise than the policy.
 
     Times count from the first report of an event to the first time that it was done.
@@ -41,7 +40,7 @@ def is_override(row: AuditRow) -> bool:
     return "advised" in row.details and row.details["advised"] != row.subject
 
 
-def _times(rows: Iterable[AuditRow]) -> Line:
+def _times(rows: Iterable[AuditRow]) -> TimesTaken:
     """How long it took, the first time for each event."""
     first: dict[int, float] = {}
     for row in rows:
@@ -69,7 +68,7 @@ def _lost(overrides: Sequence[AuditRow]) -> float | None:
     return round(median(known), 1) if known else None
 
 
-def _override(row: AuditRow) -> Line:
+def _override(row: AuditRow) -> Override:
     details = row.details
     return {
         "number": row.number,

@@ -18,6 +18,7 @@ from starlette.responses import JSONResponse, Response
 
 from dva_sim.console.audit.audit_measures import measured
 from dva_sim.console.web.rest import NOT_KEPT, problem
+from dva_sim.console.wire.audit_answers import AuditCheck
 from dva_sim.kernel.csv_cells import harmless_row
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.recordings.audit_log import (
@@ -109,7 +110,7 @@ def _verified(path: Path) -> Verified:
 def _checked(path: Path) -> Response:
     found = _verified(path)
     wrong = found.problem
-    body = {
+    body: AuditCheck = {
         "rows": found.rows,
         "hash": found.head,
         "problem": None if wrong is None else {"row": wrong.number, "text": wrong.text},

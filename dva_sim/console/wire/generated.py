@@ -3,12 +3,13 @@
     python -m dva_sim.console.wire.generated
 
 writes `static/js/declared.js` (how long an answer is waited for, and limits), `static/js/lines.js`
-(the types of all lines that pages are told) and prints the table of actions in `docs/console.md`.
+(the types of all that pages are told) and prints the table of actions in `docs/console.md`.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, Final, Literal, NotRequired, get_args, get_origin, get_type_hints
@@ -17,8 +18,10 @@ from typing_extensions import is_typeddict
 
 from dva_sim.console.wire.actions import ACTIONS, Action, ActionPlace, Audit
 from dva_sim.console.wire.arguments import FASTEST, LINK_LIMITS, MOST_PORT
+from dva_sim.console.wire.audit_answers import AuditCheck, AuditMeasures
 from dva_sim.console.wire.kinds import hints_of, words_of
 from dva_sim.console.wire.lines import ToPage
+from dva_sim.recordings.audit_log import AuditRow
 
 STATIC: Final = Path(__file__).parent.parent / "static"
 GRACE: Final = 5.0  # the web process has answered before a page gives up [s]
@@ -50,9 +53,9 @@ def javascript() -> str:
 
 
 def line_types() -> str:
-    """The types of all lines that pages are told, and of their parts."""
+    """The types of all lines that pages are told, of answers on the audit log, and their parts."""
     found: dict[type, str] = {}
-    for one in get_args(ToPage):
+    for one in (*get_args(ToPage), AuditRow, AuditCheck, AuditMeasures):
         _declare(one, found)
     told = " | ".join(map(name_of, get_args(ToPage)))
     union = _typedef("A line sent to a page.", f"({told}) & {{s?: number}}", "ToPage")
@@ -70,9 +73,10 @@ def _declare(declared: type, found: dict[type, str]) -> None:
     if declared in found:
         return
     hints = get_type_hints(declared, include_extras=True)
+    required = getattr(declared, "__required_keys__", hints)  # a dataclass has all
     fields = []
     for name, hint in hints.items():
-        optional = name not in declared.__required_keys__  # type: ignore[attr-defined]
+        optional = name not in required
         inner = get_args(hint)[0] if get_origin(hint) is NotRequired else hint
         fields.append(f"{name}{'?' if optional else ''}: {_in_javascript(inner, found)}")
     about = (declared.__doc__ or "").strip().split("\n")[0]
@@ -102,7 +106,7 @@ def _in_javascript(hint: Any, found: dict[type, str]) -> str:
     inner = get_args(hint)
     if get_origin(hint) is Literal:
         return " | ".join(f"'{one}'" for one in inner)
-    if get_origin(hint) is dict:
+    if get_origin(hint) in (dict, Mapping):
         return f"Record<string, {_in_javascript(inner[1], found)}>"
     if get_origin(hint) is list:
         of = _in_javascript(inner[0], found)

@@ -6,14 +6,18 @@ import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.console.declared_lines import STRICT
 from helpers.console.served_console import Served, serving
+from pydantic import TypeAdapter, ValidationError
 
 from dva_sim.console.audit.audit_measures import measured
 from dva_sim.console.web.audit import csv_of
+from dva_sim.console.wire.audit_answers import AuditCheck, AuditMeasures
 from dva_sim.recordings.audit_log import (
     BEGIN,
     NOTHING_BEFORE,
@@ -67,6 +71,23 @@ def test_rows_come_by_the_thousand_after_a_number(served):
     assert (len(first["rows"]), first["more"]) == (1000, True)
     assert (len(rest["rows"]), rest["more"]) == (200, False)
     assert rest["rows"][0]["before"] == first["rows"][-1]["hash"]
+
+
+def test_answers_are_as_declared(served):
+    assert AuditCheck.__pydantic_config__ is STRICT
+    for path, declared in (("check", AuditCheck), ("measures", AuditMeasures)):
+        TypeAdapter(declared).validate_json(
+            served.ask(f"/api/audit/{path}", token=served.look).body
+        )
+    row = served.ask("/api/audit", token=served.look).json["rows"][0]
+    assert row.keys() == {field.name for field in fields(AuditRow)}
+    overridden = measured(rows(assigned(1, "guard-1", "robot-2")))
+    assert len(overridden["newest_overrides"]) == 1
+    TypeAdapter(AuditMeasures).validate_python(overridden)
+    with pytest.raises(ValidationError, match="did_s"):
+        TypeAdapter(AuditMeasures).validate_python(
+            measured(rows(assigned(1, "guard-1", "robot-2", arrival_s="soon")))
+        )
 
 
 def test_a_number_that_is_none_is_refused(served):

@@ -11,10 +11,19 @@ from typing_extensions import is_typeddict
 from dva_sim.cameras import lines as painted
 from dva_sim.console.web.feed import PageFeed
 from dva_sim.console.web.state import RunState
-from dva_sim.console.wire import events, lines, pages, records, rows, scenes, seats
+from dva_sim.console.wire import (
+    audit_answers,
+    events,
+    lines,
+    pages,
+    records,
+    rows,
+    scenes,
+    seats,
+)
 
 STRICT = {"extra": "forbid", "strict": True, "allow_inf_nan": False}
-for module in (events, pages, records, rows, scenes, seats, painted):
+for module in (audit_answers, events, pages, records, rows, scenes, seats, painted):
     for declared in vars(module).values():
         if is_typeddict(declared):
             declared.__pydantic_config__ = STRICT

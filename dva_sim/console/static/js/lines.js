@@ -350,6 +350,36 @@
  * @typedef {{k: 'pong', at: any, now: number}} Pong
  */
 /**
+ * An entry in its place.
+ * @typedef {{time_s: number, at_utc: string, author: string, device: string, role: string,
+ *   action: string, event: number | null, subject: string, cause: string, outcome: string,
+ *   text: string, details: Record<string, any>, number: number, before: string, hash: string}}
+ *   AuditRow
+ */
+/**
+ * The first row that does not hold, and what is wrong with it.
+ * @typedef {{row: number, text: string}} WrongRow
+ */
+/**
+ * What a look at the whole chain has shown.
+ * @typedef {{rows: number, hash: string, problem: WrongRow | null, doubts: string[]}} AuditCheck
+ */
+/**
+ * How long something took, the first time for each event.
+ * @typedef {{events: number, median_s: number | null, largest_s: number | null}} TimesTaken
+ */
+/**
+ * Somebody else was sent than the policy would have sent.
+ * @typedef {{number: number, event: number | null, author: string, did: string, did_s: number |
+ *   null, advised: string | null, advised_s: number | null, cause: string}} Override
+ */
+/**
+ * Times to acknowledge and to assign, and what people did otherwise than the policy.
+ * @typedef {{acknowledge: TimesTaken, assign: TimesTaken, assigned_by_people: number,
+ *   assigned_by_policy: number, overrides: number, lost_s: number | null,
+ *   newest_overrides: Override[]}} AuditMeasures
+ */
+/**
  * A line sent to a page.
  * @typedef {(Snap | Moved | Rows | RobotWindow | Devices | Hazards | Events | Control | Alarms |
  *   Audit | Story | Told | Seat | OtherSeat | Guard | Log | Shelf | Pictures | Done | Bye | You |

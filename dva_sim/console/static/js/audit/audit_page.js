@@ -4,9 +4,9 @@ import { audit } from '../store.js';
 import { Field } from '../ui/fields.js';
 import { clockText, plain, secondsText } from '../ui/words.js';
 
-/** @typedef {import('../types.js').AuditRow} AuditRow */
-/** @typedef {import('../types.js').AuditCheck} AuditCheck */
-/** @typedef {import('../types.js').AuditMeasures} AuditMeasures */
+/** @typedef {import('../lines.js').AuditRow} AuditRow */
+/** @typedef {import('../lines.js').AuditCheck} AuditCheck */
+/** @typedef {import('../lines.js').AuditMeasures} AuditMeasures */
 
 const SHOWN = 1000;
 const CHECK_MS = 10000;
@@ -127,7 +127,7 @@ function Measures({ measures }) {
 /** @param {number | null} seconds */
 const expected = (seconds) => (seconds === null || seconds === undefined ? 'time unknown' : secondsText(seconds));
 
-/** @param {{events: number, median_s: number | null, largest_s: number | null}} found */
+/** @param {import('../lines.js').TimesTaken} found */
 function times({ events, median_s: median, largest_s: largest }) {
   if (!events || median === null || largest === null) return '–';
   return `${secondsText(median)} median, ${secondsText(largest)} largest, ${events} ${events === 1 ? 'event' : 'events'}`;
