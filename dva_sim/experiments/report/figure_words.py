@@ -28,24 +28,22 @@ WORDS: Final = {
     "tradeoff": (
         "Response over exposure, a line for each level of the compared factor through its stops."
     ),
-    "endings": (
-        "How runs and events ended, and when: cumulative incidence of each way to end, stacked."
-    ),
+    "endings": "Ends of runs and events over time: cumulative incidence of each kind, stacked.",
     "trajectories": (
         "One person, one trial: the ways taken under each line, at the first and the last stop."
     ),
-    "time_lapse_typical": "Where everybody was at some moments of the run in the middle.",
-    "time_lapse_worst": "Where everybody was at some moments of the run that took most.",
+    "time_lapse_typical": "Places of all robots and people at moments of the run in the middle.",
+    "time_lapse_worst": "Places of all robots and people at moments of the run that took most.",
     "story_times": "Times of the events that were reached, guards and robots apart.",
-    "story_outcomes": "What became of every event, as shares that add up to one.",
+    "story_outcomes": "The fate of every event, as shares that add up to one.",
     "trade": "Response against exposure, a mark for each policy, a panel for each load.",
     "stages": "Response against containment: who looks first contains later.",
     "fates": "Cumulative incidence by cause, stacked, for some policies at every load.",
-    "way": "How far each policy gets from the floor to the best possible response.",
+    "way": "The share of what can be gained in response that each policy gains.",
     "percentiles": (
         "The time after which half, nine tenths and 95 % of all events had somebody on scene."
     ),
-    "burden": "How much each person works, and how evenly work and service are spread.",
+    "burden": "The workload of each person, and how evenly work and service are spread.",
     "brought": "The service a session gets over each transport, and how the drive over it went.",
     "taken": "The share of the line that a session takes, and the rest that is left to others.",
 }
