@@ -6,13 +6,15 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from dva_sim.agents.people.person_guard import SEVERITIES
+from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.wire.actions import Asked
-from dva_sim.console.wire.arguments import ReportAsked
+from dva_sim.console.wire.arguments import PlaceAsked, ReportAsked
 from dva_sim.console.wire.events import DecidedShown, DispatchShown, EventDecisions
 from dva_sim.console.wire.scenes import LabelledMoment
 from dva_sim.console.wire.seats import Answered, CandidateShown
 from dva_sim.core.candidates import FREE
 from dva_sim.protocol import messages as m
+from dva_sim.worlds.site import Site
 
 CERTAIN: Final = 0.9  # of what somebody in a control room reports
 DECISIONS: Final = (
@@ -59,6 +61,19 @@ def decision_of(
     mode = str(line["mode"])
     asks = "the policy asks first" if mode == "ask_first" else "the policy decides by itself"
     return m.SetDispatch(mode, reason), asks
+
+
+def place_of(line: PlaceAsked, site: Site) -> tuple[float, float]:
+    """A place on the site [m].
+
+    Raises:
+        Refused: it lies beyond it.
+    """
+    x, y = line["x_m"], line["y_m"]
+    left, low, right, high = site.extent
+    if not (left <= x <= right and low <= y <= high):
+        raise Refused("x_m and y_m should be a place on the site")
+    return x, y
 
 
 def report_of(line: ReportAsked, place: m.Position) -> tuple[m.EventReport, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
+from dva_sim.console.events.decisions import place_of
 from dva_sim.console.guards.played_guards import PlayedGuards
 from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
@@ -64,21 +65,9 @@ class GuardActions:
 
     @does("guard_place")
     def _place(self, client: str, line: PlaceAsked, said: Said) -> None:
-        self._guard(client).stand_at(*self._point(line), said)
+        self._guard(client).stand_at(*place_of(line, self._site), said)
 
     @does("guard_report")
     def _report(self, client: str, line: ReportAsked, said: Said) -> None:
-        point = self._point(line)
+        point = place_of(line, self._site)
         self._guard(client).report(line["kind"], *point, line["severity"], said)
-
-    def _point(self, line: PlaceAsked) -> tuple[float, float]:
-        """A place on the site [m].
-
-        Raises:
-            Refused: it is none.
-        """
-        x, y = line["x_m"], line["y_m"]
-        left, low, right, high = self._site.extent
-        if not (left <= x <= right and low <= y <= high):
-            raise Refused("x_m and y_m should be a place on the site")
-        return x, y

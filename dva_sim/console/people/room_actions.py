@@ -9,7 +9,7 @@ from typing import Any, Unpack
 from dva_sim.console.asking.dispatcher import does
 from dva_sim.console.asking.refusal import Refused, Said
 from dva_sim.console.asking.seats import Seats
-from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, report_of
+from dva_sim.console.events.decisions import DECISIONS, answer_of, decision_of, place_of, report_of
 from dva_sim.console.events.missions import inspection_of, send_on_mission
 from dva_sim.console.events.rooms import ConsoleRoom
 from dva_sim.console.events.takeover import Takeover
@@ -17,7 +17,6 @@ from dva_sim.console.wire.actions import Asked
 from dva_sim.console.wire.arguments import (
     MissionAsked,
     OfRobots,
-    PlaceAsked,
     ReportAsked,
     RoomName,
     TakeoverAsked,
@@ -101,26 +100,15 @@ class RoomActions:
 
     @does("event_raise")
     def _raise(self, client: str, line: ReportAsked, said: Said) -> None:
-        body, done = report_of(line, self._place(line))
+        site = self._world.run.stage.site
+        place = m.Position(*site.frame.to_latlon(*place_of(line, site)))
+        body, done = report_of(line, place)
 
         def then(_: m.Reply) -> Answered:
             event = self._world.run.dva.desk.book.near(body.kind, body.position)
             return {} if event is None else {"event": event.number}
 
         self._ask(client, line, said, body, done, then)
-
-    def _place(self, line: PlaceAsked) -> m.Position:
-        """Where on earth a place of the site lies.
-
-        Raises:
-            Refused: it is none.
-        """
-        site = self._world.run.stage.site
-        x, y = line["x_m"], line["y_m"]
-        left, low, right, high = site.extent
-        if not (left <= x <= right and low <= y <= high):
-            raise Refused("x_m and y_m should be a place on the site")
-        return m.Position(*site.frame.to_latlon(x, y))
 
     def _device(self, label: str) -> str:
         """The id of a device by its label.

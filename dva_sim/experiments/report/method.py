@@ -139,10 +139,9 @@ def _alike(reading: Reading) -> str:
 
 def _reduction(reading: Reading) -> VarianceReduction | None:
     """Of the contrast at its last stop."""
-    view = reading.view
-    if view is None or view.contrast is None:
+    view, sides = reading.view, reading.last_sides
+    if view is None or sides is None:
         return None
-    grid = view.part.grid(view.measure)
-    first, second = (view.curve(grid, view.panels[0], level)[-1] for level in view.contrast)
+    first, second = sides
     person = np.broadcast_to(view.part.persons[:, np.newaxis], first.shape)
     return variance_reduction(first.ravel(), second.ravel(), person.ravel())

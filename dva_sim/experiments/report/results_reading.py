@@ -15,6 +15,7 @@ from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, wi
 from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
 from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
 from dva_sim.experiments.analysis.run_grid import (
+    Floats,
     Table,
 )
 from dva_sim.experiments.analysis.study_view import (
@@ -180,13 +181,20 @@ class ResultsReading:
         return typical_and_worst(self.results.folder, part, self.view.measure, tables)
 
     @cached_property
-    def pair_correlation(self) -> float | None:
-        """How alike the two sides of the contrast are, run by run, at the last stop."""
+    def last_sides(self) -> list[Floats] | None:
+        """Both sides of the contrast at the last stop, `(persons, trials)` each."""
         view = self.view
         if view is None or view.contrast is None:
             return None
         grid = view.part.grid(view.measure)
-        first, second = (view.curve(grid, view.panels[0], level)[-1] for level in view.contrast)
+        return [view.curve(grid, view.panels[0], level)[-1] for level in view.contrast]
+
+    @cached_property
+    def pair_correlation(self) -> float | None:
+        """How alike the two sides of the contrast are, run by run, at the last stop."""
+        if self.last_sides is None:
+            return None
+        first, second = self.last_sides
         both = np.isfinite(first) & np.isfinite(second)
         if both.sum() < _FEWEST_PAIRS:
             return None
