@@ -24,7 +24,8 @@ class TcpConnection:
     - cumulative, selective and duplicate acknowledgement (RFC 9293, 2018, 2883), time
       stamps (RFC 7323);
     - delayed acknowledgement: 40 ms, at once for the first segments, after trouble, for
-      the second segment, and when the program has read all and nothing goes back (RFC 1122);
+      the second segment, and when the program has read all, nothing goes back, and the last
+      segment is small or ends what was written (RFC 1122, PSH);
     - time-out with variance, floor and doubling (RFC 6298), tail-loss probe and loss by
       time (RFC 8985), rate reduction (RFC 6937), recoveries taken back (RFC 3522);
     - congestion window: ten segments at first (RFC 6928), slow start and Reno (RFC 5681),

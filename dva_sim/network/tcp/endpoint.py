@@ -137,6 +137,7 @@ class TcpEndpoint:
         duplicate: bool,
         stamp: float,
         echo: float,
+        pushes: bool,
     ) -> None:
         """A segment arrives; its arguments are what `Sender` and `Receiver` name so."""
         if self._deaf:
@@ -150,7 +151,7 @@ class TcpEndpoint:
         now, receiver, sender = self._clock.now, self._receiver, self.sender
         if stamp > receiver.stamp and start <= receiver.acknowledged:
             receiver.stamp = stamp
-        fresh = end > start and receiver.take(start, end, now)
+        fresh = end > start and receiver.take(start, end, now, pushes)
         if start < 0:
             receiver.urgent = True
         sender.acknowledge(now, acknowledged, edge, blocks, duplicate=duplicate, echo=echo)
@@ -177,7 +178,7 @@ class TcpEndpoint:
             self._ended = True
             self.on_end()
 
-    def _emit(self, start: int, end: int, now: float) -> None:
+    def _emit(self, start: int, end: int, now: float, pushes: bool = False) -> None:
         """Send a segment; `end` equal to `start` means an acknowledgement only."""
         receiver = self._receiver
         duplicate = receiver.duplicate
@@ -186,8 +187,8 @@ class TcpEndpoint:
         if arrival is None:
             return
         blocks = tuple(receiver.blocks[:BLOCKS])
-        known = receiver.next, receiver.edge, blocks, duplicate
-        self._clock.call_at(arrival, self._other.arrive, start, end, *known, now, receiver.stamp)
+        known = receiver.next, receiver.edge, blocks, duplicate, now, receiver.stamp, pushes
+        self._clock.call_at(arrival, self._other.arrive, start, end, *known)
 
     def acknowledge(self) -> None:
         """Send an acknowledgement without data."""

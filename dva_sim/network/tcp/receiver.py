@@ -5,7 +5,8 @@ References:
     RFC 7323, section 4.3 (which time stamp is echoed), RFC 1122, section 4.2.3.2 (delayed
     acknowledgement); Sarolahti, Kuznetsov: Congestion Control in Linux TCP. USENIX Annual
     Technical Conference, FREENIX Track, 2002 (quick and adaptive acknowledgements);
-    ip-sysctl (tcp_pingpong_thresh = 1).
+    ip-sysctl (tcp_pingpong_thresh = 1). Measured on Linux 6.18: a full segment without PSH is
+    not acknowledged when it is read.
 """
 
 from __future__ import annotations
@@ -70,9 +71,10 @@ class Receiver:
         self._quick, self._last_data = 0, -inf
         self._patience = options.delayed_ack
         self._largest = 536  # segment seen [B]; RFC 9293's default to start with
+        self._pushed = 0  # segments that are small or have PSH, not acknowledged
         self._timer = Timer(clock, self._waited, options.tick)
 
-    def take(self, start: int, end: int, now: float) -> bool:
+    def take(self, start: int, end: int, now: float, pushes: bool) -> bool:
         """Bytes `start` to `end` arrive at `now` [s]; returns whether some are in order."""
         if end <= self.next:
             self.duplicate = True
@@ -83,7 +85,8 @@ class Receiver:
             if start < self.edge:
                 self._keep(start, end)
             return False
-        self._note_rhythm(end - start, now)
+        self._note_rhythm(now)
+        self._note_size(end - start, pushes)
         self.duplicate = self.duplicate or start < self.next
         self.next = end
         self.pending += 1
@@ -99,8 +102,8 @@ class Receiver:
         if self._automatic:
             self._window = min(self._window + taken, LARGEST_WINDOW)
         drained = self.pending and self.read_to == self.next
-        due = drained and (self.pending > 1 or not self.dialogue)
-        if due or self._reopened():
+        pushed = self._pushed > (1 if self.dialogue else 0)
+        if (drained and (pushed or self._has_full_one())) or self._reopened():
             self._acknowledge()
         return taken
 
@@ -111,7 +114,7 @@ class Receiver:
         if not self.pending:
             return False
         quick = self._quick > 0 and not self.dialogue
-        return quick or self.next - self.acknowledged > self._largest or not self._patience
+        return quick or self._has_full_one() or not self._patience
 
     def wait(self, now: float) -> None:
         """Let the acknowledgement wait for something to ride on."""
@@ -128,6 +131,7 @@ class Receiver:
         if self.pending and self._quick:
             self._quick -= 1
         self.pending, self.urgent, self.duplicate = 0, False, False
+        self._pushed = 0
         self.acknowledged = self.next
         self.edge = max(self.edge, self.read_to + self._window)
         self._timer.stop()
@@ -151,11 +155,26 @@ class Receiver:
         least = min(self._options.mss, self._window // 2)
         return after >= 2 * before and after - before >= least
 
-    def _note_rhythm(self, size: int, now: float) -> None:
+    def _has_full_one(self) -> bool:
+        """Whether more than a full segment is not acknowledged."""
+        return self.next - self.acknowledged > self._largest
+
+    def _note_size(self, size: int, pushes: bool) -> None:
+        """How large segments are, and whether one ends what its program has written.
+
+        A full segment without PSH is the first part of more, so its acknowledgement waits for the
+        next one even if the program reads at once.
+        """
+        if size < self._largest:
+            self._pushed += 1
+        else:
+            self._largest = min(size, self._options.mss)
+            self._pushed = max(self._pushed, int(pushes))
+
+    def _note_rhythm(self, now: float) -> None:
         """How soon the next data may be expected."""
         gap, base = now - self._last_data, self._options.delayed_ack
         self._last_data = now
-        self._largest = max(self._largest, min(size, self._options.mss))
         if gap > self._times.timeout:
             self._quick = QUICK
         elif gap <= base / 2:

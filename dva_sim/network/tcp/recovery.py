@@ -14,7 +14,7 @@ from math import inf
 
 from dva_sim.network.tcp.congestion import RateReduction, Reno
 from dva_sim.network.tcp.parameters import TcpOptions
-from dva_sim.network.tcp.retransmission_timer import RoundTrip
+from dva_sim.network.tcp.retransmission_timer import SOONEST_S, RoundTrip
 from dva_sim.network.tcp.send_queue import Scoreboard, SentSegment
 
 DUPLICATES = 3
@@ -167,6 +167,7 @@ class Recovery:
         "_limited",
         "_probe_repeats",
         "_reduction",
+        "_timed_out",
         "_undo",
         "_until",
         "_window",
@@ -181,7 +182,7 @@ class Recovery:
         self._window, self._board = window, board
         self._limited, self._undo = options.congestion_window, options.undo
         self.losses = ByTime(times) if options.rack else ByCount(times)
-        self.state, self._until = OPEN, 0
+        self.state, self._until, self._timed_out = OPEN, 0, -1
         self._before = window.window, window.threshold
         self._first_repeat: float = inf
         self._reduction = RateReduction(0.0, 0)
@@ -190,6 +191,15 @@ class Recovery:
     def repeated(self, now: float) -> None:
         """A segment held to be lost is sent again at `now` [s]."""
         self._first_repeat = min(self._first_repeat, now)
+
+    def doubted(self) -> None:
+        """An acknowledgement selects something, or tells of a duplicate.
+
+        Outside of a recovery Linux forgets by it when the last one had sent something again; so
+        what a needless time-out has sent twice does not hide that the next is needless, too.
+        """
+        if self.state == OPEN:
+            self._first_repeat = inf
 
     def sent(self) -> None:
         """A segment leaves, new or again."""
@@ -242,7 +252,7 @@ class Recovery:
         if board.lost and self.state == OPEN:
             self._begin(RECOVERY, next_byte)
             self._reduction = RateReduction(self._window.reduce(now), len(board.queue))
-        return now + wait if wait else 0.0
+        return now + wait + SOONEST_S if wait else 0.0
 
     def hold(self, delivered: int, whole: bool) -> bool:
         """Keep the congestion window down while recovering; returns whether it does.
@@ -258,10 +268,15 @@ class Recovery:
         return self.state == RECOVERY
 
     def time_out(self, now: float, first: int, next_byte: int) -> None:
-        """RFC 5681, equation 4, once per window; RFC 8985, section 6.3."""
-        if self.state == OPEN or first >= self._until:
+        """RFC 5681, equation 4: not for a segment that the timer has sent again already.
+
+        Nor within a recovery, whose threshold is that of the same window. RFC 8985, section 6.3.
+        """
+        is_another = self.state == LOSS and first > self._timed_out
+        if self.state == OPEN or is_another or first >= self._until:
             self._begin(LOSS, next_byte)
             self._window.reduce(now)
+        self._timed_out = first
         self.state, self._until = LOSS, next_byte
         self.losses.on_timeout(self._board, now)
         if self._limited:

@@ -169,6 +169,8 @@ def next_on_grid(now: float, wait: float, tick: float) -> float:
     return (due // step + 1) * step * tick
 
 
+SOONEST_S = 0.002
+"""What Linux adds to the waits for a probe and for a segment in doubt (TCP_TIMEOUT_MIN)."""
 TIMEOUT, PROBE, REORDER, WINDOW = "timeout", "probe", "reorder", "window"
 
 
@@ -266,5 +268,5 @@ class Alarm:
         """RFC 8985, section 7.2: a single segment may meet a delayed acknowledgement."""
         if not self._times.smoothed:
             return self._options.first_rto
-        patience = self._options.min_rto if segments == 1 else 0.0
+        patience = self._options.min_rto if segments == 1 else SOONEST_S
         return 2 * self._times.smoothed + patience

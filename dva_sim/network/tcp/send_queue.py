@@ -37,6 +37,7 @@ class SendBuffer:
         limit: How much may be charged before no further packet is begun [B].
         used: How much is charged [B].
         blocked: Whether somebody waits for room, because a write was not taken whole, say.
+        is_cut: Whether the last segment left more behind in its packet: so it has no PSH.
     """
 
     __slots__ = (
@@ -46,6 +47,7 @@ class SendBuffer:
         "_packet",
         "_waiting",
         "blocked",
+        "is_cut",
         "limit",
         "used",
     )
@@ -59,7 +61,7 @@ class SendBuffer:
             self.limit = max(2 * size, SMALLEST)
         self.used = 0
         self._waiting: deque[int] = deque()  # payload of each packet that waits [B]
-        self.blocked = False
+        self.blocked = self.is_cut = False
 
     def offered(self, window: int) -> None:
         """The other end has room for `window` bytes [B]: packets may wait that are half as long."""
@@ -94,7 +96,8 @@ class SendBuffer:
         while waiting and left >= waiting[0]:
             left -= waiting.popleft()
             packets += 1
-        if left and waiting:  # cut off
+        self.is_cut = bool(left and waiting)
+        if self.is_cut:
             waiting[0] -= left
             self.used += PACKET_COST
             packets += 1
@@ -131,16 +134,30 @@ class SentSegment:
         end: The byte after its last.
         sent_at: When it was sent last [s].
         charge: What the send buffer is charged for it [B].
+        pushes: Whether it has PSH: it ends what was written by then.
         repeated: It has been sent more than once.
         sacked: It has been acknowledged selectively.
         lost: It is held to be lost.
         resent: It has been sent again since then, and that is under way.
     """
 
-    __slots__ = ("charge", "end", "lost", "repeated", "resent", "sacked", "sent_at", "start")
+    __slots__ = (
+        "charge",
+        "end",
+        "lost",
+        "pushes",
+        "repeated",
+        "resent",
+        "sacked",
+        "sent_at",
+        "start",
+    )
 
-    def __init__(self, start: int, end: int, sent_at: float, charge: int) -> None:
+    def __init__(
+        self, start: int, end: int, sent_at: float, charge: int, pushes: bool = True
+    ) -> None:
         self.start, self.end, self.sent_at, self.charge = start, end, sent_at, charge
+        self.pushes = pushes
         self.repeated = self.sacked = self.lost = self.resent = False
 
 
@@ -218,10 +235,13 @@ class Scoreboard:
             sent.lost = False
         self.lost = 0
 
-    def repeat(self, sent: SentSegment, now: float) -> None:
-        """A segment is sent again at `now` [s]."""
+    def repeat(self, sent: SentSegment, now: float, probes: bool = False) -> None:
+        """A segment is sent again at `now` [s].
+
+        One that probes for a tail loss is not counted in flight once more, as in Linux.
+        """
         sent.repeated, sent.sent_at = True, now
-        if not sent.resent:
+        if not (sent.resent or probes):
             sent.resent = True
             self.resent += 1
 
@@ -235,6 +255,7 @@ class Scoreboard:
             self.lost -= other.lost
             self.resent -= other.resent
             sent.end = other.end
+            sent.pushes = sent.pushes or other.pushes
             sent.charge += other.charge - PACKET_COST
             free += PACKET_COST
             del self.queue[index + 1]

@@ -18,7 +18,7 @@ from dva_sim.network.tcp.recovery import OPEN, Recovery
 from dva_sim.network.tcp.retransmission_timer import PROBE, REORDER, WINDOW, Alarm, RoundTrip
 from dva_sim.network.tcp.send_queue import Gain, Scoreboard, SendBuffer, SentSegment
 
-Emit = Callable[[int, int, float], object]
+Emit = Callable[[int, int, float, bool], object]
 Blocks = tuple[tuple[int, int], ...]
 
 
@@ -28,8 +28,8 @@ class Sender:
     Args:
         clock: The run's clock.
         options: Of this end.
-        emit: Sends one segment: first byte, byte after the last, now [s]. A first byte
-            of -1 asks for an acknowledgement.
+        emit: Sends one segment: first byte, byte after the last, now [s], whether it has PSH.
+            A first byte of -1 asks for an acknowledgement.
         give_up: Called when the other end has not answered for too long.
 
     Attributes:
@@ -151,6 +151,8 @@ class Sender:
             self._measure(gain, now, echo, advanced)
         if duplicate:
             recovery.losses.needless(acknowledged, self.next)
+        if duplicate or blocks:
+            recovery.doubted()
         if recovery.probe_end >= 0:
             recovery.judge_probe(now, acknowledged, advanced or bool(blocks), duplicate)
         if advanced:
@@ -244,8 +246,9 @@ class Sender:
         if end - start < self._options.mss:
             self._small_end = end
         charge = self.buffer.depart(end - start)
-        self.board.queue.append(SentSegment(start, end, now, charge))
-        self._leave(start, end, now)
+        sent = SentSegment(start, end, now, charge, not self.buffer.is_cut)
+        self.board.queue.append(sent)
+        self._leave(sent, now)
 
     def _repeat_lost(self, now: float) -> None:
         queue, index = self.board.queue, 0
@@ -256,22 +259,22 @@ class Sender:
                 room -= 1
             index += 1
 
-    def _repeat(self, index: int, now: float) -> None:
+    def _repeat(self, index: int, now: float, probes: bool = False) -> None:
         sent = self.board.queue[index]
         if self._options.collapse:
             self.buffer.release(self.board.merge(index, self._options.mss))
-        self.board.repeat(sent, now)
+        self.board.repeat(sent, now, probes)
         if self.recovery.state != OPEN:
             self.recovery.repeated(now)
         self.retransmitted += 1
         if index == 0:
             self._alarm.delay_timeout(now)
-        self._leave(sent.start, sent.end, now)
+        self._leave(sent, now)
 
-    def _leave(self, start: int, end: int, now: float) -> None:
+    def _leave(self, sent: SentSegment, now: float) -> None:
         self.recovery.sent()
         self._last_sent = now
-        self._emit(start, end, now)
+        self._emit(sent.start, sent.end, now, sent.pushes)
 
     # Timers
 
@@ -318,7 +321,7 @@ class Sender:
         if fresh:
             self._send(end, now)
         else:
-            self._repeat(len(self.board.queue) - 1, now)
+            self._repeat(len(self.board.queue) - 1, now, probes=True)
         self.recovery.probed(self.next, not fresh)
         self._alarm.restart(now)
 
@@ -334,5 +337,5 @@ class Sender:
         if self.edge > self.next:
             self._send(min(self.edge, self.total), now)
         else:
-            self._emit(-1, -1, now)
+            self._emit(-1, -1, now, False)
         self._watch(now, False, bool(self.board.queue))
