@@ -243,11 +243,12 @@ def _network(
         return ExitCode.RUNS_FAILED if failures else ExitCode.OK
     if not live:
         made = {n: _joined(source.made_with) for n, source in plan.sources.items()}
-        return judge_runs(reference.load_runs(plan.sources), made, out, setting)
+        return judge_runs(reference.load_runs(plan.sources), made, out, setting, plan.causes)
     with TemporaryDirectory() as folder:
         path = (out or Path(folder)) / "measured.csv"
         runs = _measured_now(plan.own.blocks, path, setting.quick)
-        return judge_runs(runs, {"measured on": measuring.made_with(path)}, out, setting)
+        made = {"measured on": measuring.made_with(path)}
+        return judge_runs(runs, made, out, setting, plan.causes)
 
 
 def judge_runs(
@@ -255,15 +256,17 @@ def judge_runs(
     conditions: dict[str, str],
     out: Path | None,
     setting: comparison.NetworkSetting,
+    causes: Mapping[str, str],
 ) -> ExitCode:
     """Compare the model with measurements, print it, write it if asked to; how it ended."""
-    return conclude(partial(_compared, grouped(runs), conditions, setting), out)
+    return conclude(partial(_compared, grouped(runs), conditions, setting, causes), out)
 
 
 def _compared(
     groups: Sequence[ConditionGroup],
     conditions: dict[str, str],
     setting: comparison.NetworkSetting,
+    causes: Mapping[str, str],
 ) -> ValidationResult:
     with _bar() as bar:
         task = bar.add_task("runs of the model", total=comparison.runs_in(groups, setting))
@@ -274,7 +277,7 @@ def _compared(
         "seed": str(setting.seed),
         "length": _length(setting.quick),
     }
-    return network_page.evidence(found, conditions)
+    return network_page.evidence(found, conditions, causes)
 
 
 def _beside(asked: str, quick: bool, workers: int) -> ValidationResult:

@@ -163,10 +163,12 @@ class PlanConfig(Config):
     Attributes:
         reference: The measurements that are shipped.
         own: Those of our own campaign.
+        causes: Why conditions miss, by their labels, as far as that has been found out.
     """
 
     reference: SourceConfig
     own: OwnConfig
+    causes: dict[str, str] = Field(default_factory=dict)
 
     @property
     def sources(self) -> dict[str, SourceConfig]:

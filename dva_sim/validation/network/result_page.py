@@ -163,12 +163,15 @@ READING = (
 WORST = 12  # of the largest z that are named
 
 
-def evidence(comparison: NetworkComparison, conditions: Mapping[str, str]) -> ValidationResult:
+def evidence(
+    comparison: NetworkComparison, conditions: Mapping[str, str], causes: Mapping[str, str]
+) -> ValidationResult:
     """What all conditions come to.
 
     Args:
         comparison: What was found.
         conditions: How it was found, by name.
+        causes: Known causes of misses, by the label of a condition.
     """
     criteria = _sheet("Criteria", SUMMARY_HEADS, summary(comparison))
     without = _sheet("What is left out", ABLATION_HEADS, ablation(comparison))
@@ -178,7 +181,17 @@ def evidence(comparison: NetworkComparison, conditions: Mapping[str, str]) -> Va
         for number, (kind, rows) in enumerate((k, rows) for k, rows in by_kind.items() if rows)
     ]
     unjudged = _sheet("Not judged", ("why", "conditions"), left_out(comparison))
+    reasons = ResultSheet(
+        "Why conditions miss",
+        ("condition", "misses", "cause"),
+        reasons_of(comparison, causes),
+        words=frozenset({0, 1, 2}),
+        wraps=True,
+        widths=(44, 22, None),
+    )
     largest = _sheet("Largest deviations of pooled conditions", WORST_HEADS, worst(comparison))
+    shown = criteria, reasons, without, *tables, unjudged, largest
+    told = *tables, unjudged, largest, reasons, criteria, without
     kept = {NAME: rows_of(comparison)}
     if comparison.controls or comparison.ablated:
         kept["variants"] = variant_rows(comparison)
@@ -188,8 +201,8 @@ def evidence(comparison: NetworkComparison, conditions: Mapping[str, str]) -> Va
         passes=comparison.passes,
         notes=notes(comparison),
         conditions=conditions,
-        sheets=[sheet for sheet in (criteria, without, *tables, unjudged, largest) if sheet.rows],
-        told=[sheet for sheet in (*tables, unjudged, largest, criteria, without) if sheet.rows],
+        sheets=[sheet for sheet in shown if sheet.rows],
+        told=[sheet for sheet in told if sheet.rows],
         draw=partial(draw_all, comparison),
         tables=kept,
     )
@@ -308,6 +321,21 @@ def _some(labels: Sequence[str]) -> str:
 
 def _passes(passes: bool) -> str:
     return "passes" if passes else "fails"
+
+
+def reasons_of(
+    comparison: NetworkComparison, causes: Mapping[str, str]
+) -> list[tuple[str, str, str]]:
+    """Each condition that misses where all have to hold: in which measures, and why."""
+    singles = {id(verdict.cell) for verdict in comparison.of_kind("single")}
+    misses: dict[str, list[str]] = {}
+    for cell in comparison.cells:
+        if id(cell) in comparison.outside - singles:
+            misses.setdefault(cell.group.condition.label, []).append(cell.measure.name)
+    return [
+        (label, ", ".join(measures), causes.get(label, "not known"))
+        for label, measures in misses.items()
+    ]
 
 
 def worst(comparison: NetworkComparison) -> list[list[str]]:

@@ -81,7 +81,7 @@ def test_the_command_writes_tables_and_figures(runs, tmp_path, capsys, monkeypat
     few = [run for run in runs if run.condition.label == LABELS[0]]
     first, second = tmp_path / "a", tmp_path / ("b" if again else "a")
     for folder in dict.fromkeys([first, second]):
-        assert validation.judge_runs(few, {}, folder, QUICK) == 0
+        assert validation.judge_runs(few, {}, folder, QUICK, {}) == 0
     assert "conditions are judged" in capsys.readouterr().out
     files = [path.relative_to(first) for path in first.rglob("*") if path.is_file()]
     assert {str(f) for f in files} >= {"index.html", "network.csv", "figures/scatter.png"}
