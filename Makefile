@@ -54,7 +54,8 @@ test-browser: $(DEV)  ## the console's pages in the system's Chromium
 test-middleware: $(MIDDLEWARE)  ## every transport over its real middleware, mosquitto among it
 	@$(BIN)/python -c 'import shutil, sys; sys.exit(shutil.which("mosquitto") is None)' \
 	  || echo "MQTT is left out: the program mosquitto is missing; try: apt-get install mosquitto"
-	@$(PYTEST) -m "system or not system" tests/testing/test_transports.py tests/network/middleware tests/simulation/middleware
+	@$(PYTEST) -m "system or not system" tests/testing/test_transports.py tests/network/middleware tests/simulation/middleware \
+	  tests/network/test_mqtt.py tests/live/test_over_mqtt.py tests/live/test_taking_over.py tests/contracts
 
 test-long: $(DEV)  ## long searches and whole studies, the same cases each time
 	@echo "Running the long tests ..."

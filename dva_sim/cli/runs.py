@@ -44,6 +44,14 @@ _LINK = (
     "Emulate a link to the robots: its keys, or a file of them; may be given again. "
     "scenario: that of the scenario."
 )
+_TRANSPORT: Any = (
+    text(
+        "What carries messages, and options of MQTT: broker=near|far, qos=0|1.",
+        metavar="zeromq|mqtt|KEY=VALUE",
+        of=list[str] | None,
+    ),
+    None,
+)
 _CLOSED = "--keys FOLDER closes it"
 
 
@@ -127,12 +135,14 @@ def _show_replay(**asked: Any) -> None:
     state=(file("File that lets a killed DVA go on where it was."), None),
     duration=(seconds(_FOR, "--for"), None),
     link=(text(_LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
+    transport=_TRANSPORT,
     **RUN,
 )
 def live(
     only: str | None,
     number: int,
     link: list[str] | None,
+    transport: list[str] | None,
     set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -140,13 +150,14 @@ def live(
 ) -> None:
     """Run a scenario in real time, over sockets.
 
-    The DVA, the world and each operator are processes that talk by ZeroMQ.
+    The DVA, the world and each operator are processes that talk by ZeroMQ, or by MQTT.
 
     Examples:
         dva-sim live drive-to-event  # a simulated person drives
         dva-sim live drive-to-event --operators scripted  # fixed commands, an emergency
         dva-sim live drive-to-event --record run.mcap  # for `dva-sim replay` and `check`
         dva-sim live drive-to-event --link delay_s=0.2 --link loss=0.02  # over a bad link
+        dva-sim live drive-to-event --transport mqtt  # by a broker: mosquitto, on this machine
         dva-sim live drive-to-event --only dva --dva 192.168.1.10:5600  # one part here
     """
     from dva_sim.cli import exposure, live_screen  # late: start-up
@@ -154,7 +165,9 @@ def live(
     from dva_sim.network.addresses import problem_of  # late: start-up
 
     changes = (*(set_ or ()), *changes_by_link(link or ()))
-    options = LiveOptions(changes=changes, emulated=bool(link), **asked)
+    options = LiveOptions(
+        changes=changes, emulated=bool(link), transport=tuple(transport or ()), **asked
+    )
     dva, has_keys = options.dva, options.keys is not None
     at = dva if dva is not None and not problem_of(dva) and only in (None, "dva") else None
     listens = [] if at is None else [at.rpartition(":")[0]]
@@ -179,6 +192,7 @@ def live(
         "modelled",
     ),
     dva_port=(count("With real links: port of the DVA; 0: any.", **_PORT), 0),
+    transport=_TRANSPORT,
     dva=(text("Show what runs at this DVA; SCENARIO gives the plan.", metavar=_ADDRESS), None),
     keys=(folder("With --dva: keys, one of a control room, from `dva-sim keys`."), None),
     phones=(flag("--phones", "An address for phones, by https, with a QR code."), False),
@@ -208,6 +222,7 @@ def console(
     no_token: bool,
     results: Path | None,
     out: Path | None,
+    transport: list[str] | None,
     set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -226,7 +241,7 @@ def console(
         dva-sim console --phones  # prints an address to be scanned by a phone
         dva-sim console --results results/mine  # recordings of a study, the worst first
     """
-    host, changes = asked["host"], tuple(set_ or ())
+    host, changes, carried_by = asked["host"], tuple(set_ or ()), tuple(transport or ())
     page = {"host": host, "port": asked["port"], "open": not no_open, "token": not no_token}
     if results is not None:
         with loudness(quiet, verbose):
@@ -243,9 +258,8 @@ def console(
         own = {"--links": asked["links"] != "modelled", "--phones": asked["phones"]}
         own |= {"--record": asked["record"], "-o": out}
         refuse_with_dva([name for name, given in own.items() if given])
-        where = AttachOptions(
-            dva=dva, keys=keys, scenario=scenario, changes=changes, audit=asked["audit"], **page
-        )
+        about = {"scenario": scenario, "changes": changes, "audit": asked["audit"]}
+        where = AttachOptions(dva=dva, keys=keys, transport=carried_by, **about, **page)
         where.check()
         exposure.warn_of_pages([host], has_token=where.token)
         exposure.warn_of_devices([where.listen], has_keys=keys is not None, close_by=_CLOSED)
@@ -254,7 +268,11 @@ def console(
     if keys is not None:
         raise ConfigError("--keys is for --dva: devices of a console encrypt nothing")
     options = ConsoleOptions(
-        scenario=scenario or DEFAULT, changes=changes, results=out, **asked | page
+        scenario=scenario or DEFAULT,
+        changes=changes,
+        results=out,
+        transport=carried_by,
+        **asked | page,
     )
     pages = [host, *([options.phones_host] if options.phones else [])]
     exposure.warn_of_pages(pages, has_token=options.token)

@@ -14,6 +14,7 @@ from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
+from dva_sim.network.carriers import carrier_of
 from dva_sim.recordings.writing import check_both
 from dva_sim.simulation.scenario import Scenario, build, load
 
@@ -31,6 +32,7 @@ class ConsoleOptions(PageOptions):
         changes: Of the scenario, `KEY=VALUE`.
         links: `modelled` as in a study, or `real`: sockets, which others may join.
         dva_port: Port of the DVA on real links; 0: any that is free.
+        transport: What carries messages on real links, as on the command line.
         record: Recording to be made, if any.
         audit: File of the audit log; None: one that is gone with the console.
         results: Folder for the tables of what people did, if any.
@@ -43,6 +45,7 @@ class ConsoleOptions(PageOptions):
     changes: tuple[str, ...] = ()
     links: str = "modelled"
     dva_port: int = 0
+    transport: tuple[str, ...] = ()
     record: Path | None = None
     audit: Path | None = None
     results: Path | None = None
@@ -78,7 +81,8 @@ class ConsoleOptions(PageOptions):
         if self.links == "modelled":
             return None
         host = own_address(self.host) if self.host in ("0.0.0.0", "::") else self.host
-        return partial(ConsoleSockets, host=host, port=self.dva_port)
+        carrier = carrier_of(self.transport)
+        return partial(ConsoleSockets, host=host, port=self.dva_port, carrier=carrier)
 
     def read(self) -> Scenario:
         """The scenario.
@@ -88,6 +92,10 @@ class ConsoleOptions(PageOptions):
         """
         if self.links not in LINKS:
             raise ConfigError(f"--links {self.links!r} should be {either(LINKS)}")
+        if self.links == "real":
+            carrier_of(self.transport).check([self.host], has_keys=False)
+        elif self.transport:
+            raise ConfigError("--transport is for --links real, or --dva")
         document, changes = load(self.scenario), parse_changes(self.changes)
         model = document.data.get("model", "full")
         if model != "full":

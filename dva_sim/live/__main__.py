@@ -16,7 +16,8 @@ def main(argument: str) -> int:
     """Run the part that the supervisor asks for; its exit code."""
     told = json.loads(argument)
     options = told["options"]
-    options["changes"] = tuple(options["changes"])
+    for key in ("changes", "transport"):
+        options[key] = tuple(options[key])
     for key in PATHS:
         options[key] = None if options[key] is None else Path(options[key])
     reports = PipeEnd(sys.stdout.fileno())  # a supervisor that does not read must not stop robots

@@ -14,8 +14,10 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.live.open_files import check_room_for
 from dva_sim.network.addresses import check_address
+from dva_sim.network.carriers import Carrier, carrier_of
 from dva_sim.network.emulator.forwarder import links_of
 from dva_sim.network.link.files import read_link
+from dva_sim.network.sockets import split_address
 from dva_sim.recordings.writing import SUFFIX, check_both, try_to_write
 from dva_sim.simulation.full import rehearse
 from dva_sim.simulation.scenario import Scenario, build, load
@@ -48,6 +50,7 @@ class LiveOptions:
         overwrite: What was recorded before may be replaced.
         camera_port: Port of the robots' pictures; None: the usual one, and with keys none.
         emulated: The scenario's link is emulated between the robots and everybody else.
+        transport: What carries the messages, as on the command line; see `carrier_of`.
     """
 
     scenario: str
@@ -64,6 +67,16 @@ class LiveOptions:
     overwrite: bool = False
     camera_port: int | None = None
     emulated: bool = False
+    transport: tuple[str, ...] = ()
+
+    @property
+    def carrier(self) -> Carrier:
+        """What carries the messages.
+
+        Raises:
+            ConfigError: it is not given as it should be.
+        """
+        return carrier_of(self.transport)
 
     @property
     def shows_pictures(self) -> bool:
@@ -89,6 +102,8 @@ class LiveOptions:
             raise ConfigError(f"--for {self.duration:g} should be a number of seconds above 0")
         if self.dva is not None:
             check_address(self.dva, "--dva ")
+        places = self.host if self.dva is None else split_address(self.dva)[0], self.host
+        self.carrier.check([] if self.emulated else places, self.keys is not None)
         scenario = self._built()
         if scenario.operator.strategy == "oracle":
             raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")

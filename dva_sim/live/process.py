@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from dva_sim.agents.observation import OVER_ZMQ, Cameras, topic_in
@@ -20,9 +20,12 @@ from dva_sim.kernel.errors import DvaSimError, RunsFailed
 from dva_sim.live.options import CAMERA_PORT, LiveOptions
 from dva_sim.live.parts import DvaPart, LivePart, WorldPart, make_part
 from dva_sim.live.recording import LiveRecorder, RunKeeping
+from dva_sim.network.carriers import free_port
 from dva_sim.network.keys import KeyRing
+from dva_sim.network.mqtt import open_broker
+from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
-from dva_sim.network.sockets import SocketNetwork, split_address
+from dva_sim.network.sockets import split_address
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.stage import DVA, Stage, id_of, team_of
 from dva_sim.simulation.full.verdicts import Verdict
@@ -135,12 +138,19 @@ def _run_part(
     def tell(line: str) -> None:
         recorder.tell(clock.now, name, line, "link")
 
-    network = SocketNetwork(clock, ring, tell, scenario.zeromq)
-    team = frozenset(team_of(scenario))
-    recorder.is_own = team.__contains__ if supervised else network.is_here
-    network.watcher = recorder.message
+    carrier, broker = options.carrier, options.dva or ""
     with ExitStack() as at_end:
+        if carrier.is_mqtt:
+            broker = broker or f"{options.host}:{options.port or free_port(options.host)}"
+            options = replace(options, dva=broker)
+            if name == carrier.ends[0]:
+                at_end.callback(open_broker(*split_address(broker)).close)
+        tells_loss = not supervised or name == carrier.ends[1]  # one line is enough
+        network = carrier.open(clock, ring, tell, scenario.zeromq, broker, tells_loss)
         at_end.callback(network.close)
+        team = frozenset(team_of(scenario))
+        recorder.is_own = team.__contains__ if supervised else network.is_here
+        network.watcher = recorder.message
         joining = _joining(network, options, name)
         service = None
         if name == "world" and options.shows_pictures:
@@ -198,7 +208,7 @@ def _time_of_day(clock: LiveClock) -> tuple[float, bool]:
     return whole + started % 1.0, True
 
 
-def _joining(network: SocketNetwork, options: LiveOptions, name: str) -> Callable[[str, int], str]:
+def _joining(network: RealNetwork, options: LiveOptions, name: str) -> Callable[[str, int], str]:
     """Gives each new device of this process two ports, and its address."""
     given = options.port
 
@@ -218,7 +228,7 @@ class _Reporter:
     """Collects the reports of a part; each line of the story is told once."""
 
     def __init__(
-        self, name: str, number: int, stage: Stage, part: LivePart, network: SocketNetwork
+        self, name: str, number: int, stage: Stage, part: LivePart, network: RealNetwork
     ) -> None:
         self._name, self._number, self._stage = name, number, stage
         self._part, self._network = part, network

@@ -18,6 +18,7 @@ from dva_sim.kernel.errors import ERROR, DvaSimError, ExitCode, RunsFailed
 from dva_sim.live.options import PATHS, LiveOptions
 from dva_sim.live.process import Report
 from dva_sim.live.recording import RunKeeping
+from dva_sim.network.carriers import DEFAULT_PORT, free_port
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
@@ -112,10 +113,13 @@ class Supervisor:
             if self._options.emulated:
                 self._link = LinkProcess(scenario.link, self._options.seed)
                 self._link.begin()
-            self._start("dva", "dva", self._options.dva, port=self._options.port)
+            first, dva = self._options.port, self._options.dva
+            if self._options.carrier.is_mqtt:
+                first, dva = 0, dva or self._address_of_broker()
+            self._start("dva", "dva", dva, port=first)
             address = self._address_of_dva()
             if address is not None:
-                ports = _ports(self._options.port, scenario)
+                ports = _ports(first, scenario)
                 self._start("world", "world", address, port=next(ports))
                 for number in range(1, scenario.operator.count + 1):
                     self._start(f"operator-{number}", "operator", address, number, next(ports))
@@ -157,6 +161,13 @@ class Supervisor:
             told[key] = None if told[key] is None else str(told[key])
         about = {"part": part, "number": number, "epoch": self._epoch, "outlet": outlet}
         return json.dumps(about | {"options": told})
+
+    def _address_of_broker(self) -> str:
+        """Return where the broker of MQTT, and so every device, will be found."""
+        host, port = self._options.host, self._options.port
+        if self._link is not None:
+            return f"{ADDRESSES[self._options.carrier.mqtt.broker]}:{port or DEFAULT_PORT}"
+        return f"{host}:{port or free_port(host)}"
 
     def _address_of_dva(self) -> str | None:
         """Where the DVA listens, once it does; None if the user ends the run before that."""

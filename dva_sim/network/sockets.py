@@ -7,18 +7,26 @@ an XPUB for what it publishes, on the next one; peers use REQ, DEALER, SUB (`pro
 from __future__ import annotations
 
 import ctypes
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
 import zmq
+from typing_extensions import override
 
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
-from dva_sim.network.messaging import OnReply, RequestTap, Service, make_request
+from dva_sim.network.messaging import OnReply
+from dva_sim.network.real_network import (
+    DRAIN,
+    LARGEST,
+    LARGEST_PICTURE,
+    NetworkError,
+    RealNetwork,
+)
 from dva_sim.network.realtime import LiveClock, Poller
 from dva_sim.network.security import Refusal, Security, Socket
 from dva_sim.network.socket_io import (
@@ -31,8 +39,6 @@ from dva_sim.network.socket_io import (
     recv,
     send,
 )
-
-DRAIN: Final = 64  # messages read from one socket before others have their turn
 
 
 def options_of(zeromq: ZeromqConfig) -> dict[int, int]:
@@ -165,18 +171,13 @@ class SocketSubscription:
             if frames is None:
                 return
             if len(frames) == 2:
-                self._network.note(self._node, frames[1], sent=False)
-                if (tap := self._network.taps.get(self._node)) is not None:
-                    tap.heard(self._peer, frames[1])
-                self._handler(frames[1])
+                self._network.hand_over(self._node, self._peer, frames[1], self._handler)
             else:
                 self._network.counters["publications of another form"] += 1
 
 
 DEFAULT_PORT: Final = 5600  # of requests; what is published is on the next one
-LARGEST: Final = 65_536  # ZeroMQ drops who sends longer messages [B]
-LARGEST_TOPIC: Final = 512  # the same of a subscriber [B]
-LARGEST_PICTURE: Final = 2_000_000  # the same of a publisher [B]
+LARGEST_TOPIC: Final = 512  # ZeroMQ drops a subscriber who sends longer messages [B]
 LINGER: Final = 200  # for last words when a node leaves [ms]
 LOOK_ASIDE: Final = 0.05  # between looks at handshakes [s]
 CLOSED_AT_ONCE: Final = 10  # sockets, at each such look
@@ -199,18 +200,14 @@ def give_back_memory() -> None:
         ctypes.CDLL(None).malloc_trim(0)
 
 
-class NetworkError(DvaSimError):
-    """A port that cannot be opened."""
-
-
 def split_address(address: str) -> tuple[str, int]:
     """Host and port of an address by the schema, such as `192.168.1.48:5600`, or without port."""
     host, _, port = address.partition(":")
     return host, int(port) if port else DEFAULT_PORT
 
 
-class SocketNetwork:
-    """The nodes of this process on the network; see `Transport`.
+class SocketNetwork(RealNetwork):
+    """The nodes of this process, each with sockets of its own.
 
     Args:
         clock: Waits for the sockets.
@@ -218,11 +215,6 @@ class SocketNetwork:
         tell: Takes one line about each connection that could not be made.
         zeromq: Set on every socket; `conflate` cannot be, since messages here have several
             parts, of which ZeroMQ would keep the last alone.
-
-    Attributes:
-        counters: What was refused or could not be sent, by reason.
-        watcher: Told of each message: a node here, the content, whether that node sends it.
-        taps: See `Transport`.
     """
 
     def __init__(
@@ -232,7 +224,7 @@ class SocketNetwork:
         tell: Callable[[str], object] = lambda _: None,
         zeromq: ZeromqConfig | None = None,
     ) -> None:
-        self.clock, self._tell = clock, tell
+        super().__init__(clock, tell)
         self._options = options_of(zeromq or ZeromqConfig())
         self._context: zmq.Context[Socket] = zmq.Context()
         # Each connection needs three; the system's own limit of open files comes first.
@@ -244,11 +236,6 @@ class SocketNetwork:
         clock.every(GIVE_BACK, self._give_back)
         if ring is not None:
             clock.every(READ_KEYS, partial(self._read_keys, ring))
-        self.counters: Counter[str] = Counter()
-        self.watcher: Callable[[str, Any, bool], object] | None = None
-        self.taps: dict[str, RequestTap] = {}
-        self._addresses: dict[str, str] = {}
-        self._services: dict[str, Service] = {}
         self._routers: dict[str, Socket] = {}
         self._publishers: dict[str, PublisherSocket] = {}
         self._clients: dict[str, dict[Socket, str]] = {}  # by peer: whose
@@ -257,26 +244,22 @@ class SocketNetwork:
 
     # --- who is where ------------------------------------------------------------------
 
+    @override
     def introduce(self, node: str, address: str) -> None:
-        """See `Transport`; connections to a node that has moved follow it."""
         before = self.endpoint(node, published=False)
-        self._addresses[node] = address
+        super().introduce(node, address)
         if self.endpoint(node, published=False) != before:
             for socket in self._clients.get(node, ()):
                 self._reach(socket, node)
 
+    @override
     def forget(self, node: str) -> None:
-        """See `Transport`; whoever still has a connection to it closes that first."""
-        self._addresses.pop(node, None)
+        super().forget(node)
         self._security.forget(node)
 
+    @override
     def is_here(self, node: str) -> bool:
-        """Whether a node is one of this process."""
         return node in self._routers
-
-    def address(self, node: str) -> str | None:
-        """Where a node is found, if anybody said."""
-        return self._addresses.get(node)
 
     def endpoint(self, node: str, published: bool) -> str | None:
         """Where a node takes requests, or publishes; None if it was never introduced."""
@@ -286,20 +269,8 @@ class SocketNetwork:
         host, port = split_address(address)
         return f"tcp://{host}:{port + published}"
 
+    @override
     def join(self, node: str, host: str = "127.0.0.1", port: int = 0) -> str:
-        """Open the two sockets of a node.
-
-        Args:
-            node: The node.
-            host: Address of this machine to listen on.
-            port: Of requests; 0 for any two free ports in a row.
-
-        Returns:
-            Its address, as for a registration.
-
-        Raises:
-            NetworkError: the ports are taken, or the host is not this machine.
-        """
         router, publisher = self._listener(zmq.ROUTER, node), self._listener(zmq.XPUB, node)
         for _ in range(PORT_TRIES):
             try:
@@ -326,8 +297,8 @@ class SocketNetwork:
         self.introduce(node, f"{host}:{chosen}")
         return self._addresses[node]
 
+    @override
     def leave(self, node: str) -> None:
-        """Close the sockets of a node; a request that is still answered goes nowhere."""
         self._discard(self._routers.pop(node), self._publishers.pop(node).socket)
 
     def _look_aside(self) -> bool:
@@ -347,8 +318,8 @@ class SocketNetwork:
             give_back_memory()
         return not self._context.closed
 
+    @override
     def close(self) -> None:
-        """Close everything; what was sent last has a moment to leave."""
         for node in list(self._routers):
             self.leave(node)
         for peer, sockets in list(self._clients.items()):
@@ -363,12 +334,8 @@ class SocketNetwork:
 
     # --- requests ----------------------------------------------------------------------
 
-    def serve(self, node: str, service: Service) -> None:
-        """See `Transport`; the node must have joined."""
-        self._services[node] = service
-
+    @override
     def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> SocketWire:
-        """See `Transport`: by a REQ socket, or by a DEALER."""
         return (DealerWire if pipelined else ReqWire)(self, node, peer, on_reply)
 
     def _requests(self, node: str, router: Socket) -> None:
@@ -388,31 +355,19 @@ class SocketNetwork:
         self, node: str, router: Socket, peer: bytes, parts: list[bytes], sender: str | None
     ) -> None:
         """One request: its route back, an empty frame, and one frame with the message."""
-        service = self._services.get(node)
-        if service is None or b"" not in parts:
+        if node not in self._services or b"" not in parts:
             self.counters["requests of another form"] += 1
             return
         start = parts.index(b"") + 1
         route = [peer, *parts[:start]]
         # Anything but one frame is no message; its empty text is refused as such, and answered.
         data = parts[start] if len(parts) == start + 1 else b""
-        self.note(node, data, sent=False)
-
-        def answer(reply: bytes) -> None:
-            self.note(node, reply)
-            self.send(router, [*route, reply])
-
         # The peer is what the socket itself calls the connection: nobody can take another's.
-        request, tap = make_request(data, answer, sender, peer), self.taps.get(node)
-        if tap is None:
-            service(request)
-        else:
-            tap.serve(service, request)
-
-    def note(self, node: str, payload: Any, sent: bool = True) -> None:
-        """Somebody may want to know what is said here."""
-        if self.watcher is not None:
-            self.watcher(node, payload, sent)
+        self._serve_request(
+            *(node, data, lambda reply: self.send(router, [*route, reply])),
+            sender=sender,
+            peer=peer,
+        )
 
     def send(self, socket: Socket, frames: list[bytes], look: bool = True) -> None:
         """Send without waiting, or drop and count it; `look` unless the file tells all to read."""
@@ -428,23 +383,23 @@ class SocketNetwork:
 
     # --- publications ------------------------------------------------------------------
 
+    @override
     def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
-        """See `Transport`; what is not bytes packs itself into bytes."""
         publisher = self._publishers.get(node)
         if publisher is not None:
             self.note(node, payload)
             data = payload if isinstance(payload, bytes) else payload.pack(size)
             self.send(publisher.socket, [topic.encode(), data])
 
+    @override
     def ready(self, node: str, topic: str, size: int) -> bool:
-        """See `Transport`: what waits in the kernel cannot be seen from here."""
-        publisher = self._publishers.get(node)
+        publisher = self._publishers.get(node)  # what waits in the kernel cannot be seen from here
         return publisher is not None and publisher.wanted(topic)
 
+    @override
     def subscribe(
         self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
     ) -> SocketSubscription:
-        """See `Transport`."""
         return SocketSubscription(self, node, publisher, topic, handler)
 
     # --- sockets -----------------------------------------------------------------------
@@ -484,11 +439,6 @@ class SocketNetwork:
     def _has_key(self, peer: str) -> bool:
         """Whether a peer can be told from an impostor, or need not be."""
         return self._ring is None or peer in self._ring.devices
-
-    def _tell_once(self, problem: str) -> None:
-        self.counters[problem] += 1
-        if self.counters[problem] == 1:
-            self._tell(problem)
 
     def _reach(self, socket: Socket, peer: str) -> None:
         """Connect to where a peer is now, and to nowhere else, if there is a way to it."""

@@ -8,6 +8,7 @@ from helpers.network.transports import (
     LOSSY,
     NODES,
     VIRTUAL,
+    MqttWorld,
     SocketWorld,
     VirtualWorld,
     World,
@@ -20,6 +21,9 @@ SOCKETS = [
 ]
 
 
+REAL = [*SOCKETS, pytest.param("mqtt", marks=pytest.mark.system)]
+
+
 @pytest.fixture(scope="session")
 def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     folder = tmp_path_factory.mktemp("keys")
@@ -27,7 +31,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     return KeyRing(folder)
 
 
-@pytest.fixture(params=[*VIRTUAL, LOSSY, *SOCKETS])
+@pytest.fixture(params=[*VIRTUAL, LOSSY, *REAL])
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made = _world(request)
     yield made
@@ -44,6 +48,8 @@ def sockets(request: pytest.FixtureRequest) -> Iterator[SocketWorld]:
 def _world(request: pytest.FixtureRequest) -> World:
     if request.param == LOSSY:
         return VirtualWorld(VIRTUAL["virtual segments"](), loss=0.05)
+    if request.param == "mqtt":
+        return MqttWorld()
     make = VIRTUAL.get(request.param)
     return VirtualWorld(make()) if make else SocketWorld(_ring(request))
 

@@ -21,7 +21,7 @@ from helpers.network.transports import (
 )
 from helpers.processes.patience import PATIENCE_S
 
-from dva_sim.network.sockets import LARGEST
+from dva_sim.network.real_network import LARGEST
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 

@@ -21,10 +21,10 @@ pytestmark = pytest.mark.contract
 
 WORLDS = [("virtual messages", 1), ("virtual messages", 4), ("virtual segments", 4)]
 WORLDS += [("virtual datagrams", 1), (LOSSY, 4)]
-SOCKETS = [("sockets", 1), ("sockets with keys", 4)]
+REAL = [("sockets", 1), ("sockets with keys", 4), ("mqtt", 1), ("mqtt", 4)]
 WINDOWS = pytest.mark.parametrize(
     ("world", "window"),
-    [*WORLDS, *(pytest.param(*each, marks=pytest.mark.system) for each in SOCKETS)],
+    [*WORLDS, *(pytest.param(*each, marks=pytest.mark.system) for each in REAL)],
     indirect=["world"],
 )
 

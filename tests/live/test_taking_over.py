@@ -2,18 +2,22 @@
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from helpers.network.scripted_session import OPERATOR, PATIENT, ROBOT, _quick_network
 from helpers.network.scripted_session import Scene as AnyScene
+from helpers.network.transports import MqttWorld
 
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
 from dva_sim.core.events import State
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.network.messaging import Transport
+from dva_sim.network.mqtt import MqttNetwork
+from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import SocketNetwork
 from dva_sim.protocol import messages as m
@@ -26,10 +30,14 @@ SUPERVISOR, OTHER = id_of("operator", 2), id_of("operator", 3)
 SHOWS_SMOKE = {"robot.sensors": [{"name": "smoke", "low": 0.5}], "dva.sensors": ["smoke"]}
 
 
-@pytest.fixture(params=["virtual", "sockets", "sockets with keys"])
+@pytest.fixture(params=["virtual", "sockets", "sockets with keys", "mqtt"])
 def network(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transport]:
     if request.param == "virtual":
         yield _quick_network()
+        return
+    if request.param == "mqtt":
+        with closing(MqttWorld(nodes=())) as world:
+            yield world.network
         return
     ring = None
     if request.param == "sockets with keys":
@@ -48,7 +56,7 @@ class Scene(AnyScene):
         quiet |= {"dva.supervisors": ["operator-2"]}
         scenario = scenarios.build(scenarios.load("drive-to-event"), PATIENT | quiet | changes)
         stage = Stage(scenario, 1, network, Recorder())
-        if isinstance(network, SocketNetwork):
+        if isinstance(network, RealNetwork):
             stage.address = lambda kind, number: network.join(id_of(kind, number))
         super().__init__(stage)
 
@@ -182,8 +190,8 @@ def test_a_holder_that_agrees_gives_its_robot_up(network):
     assert scene.robot.controller.owner == OTHER
 
 
-def test_with_keys_nobody_plays_the_supervisor(network):
-    """A supervisor is known by its id: with keys by its key, without them by its word."""
+def test_nobody_plays_the_supervisor_where_the_sender_is_told(network):
+    """By a key, or by the broker; else a supervisor is known by its word."""
     scene, first, second = Scene(network), list[m.Reply](), list[m.Reply]()
     scene.enters(1, drives_until_refused(first))
     scene.until(lambda: is_moving(scene))
@@ -193,9 +201,9 @@ def test_with_keys_nobody_plays_the_supervisor(network):
     impostor.outbox.source = SUPERVISOR
     impostor.ask(DVA, request("force").body, second.append)
     scene.until(lambda: second)
-    with_keys = isinstance(network, SocketNetwork) and network._ring is not None
-    assert second[0].code == (m.NOT_PERMITTED if with_keys else m.BUSY)
-    assert (ROBOT in scene.dva.desk.sessions.reserved) is not with_keys
+    told = isinstance(network, MqttNetwork) or bool(getattr(network, "_ring", None))
+    assert second[0].code == (m.NOT_PERMITTED if told else m.BUSY)
+    assert (ROBOT in scene.dva.desk.sessions.reserved) is not told
 
 
 def test_the_dva_lists_sensors_and_smoke_at_a_robot_is_an_event(network):

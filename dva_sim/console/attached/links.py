@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from dva_sim.agents.device import do_nothing
 from dva_sim.console.attached.options import AttachOptions
 from dva_sim.kernel.recorder import Recorder
+from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.messaging import Transport
 from dva_sim.network.realtime import PacedClock
-from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.stage import DVA
 
 
@@ -40,7 +40,7 @@ class AttachedLinks:
 
 
 def over_sockets(options: AttachOptions) -> AttachedLinks:
-    """By ZeroMQ, with keys if they are wanted.
+    """By ZeroMQ, with keys if they are wanted, or by MQTT.
 
     Raises:
         ConfigError: keys cannot be read.
@@ -52,7 +52,7 @@ def over_sockets(options: AttachOptions) -> AttachedLinks:
     def note(text: str) -> None:
         recorder.tell(clock.now, "console", text, "link")
 
-    network = SocketNetwork(clock, ring, note)
+    network = options.carrier.open(clock, ring, note, ZeromqConfig(), options.dva)
     network.introduce(DVA, options.dva)
     address = network.join(own, options.listen)
     return AttachedLinks(

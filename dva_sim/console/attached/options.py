@@ -13,6 +13,7 @@ from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.addresses import check_address
+from dva_sim.network.carriers import Carrier, carrier_of
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.sockets import split_address
 from dva_sim.simulation.full.stage import id_of, kind_of
@@ -33,6 +34,7 @@ class AttachOptions(PageOptions):
         scenario: Whose site is drawn; None: no plan is known.
         changes: Of the scenario, `KEY=VALUE`.
         audit: File of the audit log; None: one that is gone with the console.
+        transport: What carries the DVA's messages, as on the command line.
     """
 
     dva: str
@@ -40,6 +42,16 @@ class AttachOptions(PageOptions):
     scenario: str | None = None
     changes: tuple[str, ...] = ()
     audit: Path | None = None
+    transport: tuple[str, ...] = ()
+
+    @property
+    def carrier(self) -> Carrier:
+        """What carries the DVA's messages.
+
+        Raises:
+            ConfigError: it is not given as it should be.
+        """
+        return carrier_of(self.transport)
 
     @property
     def listen(self) -> str:
@@ -58,6 +70,7 @@ class AttachOptions(PageOptions):
             ConfigError: the address is none, or no audit log can be kept where it is wanted.
         """
         check_address(self.dva, "--dva ")
+        self.carrier.check([split_address(self.dva)[0]], self.keys is not None)
         if self.audit is not None:
             check_target(self.audit)
 

@@ -8,7 +8,8 @@ from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.console.wire.rows import ServerShown
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.network.sockets import NetworkError, split_address
+from dva_sim.network.real_network import NetworkError
+from dva_sim.network.sockets import split_address
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.simulation.full.run import Run
 from dva_sim.simulation.full.stage import DVA

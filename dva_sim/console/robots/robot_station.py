@@ -9,7 +9,8 @@ from contextlib import closing
 from dva_sim.agents.robot.robot import RobotAgent
 from dva_sim.console.asking.refusal import Refused
 from dva_sim.console.wire.rows import StationShown
-from dva_sim.network.sockets import PORT_TRIES, NetworkError, SocketNetwork
+from dva_sim.network.real_network import NetworkError, RealNetwork
+from dva_sim.network.sockets import PORT_TRIES
 from dva_sim.protocol import messages as m
 
 Then = Callable[[bool, str], object]
@@ -34,7 +35,7 @@ class OwnStation:
         deaf: Told whether it hears anything.
     """
 
-    def __init__(self, robot: RobotAgent, network: SocketNetwork, host: str, port: int) -> None:
+    def __init__(self, robot: RobotAgent, network: RealNetwork, host: str, port: int) -> None:
         self._robot, self._network, self._host, self._port = robot, network, host, port
         self.state, self.dva = OFF, ""
         self.deaf: Callable[[bool], object] = lambda _: None

@@ -9,9 +9,10 @@ from typing import Any
 
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
+from dva_sim.network.carriers import Carrier, free_port
 from dva_sim.network.keys import KeyRing
+from dva_sim.network.mqtt import open_broker
 from dva_sim.network.realtime import PacedClock
-from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.observations import Listener, Senders
 from dva_sim.simulation.full.stage import id_of
 from dva_sim.simulation.scenario import Scenario
@@ -34,7 +35,7 @@ def start_of_day(clock: Clock) -> tuple[float, bool]:
 
 
 class ConsoleSockets:
-    """The sockets of all devices of a console; each has two ports of its own.
+    """The sockets of all devices of a console; over ZeroMQ each has two ports of its own.
 
     Args:
         scenario: Says what is set on the sockets.
@@ -43,6 +44,7 @@ class ConsoleSockets:
         host: Address of this machine to listen on.
         port: Of the DVA's requests; its publications have the next one. 0: any two that are free.
         ring: Keys of the devices; None to run without.
+        carrier: What carries the messages; None: ZeroMQ.
 
     Attributes:
         dva: Where the DVA listens, once it does.
@@ -56,10 +58,15 @@ class ConsoleSockets:
         host: str = "127.0.0.1",
         port: int = 0,
         ring: KeyRing | None = None,
+        carrier: Carrier | None = None,
     ) -> None:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
         self.dva = ""
-        self.network = SocketNetwork(clock, ring, self._tell, scenario.zeromq)
+        carrier, broker, self._broker = carrier or Carrier(), "", None
+        if carrier.is_mqtt:
+            self._port = port or free_port(host)
+            broker, self._broker = f"{host}:{self._port}", open_broker(host, self._port)
+        self.network = carrier.open(clock, ring, self._tell, scenario.zeromq, broker)
         self._said = Senders(self.network.is_here)
 
     def _tell(self, line: str) -> None:
@@ -109,3 +116,5 @@ class ConsoleSockets:
     def close(self) -> None:
         """Close all; what was sent last has a moment to leave."""
         self.network.close()
+        if self._broker is not None:
+            self._broker.close()

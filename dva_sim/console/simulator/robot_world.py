@@ -33,8 +33,8 @@ from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link.link import Link
+from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import PacedClock
-from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.observations import motion_of, terms_of
 from dva_sim.simulation.full.physical_world import Field
 from dva_sim.simulation.full.run import WATCH_PERIOD
@@ -104,7 +104,7 @@ class RobotWorld:
         self._watch()
 
     @property
-    def network(self) -> SocketNetwork:
+    def network(self) -> RealNetwork:
         """What carries its messages."""
         return self.sockets.network
 

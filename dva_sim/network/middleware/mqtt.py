@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import socket
-import subprocess
 import threading
 import time
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from typing_extensions import override
 
 from dva_sim.kernel.errors import ConfigError
-from dva_sim.network.emulator.linux_calls import die_with_parent
 from dva_sim.network.middleware.ends import (
     SIDES,
     CommandTransport,
@@ -25,6 +20,7 @@ from dva_sim.network.middleware.ends import (
     TransportError,
     connected,
 )
+from dva_sim.network.mqtt_broker import PROGRAM, Broker, new_client
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
@@ -45,7 +41,7 @@ class MqttTransport(CommandTransport):
     """
 
     title, library, extra = "MQTT", "paho", "mqtt"
-    program = "mosquitto"
+    program = PROGRAM
 
     def __init__(
         self,
@@ -81,24 +77,18 @@ class _MqttEnd(TransportEnd):
     ) -> None:
         self._options, self._receive = options, receive
         self._hears, self._tells = (PICTURES, COMMANDS)[:: 1 if side == "near" else -1]
-        self._broker = started_broker(options, place) if side == options.broker else None
+        self._broker = None
+        if side == options.broker:
+            self._broker = Broker(place.address(side), place.port, nodelay=options.nodelay)
         self._is_near = side == "near"
         self._is_ready = threading.Event()
         self._client = self._made()
 
     def _made(self) -> Client:
-        from paho.mqtt.client import Client, MQTTv5
-        from paho.mqtt.enums import CallbackAPIVersion
-
-        client = Client(CallbackAPIVersion.VERSION2, protocol=MQTTv5)
+        client = new_client("", self._options.nodelay)
         client.on_connect = self._on_connect
         client.on_subscribe = self._on_subscribe
         client.on_message = self._on_message
-        if self._options.nodelay:
-            client.on_socket_open = lambda _, __, opened: opened.setsockopt(
-                socket.IPPROTO_TCP, socket.TCP_NODELAY, 1
-            )
-        client.reconnect_delay_set(1, 1)
         return client
 
     def _on_connect(self, client: Client, *_: Any) -> None:
@@ -149,26 +139,4 @@ class _MqttEnd(TransportEnd):
         self._client.loop_stop()
         self._client.disconnect()
         if self._broker is not None:
-            self._broker.kill()
-            self._broker.wait()
-
-
-def started_broker(options: MqttTransport, place: Rendezvous) -> subprocess.Popen[bytes]:
-    """A mosquitto that listens at its end of the link alone, and ends with this process.
-
-    It stays root, which inside a user namespace is nobody else's: there it could not become
-    another user.
-    """
-    file = Path(place.folder) / "mosquitto.conf"
-    file.write_text(
-        f"listener {place.port} {place.address(options.broker)}\n"
-        "allow_anonymous true\nuser root\nlog_dest none\n"
-        f"set_tcp_nodelay {str(options.nodelay).lower()}\n"
-    )
-    me = os.getpid()
-    with (place.folder / "mosquitto.log").open("w") as log:
-        return subprocess.Popen(
-            [options.program, "-c", str(file)],
-            stderr=log,
-            preexec_fn=lambda: die_with_parent(me),
-        )
+            self._broker.close()

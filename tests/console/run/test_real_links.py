@@ -10,7 +10,8 @@ from helpers.wording import unnamed
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.run.real_links import TITLE, ConsoleSockets
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.network.sockets import NetworkError, SocketNetwork
+from dva_sim.network.real_network import NetworkError
+from dva_sim.network.sockets import SocketNetwork
 from dva_sim.simulation.full.stage import DVA, Stage, id_of
 
 pytestmark = pytest.mark.system

@@ -5,11 +5,12 @@ with keys alike. Nothing here waits for a fixed time where it can wait for a con
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from random import Random
 from typing import Any
 
+import pytest
 import zmq
 from helpers.processes.patience import PATIENCE_S
 
@@ -17,6 +18,7 @@ from dva_sim.agents.device import AgentDevice
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import Recorder
 from dva_sim.kernel.streams import Streams
+from dva_sim.network.carriers import LOCALHOST, free_port
 from dva_sim.network.connections import Connector
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
@@ -29,8 +31,11 @@ from dva_sim.network.messaging import (
     Transport,
     Wire,
 )
+from dva_sim.network.middleware.mqtt import MqttTransport
+from dva_sim.network.mqtt import MqttNetwork, open_broker
+from dva_sim.network.real_network import NetworkError
 from dva_sim.network.realtime import LiveClock
-from dva_sim.network.sockets import NetworkError, SocketNetwork
+from dva_sim.network.sockets import SocketNetwork
 from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.worlds.geo import GeoFrame
 
@@ -180,6 +185,25 @@ class SocketWorld(World):
         self._outside.destroy(linger=0)
         for network in [self.network, *self._elsewhere]:
             network.close()
+
+
+class MqttWorld(World):
+    """Clients of a broker on this machine, in real time; skipped where there can be none."""
+
+    def __init__(self, nodes: Sequence[str] = NODES) -> None:
+        if missing := MqttTransport().lacks():
+            pytest.skip(missing)
+        self.said, self.port = list[str](), free_port(LOCALHOST)
+        self.broker = open_broker(LOCALHOST, self.port)
+        address = f"{LOCALHOST}:{self.port}"
+        self.network: MqttNetwork = MqttNetwork(LiveClock(), address, self.said.append)
+        for node in nodes:
+            self.network.join(node)
+        self.leave, self.come_back = self.network.leave, self.network.join  # type: ignore[assignment, method-assign]
+
+    def close(self) -> None:
+        self.network.close()
+        self.broker.close()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,148 @@
+"""Nodes that talk over real connections, whatever carries the bytes, in real time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Hashable
+from typing import Any, Final
+
+from dva_sim.kernel.errors import DvaSimError
+from dva_sim.network.messaging import (
+    Answer,
+    OnReply,
+    RequestTap,
+    Service,
+    Subscription,
+    Wire,
+    make_request,
+)
+from dva_sim.network.realtime import LiveClock
+
+DRAIN: Final = 64  # messages read from one place before others have their turn
+LARGEST: Final = 65_536  # of a request or a reply [B]
+LARGEST_PICTURE: Final = 2_000_000  # of a publication [B]
+
+
+class NetworkError(DvaSimError):
+    """A port that cannot be opened, or a broker that cannot be started."""
+
+
+class RealNetwork(ABC):
+    """The nodes of this process on a real network; see `Transport`.
+
+    Args:
+        clock: Waits for what arrives.
+        tell: Takes one line about each connection that could not be made.
+
+    Attributes:
+        counters: What was refused or could not be sent, by reason.
+        watcher: Told of each message: a node here, the content, whether that node sends it.
+        taps: See `Transport`.
+    """
+
+    def __init__(self, clock: LiveClock, tell: Callable[[str], object]) -> None:
+        self.clock, self._tell = clock, tell
+        self.counters: Counter[str] = Counter()
+        self.watcher: Callable[[str, Any, bool], object] | None = None
+        self.taps: dict[str, RequestTap] = {}
+        self._addresses: dict[str, str] = {}
+        self._services: dict[str, Service] = {}
+
+    def introduce(self, node: str, address: str) -> None:
+        """See `Transport`."""
+        self._addresses[node] = address
+
+    def forget(self, node: str) -> None:
+        """See `Transport`; whoever still has a connection to it closes that first."""
+        self._addresses.pop(node, None)
+
+    def address(self, node: str) -> str | None:
+        """Where a node is found, if anybody said."""
+        return self._addresses.get(node)
+
+    @abstractmethod
+    def is_here(self, node: str) -> bool:
+        """Whether a node is one of this process."""
+
+    @abstractmethod
+    def join(self, node: str, host: str = "127.0.0.1", port: int = 0) -> str:
+        """Let a node take requests and publish.
+
+        Args:
+            node: The node.
+            host: Address of this machine to listen on.
+            port: Of requests; 0 for any that is free.
+
+        Returns:
+            Its address, as for a registration.
+
+        Raises:
+            NetworkError: it cannot listen there.
+        """
+
+    @abstractmethod
+    def leave(self, node: str) -> None:
+        """End what `join` has begun; a request that is still answered goes nowhere."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close everything; what was sent last has a moment to leave."""
+
+    def serve(self, node: str, service: Service) -> None:
+        """See `Transport`; the node must have joined."""
+        self._services[node] = service
+
+    @abstractmethod
+    def connect(self, node: str, peer: str, on_reply: OnReply, pipelined: bool) -> Wire:
+        """See `Transport`."""
+
+    @abstractmethod
+    def publish(self, node: str, topic: str, payload: Any, size: int) -> None:
+        """See `Transport`; what is not bytes packs itself into bytes."""
+
+    @abstractmethod
+    def ready(self, node: str, topic: str, size: int) -> bool:
+        """See `Transport`."""
+
+    @abstractmethod
+    def subscribe(
+        self, node: str, publisher: str, topic: str, handler: Callable[[Any], object]
+    ) -> Subscription:
+        """See `Transport`."""
+
+    def note(self, node: str, payload: Any, sent: bool = True) -> None:
+        """Somebody may want to know what is said here."""
+        if self.watcher is not None:
+            self.watcher(node, payload, sent)
+
+    def _serve_request(
+        self, node: str, data: bytes, send: Answer, sender: str | None, peer: Hashable
+    ) -> None:
+        """Hand a request to the service of a node; `send` takes the bytes of the reply."""
+        self.note(node, data, sent=False)
+
+        def answer(reply: bytes) -> None:
+            self.note(node, reply)
+            send(reply)
+
+        request = make_request(data, answer, sender, peer)
+        service, tap = self._services[node], self.taps.get(node)
+        if tap is None:
+            service(request)
+        else:
+            tap.serve(service, request)
+
+    def hand_over(
+        self, node: str, publisher: str, data: bytes, handler: Callable[[Any], object]
+    ) -> None:
+        """Hand what a publisher has published to the handler of a node."""
+        self.note(node, data, sent=False)
+        if (tap := self.taps.get(node)) is not None:
+            tap.heard(publisher, data)
+        handler(data)
+
+    def _tell_once(self, problem: str) -> None:
+        self.counters[problem] += 1
+        if self.counters[problem] == 1:
+            self._tell(problem)
