@@ -52,6 +52,7 @@ _TRANSPORT: Any = (
     ),
     None,
 )
+_TO_ROBOTS = "to the robots", "from the robots"
 _CLOSED = "--keys FOLDER closes it"
 
 
@@ -193,6 +194,7 @@ def live(
     ),
     dva_port=(count("With real links: port of the DVA; 0: any.", **_PORT), 0),
     transport=_TRANSPORT,
+    link=(text("With --links real: " + _LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
     dva=(text("Show what runs at this DVA; SCENARIO gives the plan.", metavar=_ADDRESS), None),
     keys=(folder("With --dva: keys, one of a control room, from `dva-sim keys`."), None),
     phones=(flag("--phones", "An address for phones, by https, with a QR code."), False),
@@ -223,6 +225,7 @@ def console(
     results: Path | None,
     out: Path | None,
     transport: list[str] | None,
+    link: list[str] | None,
     set_: list[str] | None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -237,25 +240,29 @@ def console(
         dva-sim console --audit audit.sqlite  # who decided what, for `check`
         dva-sim console -o results/mine  # tables of the drives, for `show` and `report`
         dva-sim console --links real  # over sockets, which other devices may join
+        dva-sim console --links real --link delay_s=0.3  # robots behind an emulated link
         dva-sim console --dva 127.0.0.1:5600  # what a `dva-sim live` does, here or elsewhere
         dva-sim console --phones  # prints an address to be scanned by a phone
         dva-sim console --results results/mine  # recordings of a study, the worst first
     """
-    host, changes, carried_by = asked["host"], tuple(set_ or ()), tuple(transport or ())
+    host, carried_by = asked["host"], tuple(transport or ())
     page = {"host": host, "port": asked["port"], "open": not no_open, "token": not no_token}
     if results is not None:
         with loudness(quiet, verbose):
             _show_replay(results=results, **page)
         return
     from dva_sim.cli import exposure  # late: start-up
+    from dva_sim.cli.link_counts import in_words  # late: start-up
     from dva_sim.console.attached.options import AttachOptions, refuse_with_dva  # late: start-up
     from dva_sim.console.attached.supervisor import attach  # late: start-up
     from dva_sim.console.options import DEFAULT, ConsoleOptions  # late: start-up
     from dva_sim.console.supervisor import ConsoleSupervisor  # late: start-up
     from dva_sim.experiments.study.scenario_mistakes import mistakes_of  # late: start-up
+    from dva_sim.live.options import changes_by_link  # late: start-up
 
+    changes = (*(set_ or ()), *changes_by_link(link or ()))
     if dva is not None:
-        own = {"--links": asked["links"] != "modelled", "--phones": asked["phones"]}
+        own = {"--links": asked["links"] != "modelled", "--link": link, "--phones": asked["phones"]}
         own |= {"--record": asked["record"], "-o": out}
         refuse_with_dva([name for name, given in own.items() if given])
         about = {"scenario": scenario, "changes": changes, "audit": asked["audit"]}
@@ -272,6 +279,7 @@ def console(
         changes=changes,
         results=out,
         transport=carried_by,
+        emulated=bool(link),
         **asked | page,
     )
     pages = [host, *([options.phones_host] if options.phones else [])]
@@ -282,7 +290,12 @@ def console(
         close_by="--host 127.0.0.1 closes it",
     )
     with loudness(quiet, verbose), mistakes_of(options.scenario, list(changes), options.seed):
-        ConsoleSupervisor(options, _say_at_once).run()
+        console = ConsoleSupervisor(options, _say_at_once)
+        try:
+            console.run()
+        finally:
+            for line in in_words(console.packets, _TO_ROBOTS) if console.packets else ():
+                _say_at_once(line)
 
 
 @asks(

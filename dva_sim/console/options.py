@@ -14,6 +14,7 @@ from dva_sim.console.world.kept_results import KeptResults
 from dva_sim.kernel.config_overrides import parse_changes, set_by
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import either
+from dva_sim.live.options import check_emulated
 from dva_sim.network.carriers import carrier_of
 from dva_sim.recordings.writing import check_both
 from dva_sim.simulation.scenario import Scenario, build, load
@@ -33,6 +34,7 @@ class ConsoleOptions(PageOptions):
         links: `modelled` as in a study, or `real`: sockets, which others may join.
         dva_port: Port of the DVA on real links; 0: any that is free.
         transport: What carries messages on real links, as on the command line.
+        emulated: The scenario's link is emulated between the robots and everybody else.
         record: Recording to be made, if any.
         audit: File of the audit log; None: one that is gone with the console.
         results: Folder for the tables of what people did, if any.
@@ -46,6 +48,7 @@ class ConsoleOptions(PageOptions):
     links: str = "modelled"
     dva_port: int = 0
     transport: tuple[str, ...] = ()
+    emulated: bool = False
     record: Path | None = None
     audit: Path | None = None
     results: Path | None = None
@@ -82,7 +85,10 @@ class ConsoleOptions(PageOptions):
             return None
         host = own_address(self.host) if self.host in ("0.0.0.0", "::") else self.host
         carrier = carrier_of(self.transport)
-        return partial(ConsoleSockets, host=host, port=self.dva_port, carrier=carrier)
+        seed = self.seed if self.emulated else None
+        return partial(
+            ConsoleSockets, host=host, port=self.dva_port, carrier=carrier, emulated=seed
+        )
 
     def read(self) -> Scenario:
         """The scenario.
@@ -108,8 +114,19 @@ class ConsoleOptions(PageOptions):
             raise set_by(self.changes, error) from None
         if self.links == "real" and scenario.zeromq.conflate != "none":
             raise ConfigError("zeromq.conflate: only on modelled links, since messages have parts")
+        if self.emulated:
+            self._check_emulated(scenario)
         if self.record is not None:
             check_both(self.record, self.overwrite)
         if self.audit is not None:
             check_audit_target(self.audit)
         return scenario
+
+    def _check_emulated(self, scenario: Scenario) -> None:
+        if self.links != "real":
+            raise ConfigError("--link is for --links real; --set link.KEY changes a modelled link")
+        if carrier_of(self.transport).is_mqtt:
+            raise ConfigError("--link is for ZeroMQ's sockets at a console, not for mqtt")
+        if scenario.zeromq.send_buffer_bytes or scenario.zeromq.receive_buffer_bytes:
+            raise ConfigError("zeromq: sizes of TCP's buffers cannot be chosen with --link")
+        check_emulated(scenario.link, self.seed)

@@ -18,6 +18,8 @@ from dva_sim.console.world.world import ConsoleWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.live.process import ending_when_asked
 from dva_sim.live.recording import Keeper, LiveRecorder
+from dva_sim.network.emulator.process import LinkEnded
+from dva_sim.network.emulator.report import LinkReport
 from dva_sim.serving.pipes import PipeEnd
 from dva_sim.simulation.full.verdicts import refuse_broken, verdicts
 from dva_sim.simulation.scenario import Scenario
@@ -33,11 +35,15 @@ class ConsoleSupervisor:
     Args:
         options: What to run, and where it is to be seen.
         say: Prints a line.
+
+    Attributes:
+        packets: What became of the packets of the emulated link, once it has ended.
     """
 
     def __init__(self, options: ConsoleOptions, say: Say) -> None:
         self._options, self._say = options, say
         self._processes = ConsoleProcesses(options, say)
+        self.packets: LinkReport | None = None
 
     def run(self) -> None:
         """Run until Ctrl-C, SIGTERM, or the end of the web process.
@@ -112,6 +118,7 @@ class ConsoleSupervisor:
             world.phones.close()
             if world.sockets is not None:
                 world.sockets.close()
+                self.packets = world.sockets.packets
             if outlet is not None:
                 world.recorder.tidy()
                 outlet.close()
@@ -131,8 +138,12 @@ class ConsoleSupervisor:
             if world.sockets is not None:
                 self._say(f"DVA: {world.sockets.dva}")
             if not ending.is_asked:
+                if world.sockets is not None:
+                    world.sockets.begin()
                 world.clock.go()
                 world.clock.run()
+            if world.sockets is not None and world.sockets.has_lost_link:
+                raise LinkEnded("the emulated link has ended by itself")
             self._leave(world)
 
     def _leave(self, world: ConsoleWorld) -> None:

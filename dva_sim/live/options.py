@@ -16,6 +16,7 @@ from dva_sim.live.open_files import check_room_for
 from dva_sim.network.addresses import check_address
 from dva_sim.network.carriers import Carrier, carrier_of
 from dva_sim.network.emulator.forwarder import links_of
+from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.files import read_link
 from dva_sim.network.sockets import split_address
 from dva_sim.recordings.writing import SUFFIX, check_both, try_to_write
@@ -156,12 +157,7 @@ class LiveOptions:
                 f"{given[0]} cannot be given with --link, where all parts run in networks of "
                 "their own"
             )
-        if scenario.link.partitions:
-            raise ConfigError(
-                "link.partitions: only on modelled links, since all robots share the emulated "
-                "one; link.outages are understood"
-            )
-        links_of(scenario.link, self.seed)
+        check_emulated(scenario.link, self.seed)
 
     def _check_record(self, record: Path, part: str | None) -> None:
         if self.records_run:
@@ -185,6 +181,20 @@ class LiveOptions:
             return build(document, changes)
         except ConfigError as error:
             raise set_by(self.changes, error) from None
+
+
+def check_emulated(link: LinkConfig, seed: int) -> None:
+    """Refuse a link that cannot be emulated.
+
+    Raises:
+        ConfigError: it has partitions, or names a file that cannot be read.
+    """
+    if link.partitions:
+        raise ConfigError(
+            "link.partitions: only on modelled links, since all robots share the emulated one; "
+            "link.outages are understood"
+        )
+    links_of(link, seed)
 
 
 def changes_by_link(given: Sequence[str]) -> tuple[str, ...]:

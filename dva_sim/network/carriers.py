@@ -21,7 +21,7 @@ from dva_sim.network.middleware.mqtt import MqttTransport
 from dva_sim.network.mqtt import MqttNetwork
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
-from dva_sim.network.sockets import SocketNetwork
+from dva_sim.network.sockets import NodeCrossing, SocketNetwork
 
 ZEROMQ, MQTT = "zeromq", "mqtt"
 CARRIERS: Final = ZEROMQ, MQTT
@@ -72,6 +72,7 @@ class Carrier:
         zeromq: ZeromqConfig,
         broker: str,
         tells_loss: bool = True,
+        crossing: NodeCrossing | None = None,
     ) -> RealNetwork:
         """Open the network of a process.
 
@@ -82,10 +83,11 @@ class Carrier:
             zeromq: Set on ZeroMQ's sockets.
             broker: Address of MQTT's broker, `HOST:PORT`.
             tells_loss: Whether this process tells that the broker is lost.
+            crossing: Leads ZeroMQ's connections across a link.
         """
         if self.is_mqtt:
             return MqttNetwork(clock, broker, tell, self.mqtt.qos, tells_loss)
-        return SocketNetwork(clock, ring, tell, zeromq)
+        return SocketNetwork(clock, ring, tell, zeromq, crossing)
 
     def check(self, hosts: Sequence[str], has_keys: bool) -> None:
         """Refuse what the carrier cannot do, or lacks here.

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import zmq
 from typing_extensions import override
@@ -206,6 +206,16 @@ def split_address(address: str) -> tuple[str, int]:
     return host, int(port) if port else DEFAULT_PORT
 
 
+class NodeCrossing(Protocol):
+    """Leads connections of nodes across a link."""
+
+    def place(self, port: int) -> str:
+        """Return a further endpoint of a node that listens at a port."""
+
+    def way(self, node: str, peer: str, endpoint: str) -> str | None:
+        """Return the endpoint that leads a node to its peer; None: that of the peer itself."""
+
+
 class SocketNetwork(RealNetwork):
     """The nodes of this process, each with sockets of its own.
 
@@ -215,6 +225,8 @@ class SocketNetwork(RealNetwork):
         tell: Takes one line about each connection that could not be made.
         zeromq: Set on every socket; `conflate` cannot be, since messages here have several
             parts, of which ZeroMQ would keep the last alone.
+        crossing: Leads connections between nodes of this process that are at different ends of a
+            link; None: all connect directly.
     """
 
     def __init__(
@@ -223,8 +235,10 @@ class SocketNetwork(RealNetwork):
         ring: KeyRing | None = None,
         tell: Callable[[str], object] = lambda _: None,
         zeromq: ZeromqConfig | None = None,
+        crossing: NodeCrossing | None = None,
     ) -> None:
         super().__init__(clock, tell)
+        self._crossing = crossing
         self._options = options_of(zeromq or ZeromqConfig())
         self._context: zmq.Context[Socket] = zmq.Context()
         # Each connection needs three; the system's own limit of open files comes first.
@@ -291,6 +305,9 @@ class SocketNetwork(RealNetwork):
         else:
             self._discard(router, publisher)
             raise NetworkError(f"found no two free ports in a row on {host}")
+        if self._crossing is not None:
+            router.bind(self._crossing.place(chosen))
+            publisher.bind(self._crossing.place(chosen + 1))
         self._routers[node] = router
         self._publishers[node] = PublisherSocket(publisher)
         self.clock.watch(router, lambda: self._requests(node, router))
@@ -446,6 +463,9 @@ class SocketNetwork(RealNetwork):
         endpoint = self.endpoint(peer, published)
         if endpoint is None or not self._has_key(peer):
             return
+        if self._crossing is not None and self.is_here(peer):
+            node = self._clients[peer][socket]
+            endpoint = self._crossing.way(node, peer, endpoint) or endpoint
         self._cut(socket)
         socket.connect(endpoint)
         self.clock.look(socket)

@@ -7,21 +7,31 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from typing_extensions import override
+
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
 from dva_sim.network.carriers import Carrier, free_port
+from dva_sim.network.emulator.crossing import CrossedLink
+from dva_sim.network.emulator.forwarder import FAR, NEAR
+from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.keys import KeyRing
+from dva_sim.network.link import LinkConfig
 from dva_sim.network.mqtt import open_broker
 from dva_sim.network.realtime import PacedClock
+from dva_sim.network.sockets import NodeCrossing
 from dva_sim.simulation.full.observations import Listener, Senders
-from dva_sim.simulation.full.stage import id_of
+from dva_sim.simulation.full.stage import id_of, kind_of
 from dva_sim.simulation.scenario import Scenario
 
 _ENDS = re.compile(
     rb"<DestinationID>([0-9A-F:]{17})</DestinationID>.{0,200}?<SourceID>([0-9A-F:]{17})<", re.DOTALL
 )
+_AT_FAR_END = {"robot", "guard", "detector"}
+LOOK_AT_LINK = 0.5  # between looks at whether it is still there [s]
 _HEADER = 400  # so many bytes hold it
 TITLE = "the links are real: they are what the network of this machine makes them"
+EMULATED = "the links are real, and emulated as --link says, from beginning to end"
 
 
 MakeSockets = Callable[[Scenario, PacedClock, ConsoleRecorder], "ConsoleSockets"]
@@ -32,6 +42,36 @@ def start_of_day(clock: Clock) -> tuple[float, bool]:
     started = time.time() - clock.now
     local = time.localtime(started)
     return local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec + started % 1.0, True
+
+
+class RobotCrossing(NodeCrossing):
+    """An emulated link between robots, guards and detectors, and all other devices.
+
+    Args:
+        config: The link.
+        seed: Random seed of its losses and jitter.
+
+    Raises:
+        EmulatorError: it cannot be set up here; the line says what is missing.
+    """
+
+    def __init__(self, config: LinkConfig, seed: int) -> None:
+        self.link = CrossedLink(config, seed)
+
+    @override
+    def place(self, port: int) -> str:
+        return f"ipc://{self.link.place(port)}"
+
+    @override
+    def way(self, node: str, peer: str, endpoint: str) -> str | None:
+        end = _end_of(node)
+        if end == _end_of(peer):
+            return None
+        return f"ipc://{self.link.way(end, int(endpoint.rpartition(':')[2]))}"
+
+
+def _end_of(node: str) -> str:
+    return FAR if kind_of(node)[0] in _AT_FAR_END else NEAR
 
 
 class ConsoleSockets:
@@ -45,10 +85,16 @@ class ConsoleSockets:
         port: Of the DVA's requests; its publications have the next one. 0: any two that are free.
         ring: Keys of the devices; None to run without.
         carrier: What carries the messages; None: ZeroMQ.
+        emulated: Random seed of the scenario's link, which is emulated between robots, guards and
+            detectors and everybody else; None: it is not.
 
     Attributes:
         dva: Where the DVA listens, once it does.
+        crossing: The emulated link, if there is one.
+        packets: What became of its packets, at the end.
     """
+
+    packets: LinkReport | None
 
     def __init__(
         self,
@@ -59,15 +105,36 @@ class ConsoleSockets:
         port: int = 0,
         ring: KeyRing | None = None,
         carrier: Carrier | None = None,
+        emulated: int | None = None,
     ) -> None:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
-        self.dva = ""
+        self.dva, self.packets = "", None
         carrier, broker, self._broker = carrier or Carrier(), "", None
         if carrier.is_mqtt:
             self._port = port or free_port(host)
             broker, self._broker = f"{host}:{self._port}", open_broker(host, self._port)
-        self.network = carrier.open(clock, ring, self._tell, scenario.zeromq, broker)
+        self.crossing = None if emulated is None else RobotCrossing(scenario.link, emulated)
+        self.network = carrier.open(
+            *(clock, ring, self._tell, scenario.zeromq, broker), crossing=self.crossing
+        )
+        if self.crossing is not None:
+            clock.every(LOOK_AT_LINK, self._look_at_link)
         self._said = Senders(self.network.is_here)
+
+    def begin(self) -> None:
+        """Let the time of the emulated link, if there is one, begin with that of the world."""
+        if self.crossing is not None:
+            self.crossing.link.begin()
+
+    @property
+    def has_lost_link(self) -> bool:
+        """Whether the emulated link has ended by itself."""
+        return self.crossing is not None and self.crossing.link.has_ended
+
+    def _look_at_link(self) -> bool:
+        if self.has_lost_link:
+            self._clock.stop()
+        return not self.has_lost_link
 
     def _tell(self, line: str) -> None:
         self._recorder.tell(self._clock.now, "console", line, "link")
@@ -116,5 +183,8 @@ class ConsoleSockets:
     def close(self) -> None:
         """Close all; what was sent last has a moment to leave."""
         self.network.close()
+        if self.crossing is not None:
+            self.packets = self.crossing.link.report()
+            self.crossing.link.close()
         if self._broker is not None:
             self._broker.close()

@@ -9,7 +9,7 @@ from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.run.link import changed, with_link
-from dva_sim.console.run.real_links import TITLE
+from dva_sim.console.run.real_links import EMULATED, TITLE
 from dva_sim.console.wire.arguments import LINK_LIMITS
 from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import ConfigError
@@ -24,13 +24,16 @@ class LinkSliders:
     Args:
         run: Whose.
         set_usual: Told how long a message usually takes the computer of a robot, by its id [s].
+        emulated: Whether the scenario's link is emulated below real sockets.
 
     Attributes:
         link: As it is now.
     """
 
-    def __init__(self, run: Run, set_usual: Callable[[str, float], object]) -> None:
-        self._run, self.link = run, run.scenario.link
+    def __init__(
+        self, run: Run, set_usual: Callable[[str, float], object], emulated: bool = False
+    ) -> None:
+        self._run, self.link, self._emulated = run, run.scenario.link, emulated
         self._set_usual = set_usual
         self._wanted: dict[str, float] = {}
 
@@ -39,7 +42,10 @@ class LinkSliders:
         link, run = self.link, self._run
         processing = self._wanted.get("processing_s", mean_processing_s(run.scenario))
         if run.is_real:
-            return {"kind": "real", "processing_s": processing}
+            shown: LinkShown = {"kind": "real", "processing_s": processing}
+            if self._emulated:
+                shown |= {"delay_s": link.delay_s, "loss": link.loss}
+            return shown
         return {
             "kind": "modelled",
             "delay_s": link.delay_s,
@@ -61,7 +67,7 @@ class LinkSliders:
         run = self._run
         wanted = {key: given[key] for key in LINK_LIMITS if key in given}
         if run.is_real and wanted.keys() - {"processing_s"}:
-            raise ConfigError(TITLE)
+            raise ConfigError(EMULATED if self._emulated else TITLE)
         self.link = changed(run.scenario.link, self._wanted | wanted)
         self._wanted |= wanted
         now = run.clock.now

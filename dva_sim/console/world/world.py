@@ -100,7 +100,8 @@ class ConsoleWorld(ToldWorld):
         self.tell: Tell = lambda *_: None
         self.show: Show = lambda *_: None
         self.windows = self._windows()
-        self.sliders = LinkSliders(self.run, self.windows.set_usual)
+        emulated = self.sockets is not None and self.sockets.crossing is not None
+        self.sliders = LinkSliders(self.run, self.windows.set_usual, emulated)
         self.dropped: Callable[[], int] = lambda: 0
         self._console = Console(
             setup=setup_of(self.run.stage, scenario),

@@ -46,10 +46,19 @@ class _Leader:
             for host in _HOSTS:
                 with suppress(ConnectionRefusedError):
                     there = await asyncio.open_connection(host, self._port)
-                    await asyncio.gather(_copy(reader, there[1]), _copy(there[0], writer))
-                    there[1].close()
+                    await join((reader, writer), there)
                     break
         writer.close()
+
+
+Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+async def join(one: Stream, other: Stream) -> None:
+    """Pass on the bytes of two connections to each other until both have ended; close them."""
+    await asyncio.gather(_copy(one[0], other[1]), _copy(other[0], one[1]))
+    one[1].close()
+    other[1].close()
 
 
 async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

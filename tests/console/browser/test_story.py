@@ -5,7 +5,9 @@ import signal
 
 from helpers.console.console_program import started
 from helpers.console.keyboard_driver import NEAR_FIRE, Driver
+from helpers.network.emulated_link import need_link
 from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.wording import unnamed
 from playwright.sync_api import expect
 
 DELAY_S = 0.5
@@ -25,6 +27,31 @@ def test_of_a_real_link_nothing_can_be_chosen_but_the_robots_computers(visit, pr
     page.get_by_role("button", name="Take control").click()
     expect(page.get_by_role("button", name="Release control")).to_be_enabled()
     expect(page.locator(".picture-age")).to_contain_text("old")
+
+
+ROUND_TRIP = "import('/static/js/store.js').then(store => store.driveOf(0)?.round_trip_ms ?? 0)"
+
+
+def test_who_drives_over_an_emulated_link_sees_what_it_takes(visit, programs):
+    need_link()
+    console, address = started(programs, "--links", "real", "--link", "delay_s=0.3")
+    page = visit.open(address, "network")
+
+    expect(page.get_by_role("status", name="Link")).to_have_text("emulated 300 ms")
+    page.get_by_label("Pattern of robot-1").select_option("req-rep")
+    page.get_by_role("link", name="Drive").click()
+    page.get_by_role("button", name="Take control").click()
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.get_by_role("status", name="Mode")).to_have_text("Teleoperation")
+    page.keyboard.down("ArrowUp")
+    assert becomes(lambda: page.evaluate(ROUND_TRIP) > 0)
+    assert 600 <= page.evaluate(ROUND_TRIP) < 1200
+    page.keyboard.up("ArrowUp")
+    page.close()
+    console.send(signal.SIGINT)
+    assert console.ends() == 0
+    assert unnamed(console.said, "S1 held", "to the robots: ") == []
+    assert programs.processes() == {}
 
 
 def test_a_fire_is_reached_by_keys_over_500_ms_and_confirmed(tmp_path, visit, programs):

@@ -52,14 +52,19 @@ function Link() {
     return html`<span class="item link" role="status" aria-label="Link"
       title="What is shown is over: a recording is played">${text}</span>`;
   }
+  const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
+  const loss = setting?.loss ? `, ${Number((100 * setting.loss).toFixed(1))} % lost` : '';
+  if (!isModelled.value && setting?.delay_s !== undefined) {
+    return html`<span class="item link" role="status" aria-label="Link"
+      title="Sockets over an emulated link lie between the console and the robots; its delay is one way">
+      emulated ${delay}${loss}</span>`;
+  }
   if (!isModelled.value) {
     return html`<span class="item link" role="status" aria-label="Link"
       title=${isAttached.value ? 'What is shown runs elsewhere; here is known what messages tell' : 'Sockets lie between the console and the robots, not a model'}>
       ${isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
   }
-  const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
   const trace = setting?.trace ? `, ${setting.trace}` : '';
-  const loss = setting?.loss ? `, ${Number((100 * setting.loss).toFixed(1))} % lost` : '';
   return html`<span class="item link modelled" role="status"
     aria-label="Link" title="The link that lies between the console and the robots, one way">
     modelled ${delay}${loss}${trace}</span>`;

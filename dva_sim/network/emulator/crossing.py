@@ -1,0 +1,155 @@
+"""Leads connections between programs of this machine across an emulated link, and back.
+
+Programs at neither end of the link listen at sockets of the file system, which are the same in all
+networks. A relay at each end takes what is connected at its side, opens a connection of TCP across
+the link for it, and the relay at the other end leads that to where it should go. The buffers of the
+relays are small, so that what waits does so in TCP's, as without relays.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from dva_sim.network.emulator import publishing
+from dva_sim.network.emulator.forwarder import FAR, NEAR
+from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
+from dva_sim.network.emulator.report import LinkReport
+from dva_sim.network.link import LinkConfig
+
+PORT = 7000  # at which each relay takes connections across the link
+ENDS = {NEAR: FAR, FAR: NEAR}
+_BUFFER = 4096  # of a relay, each way [B]
+_NUMBER = 2  # bytes in which a connection says where it goes
+
+
+class CrossedLink:
+    """An emulated link, and ways across it; all of it ends with this process.
+
+    Places are known by numbers, such as ports.
+
+    Args:
+        config: The link, near to far and back.
+        seed: Random seed of its losses and jitter.
+
+    Raises:
+        EmulatorError: the link cannot be set up here; the line says what is missing.
+    """
+
+    def __init__(self, config: LinkConfig, seed: int) -> None:
+        self._link = LinkProcess(config, seed)
+        self._folder = TemporaryDirectory(prefix="dva-sim-")
+        self._relays = {end: self._started(end) for end in ENDS}
+        self._led: set[tuple[str, int]] = set()
+
+    def _started(self, end: str) -> subprocess.Popen[bytes]:
+        words = [sys.executable, "-P", "-m", __name__, self._folder.name, end]
+        return self._link.start(end, words, stdin=subprocess.PIPE)
+
+    def begin(self) -> None:
+        """Let the link's time begin now: the moment that outages and recordings count from."""
+        self._link.begin()
+
+    def place(self, number: int) -> Path:
+        """Return where a program listens that is reached across the link."""
+        return _place(self._folder.name, number)
+
+    def way(self, end: str, number: int) -> Path:
+        """Return where a program at one end connects to, to reach a place at the other.
+
+        Nobody listens there for a moment when it is first asked for.
+        """
+        if (end, number) not in self._led:
+            self._led.add((end, number))
+            relay = self._relays[end].stdin
+            assert relay is not None
+            with suppress(OSError):  # it has ended with the link, which is noticed
+                relay.write(b"%d\n" % number)
+                relay.flush()
+        return _way(self._folder.name, end, number)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the link, or a relay, has ended by itself."""
+        return self._link.has_ended or any(r.poll() is not None for r in self._relays.values())
+
+    def report(self) -> LinkReport | None:
+        """End the link, and count what became of its packets; None if it has ended by itself."""
+        with suppress(LinkEnded):
+            return self._link.report()
+        return None
+
+    def close(self) -> None:
+        """End the link and its relays, and remove their files."""
+        for relay in self._relays.values():
+            relay.kill()
+            relay.wait()
+            assert relay.stdin is not None
+            with suppress(OSError):
+                relay.stdin.close()
+        self._link.close()
+        self._folder.cleanup()
+
+
+def _place(folder: str, number: int) -> Path:
+    return Path(folder, str(number))
+
+
+def _way(folder: str, end: str, number: int) -> Path:
+    return Path(folder, f"{end}-{number}")
+
+
+class _Relay:
+    """The relay at one end."""
+
+    def __init__(self, folder: str, end: str) -> None:
+        self._folder, self._end = folder, end
+        self._servers: list[asyncio.Server] = []
+
+    async def serve(self) -> None:
+        """Lead connections until the standard input ends, whose lines are numbers of places."""
+        server = await asyncio.start_server(self._arrive, ADDRESSES[self._end], PORT, limit=_BUFFER)
+        lines = asyncio.StreamReader()
+        loop = asyncio.get_running_loop()
+        await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
+        async with server:
+            while line := await lines.readline():
+                await self._open(int(line))
+
+    async def _open(self, number: int) -> None:
+        async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            try:
+                there = await asyncio.open_connection(
+                    ADDRESSES[ENDS[self._end]], PORT, limit=_BUFFER
+                )
+            except OSError:
+                writer.close()
+                return
+            there[1].write(number.to_bytes(_NUMBER, "big"))
+            await self._join((reader, writer), there)
+
+        path = _way(self._folder, self._end, number)
+        self._servers.append(await asyncio.start_unix_server(leave, path, limit=_BUFFER))
+
+    async def _arrive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Lead a connection that has crossed the link to its place."""
+        with suppress(OSError, asyncio.IncompleteReadError):
+            number = int.from_bytes(await reader.readexactly(_NUMBER), "big")
+            place = _place(self._folder, number)
+            there = await asyncio.open_unix_connection(place, limit=_BUFFER)
+            await self._join((reader, writer), there)
+        writer.close()
+
+    @staticmethod
+    async def _join(one: publishing.Stream, other: publishing.Stream) -> None:
+        for _, writer in (one, other):
+            writer.transport.set_write_buffer_limits(_BUFFER)
+        await publishing.join(one, other)
+
+
+if __name__ == "__main__":
+    asyncio.run(_Relay(*sys.argv[1:]).serve())
