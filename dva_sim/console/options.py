@@ -125,8 +125,6 @@ class ConsoleOptions(PageOptions):
     def _check_emulated(self, scenario: Scenario) -> None:
         if self.links != "real":
             raise ConfigError("--link is for --links real; --set link.KEY changes a modelled link")
-        if carrier_of(self.transport).is_mqtt:
-            raise ConfigError("--link is for ZeroMQ's sockets at a console, not for mqtt")
         if scenario.zeromq.send_buffer_bytes or scenario.zeromq.receive_buffer_bytes:
             raise ConfigError("zeromq: sizes of TCP's buffers cannot be chosen with --link")
         check_emulated(scenario.link, self.seed)

@@ -18,7 +18,7 @@ from dva_sim.kernel.suggestions import either
 from dva_sim.network.connections import ZeromqConfig
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.middleware.mqtt import MqttTransport
-from dva_sim.network.mqtt import MqttNetwork
+from dva_sim.network.mqtt import MqttNetwork, Ways
 from dva_sim.network.real_network import RealNetwork
 from dva_sim.network.realtime import LiveClock
 from dva_sim.network.sockets import NodeCrossing, SocketNetwork
@@ -73,6 +73,7 @@ class Carrier:
         broker: str,
         tells_loss: bool = True,
         crossing: NodeCrossing | None = None,
+        ways: Ways | None = None,
     ) -> RealNetwork:
         """Open the network of a process.
 
@@ -84,9 +85,10 @@ class Carrier:
             broker: Address of MQTT's broker, `HOST:PORT`.
             tells_loss: Whether this process tells that the broker is lost.
             crossing: Leads ZeroMQ's connections across a link.
+            ways: Lead MQTT's connections across it; see `MqttNetwork`.
         """
         if self.is_mqtt:
-            return MqttNetwork(clock, broker, tell, self.mqtt.qos, tells_loss)
+            return MqttNetwork(clock, broker, tell, self.mqtt.qos, tells_loss, ways)
         return SocketNetwork(clock, ring, tell, zeromq, crossing)
 
     def check(self, hosts: Sequence[str], has_keys: bool) -> None:

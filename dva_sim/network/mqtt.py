@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote, unquote
 
@@ -57,9 +58,16 @@ LINGER: Final = 0.2  # for last words [s]
 _WITH_WILL: Final = 4  # a reason to disconnect by which the broker publishes the last will
 _SEPARATOR: Final = "\n"  # between topics that somebody wants
 
+Ways = Callable[[str], Path | None]
 
-def open_broker(host: str, port: int) -> Broker:
+
+def open_broker(host: str, port: int, also: Path | None = None) -> Broker:
     """Start a broker for the nodes of a run.
+
+    Args:
+        host: Address of this machine.
+        port: Port.
+        also: A socket of the file system at which it listens, too.
 
     Raises:
         NetworkError: it cannot listen there, or is not installed.
@@ -70,7 +78,7 @@ def open_broker(host: str, port: int) -> Broker:
             *(host, port),
             nodelay=True,
             settings=f"max_packet_size {largest}\nmax_queued_messages {MOST_WAITING}\n"
-            "allow_duplicate_messages false\n",
+            "allow_duplicate_messages false\n" + (f"listener 0 {also}\n" if also else ""),
             rules=RULES,
         )
         broker.wait()
@@ -90,6 +98,8 @@ class MqttNetwork(RealNetwork):
         tell: Takes one line when the broker is lost, or found again.
         qos: 0: messages are sent once. 1: until the broker has acknowledged them.
         tells_loss: Whether to tell that the broker is lost; else another process of the run does.
+        ways: Gives the socket of the file system that leads a node to the broker across a link;
+            None: the node connects to its address.
     """
 
     def __init__(
@@ -99,8 +109,10 @@ class MqttNetwork(RealNetwork):
         tell: Callable[[str], object] = lambda _: None,
         qos: int = 0,
         tells_loss: bool = True,
+        ways: Ways | None = None,
     ) -> None:
         super().__init__(clock, tell)
+        self.way: Ways = ways or (lambda _: None)
         self.broker, self.qos, self._tells_loss = broker, qos, tells_loss
         self._nodes: dict[str, _Node] = {}
         self._joined: set[str] = set()
@@ -183,7 +195,8 @@ class MqttNetwork(RealNetwork):
         is_new = node not in self._nodes
         self._joined.add(node)
         self.node(node).hears(f"request/{node}/+", f"wants/{node}/+", "gone/+")
-        if is_new:  # later on nothing waits: robots may drive
+        # Later on nothing waits: robots may drive. Across a link one does not know for how long.
+        if is_new and self.way(node) is None:
             self.node(node).wait_until_it_hears()
         self.introduce(node, self.broker)
         return self.broker
@@ -271,7 +284,8 @@ class _Node:
         self.hears(f"reply/{name}/+")
 
     def _new_client(self) -> Client:
-        client, later = new_client(self.name, nodelay=True), self._network.later
+        way, later = self._network.way(self.name), self._network.later
+        client = new_client(self.name, nodelay=True, kind="unix" if way else "tcp")
         client.on_connect = self._on_connect
         client.on_subscribe = lambda _, __, number, *___: self._confirmed.add(number)
         client.on_disconnect = lambda *_: later(self._disconnected)
@@ -279,7 +293,7 @@ class _Node:
         client.max_queued_messages_set(MOST_WAITING)
         client.will_set(f"gone/{self.name}", b"", qos=1)
         host, _, port = self._network.broker.rpartition(":")
-        client.connect_async(host, int(port), KEEP_ALIVE)
+        client.connect_async(str(way or host), int(port), KEEP_ALIVE)
         client.loop_start()
         return client
 

@@ -8,7 +8,7 @@ import subprocess
 import time
 from contextlib import suppress
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.emulator.linux_calls import die_with_parent
@@ -116,18 +116,19 @@ class Broker:
         self._log.close()
 
 
-def new_client(name: str, nodelay: bool) -> Client:
+def new_client(name: str, nodelay: bool, kind: Literal["tcp", "unix"] = "tcp") -> Client:
     """Return a client of MQTT 5 that tries every second to connect, and to connect again.
 
     Args:
         name: Client id; empty: the broker gives one.
         nodelay: Whether it sends small messages at once (TCP_NODELAY).
+        kind: What it connects by; `unix`: a socket of the file system, whose path is its host.
     """
     from paho.mqtt.client import Client, MQTTv5  # late: an extra
     from paho.mqtt.enums import CallbackAPIVersion
 
-    client = Client(CallbackAPIVersion.VERSION2, name, protocol=MQTTv5)
-    if nodelay:
+    client = Client(CallbackAPIVersion.VERSION2, name, protocol=MQTTv5, transport=kind)
+    if nodelay and kind == "tcp":
         client.on_socket_open = lambda _, __, opened: opened.setsockopt(
             socket.IPPROTO_TCP, socket.TCP_NODELAY, 1
         )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 from typing_extensions import override
@@ -64,10 +66,13 @@ class RobotCrossing(NodeCrossing):
 
     @override
     def way(self, node: str, peer: str, endpoint: str) -> str | None:
-        end = _end_of(node)
-        if end == _end_of(peer):
-            return None
-        return f"ipc://{self.link.way(end, int(endpoint.rpartition(':')[2]))}"
+        way = self.way_to(node, _end_of(peer), int(endpoint.rpartition(":")[2]))
+        return None if way is None else f"ipc://{way}"
+
+    def way_to(self, node: str, end: str, port: int) -> Path | None:
+        """Return what leads a node to a port at an end of the link; None if it is at that end."""
+        here = _end_of(node)
+        return None if here == end else self.link.way(here, port)
 
 
 def _end_of(node: str) -> str:
@@ -110,12 +115,17 @@ class ConsoleSockets:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
         self.dva, self.packets = "", None
         carrier, broker, self._broker = carrier or Carrier(), "", None
+        crossing = None if emulated is None else RobotCrossing(scenario.link, emulated)
+        self.crossing = crossing
+        ways = None
         if carrier.is_mqtt:
             self._port = port or free_port(host)
-            broker, self._broker = f"{host}:{self._port}", open_broker(host, self._port)
-        self.crossing = None if emulated is None else RobotCrossing(scenario.link, emulated)
+            also = None if crossing is None else crossing.link.place(self._port)
+            broker, self._broker = f"{host}:{self._port}", open_broker(host, self._port, also)
+            if crossing is not None:
+                ways = partial(crossing.way_to, end=carrier.mqtt.broker, port=self._port)
         self.network = carrier.open(
-            *(clock, ring, self._tell, scenario.zeromq, broker), crossing=self.crossing
+            *(clock, ring, self._tell, scenario.zeromq, broker), crossing=crossing, ways=ways
         )
         if self.crossing is not None:
             clock.every(LOOK_AT_LINK, self._look_at_link)

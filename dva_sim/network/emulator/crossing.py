@@ -9,6 +9,7 @@ relays are small, so that what waits does so in TCP's, as without relays.
 from __future__ import annotations
 
 import asyncio
+import socket
 import subprocess
 import sys
 from contextlib import suppress
@@ -17,6 +18,7 @@ from tempfile import TemporaryDirectory
 
 from dva_sim.network.emulator import publishing
 from dva_sim.network.emulator.forwarder import FAR, NEAR
+from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import ADDRESSES, LinkEnded, LinkProcess
 from dva_sim.network.emulator.report import LinkReport
 from dva_sim.network.link import LinkConfig
@@ -24,6 +26,8 @@ from dva_sim.network.link import LinkConfig
 PORT = 7000  # at which each relay takes connections across the link
 ENDS = {NEAR: FAR, FAR: NEAR}
 _BUFFER = 4096  # of a relay, each way [B]
+_LONGEST = 90  # of the folder's name: Linux takes 107 characters for the name of a socket
+_BACKLOG = 128  # connections that a relay has not taken yet
 _NUMBER = 2  # bytes in which a connection says where it goes
 
 
@@ -41,14 +45,21 @@ class CrossedLink:
     """
 
     def __init__(self, config: LinkConfig, seed: int) -> None:
-        self._link = LinkProcess(config, seed)
         self._folder = TemporaryDirectory(prefix="dva-sim-")
+        if len(self._folder.name) > _LONGEST:
+            raise EmulatorError(
+                f"{self._folder.name} is too long for names of sockets; set TMPDIR to a shorter one"
+            )
+        self._link = LinkProcess(config, seed)
+        self._controls: dict[str, socket.socket] = {}  # of the relays, by end
         self._relays = {end: self._started(end) for end in ENDS}
         self._led: set[tuple[str, int]] = set()
 
     def _started(self, end: str) -> subprocess.Popen[bytes]:
         words = [sys.executable, "-P", "-m", __name__, self._folder.name, end]
-        return self._link.start(end, words, stdin=subprocess.PIPE)
+        self._controls[end], there = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with there:
+            return self._link.start(end, words, stdin=there)
 
     def begin(self) -> None:
         """Let the link's time begin now: the moment that outages and recordings count from."""
@@ -59,18 +70,16 @@ class CrossedLink:
         return _place(self._folder.name, number)
 
     def way(self, end: str, number: int) -> Path:
-        """Return where a program at one end connects to, to reach a place at the other.
-
-        Nobody listens there for a moment when it is first asked for.
-        """
+        """Return where a program at one end connects to, to reach a place at the other."""
+        path = Path(self._folder.name, f"{end}-{number}")
         if (end, number) not in self._led:
             self._led.add((end, number))
-            relay = self._relays[end].stdin
-            assert relay is not None
-            with suppress(OSError):  # it has ended with the link, which is noticed
-                relay.write(b"%d\n" % number)
-                relay.flush()
-        return _way(self._folder.name, end, number)
+            # It is there at once, whatever the relay is doing, which takes it over.
+            with socket.socket(socket.AF_UNIX) as listener, suppress(ConnectionError):
+                listener.bind(str(path))
+                listener.listen(_BACKLOG)
+                socket.send_fds(self._controls[end], [str(number).encode()], [listener.fileno()])
+        return path
 
     @property
     def has_ended(self) -> bool:
@@ -85,12 +94,10 @@ class CrossedLink:
 
     def close(self) -> None:
         """End the link and its relays, and remove their files."""
-        for relay in self._relays.values():
+        for end, relay in self._relays.items():
             relay.kill()
             relay.wait()
-            assert relay.stdin is not None
-            with suppress(OSError):
-                relay.stdin.close()
+            self._controls[end].close()
         self._link.close()
         self._folder.cleanup()
 
@@ -99,28 +106,30 @@ def _place(folder: str, number: int) -> Path:
     return Path(folder, str(number))
 
 
-def _way(folder: str, end: str, number: int) -> Path:
-    return Path(folder, f"{end}-{number}")
-
-
 class _Relay:
     """The relay at one end."""
 
     def __init__(self, folder: str, end: str) -> None:
         self._folder, self._end = folder, end
-        self._servers: list[asyncio.Server] = []
+        self._led: list[asyncio.Task[asyncio.Server]] = []
+        self._control = socket.socket(fileno=sys.stdin.fileno())
 
     async def serve(self) -> None:
-        """Lead connections until the standard input ends, whose lines are numbers of places."""
+        """Lead connections until the standard input ends, by which listening sockets come."""
         server = await asyncio.start_server(self._arrive, ADDRESSES[self._end], PORT, limit=_BUFFER)
-        lines = asyncio.StreamReader()
-        loop = asyncio.get_running_loop()
-        await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(lines), sys.stdin)
+        ended = asyncio.Event()
+        asyncio.get_running_loop().add_reader(self._control, self._take, ended)
         async with server:
-            while line := await lines.readline():
-                await self._open(int(line))
+            await ended.wait()
 
-    async def _open(self, number: int) -> None:
+    def _take(self, ended: asyncio.Event) -> None:
+        number, files, *_ = socket.recv_fds(self._control, 64, 1)
+        if number:
+            self._led.append(asyncio.create_task(self._lead(int(number), files[0])))
+        else:
+            ended.set()
+
+    async def _lead(self, number: int, listener: int) -> asyncio.Server:
         async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             try:
                 there = await asyncio.open_connection(
@@ -132,8 +141,8 @@ class _Relay:
             there[1].write(number.to_bytes(_NUMBER, "big"))
             await self._join((reader, writer), there)
 
-        path = _way(self._folder, self._end, number)
-        self._servers.append(await asyncio.start_unix_server(leave, path, limit=_BUFFER))
+        listening = socket.socket(fileno=listener)
+        return await asyncio.start_unix_server(leave, sock=listening, limit=_BUFFER)
 
     async def _arrive(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Lead a connection that has crossed the link to its place."""

@@ -14,17 +14,22 @@ from helpers.wording import unnamed
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.cli.program import call
 from dva_sim.console.run.real_links import ConsoleSockets
+from dva_sim.network.carriers import carrier_of
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import LinkProcess
+from dva_sim.network.middleware.mqtt import MqttTransport
 
 QUIET = {"guard__count": 0, "bystander__count": 0}
 EACH_WAY = 0.3  # [s]
 PARTITIONS = "link.partitions=[{from_s: 0, for_s: 1}]"
 
 
-def page_over(monkeypatch, **link):
+def page_over(monkeypatch, transport=(), **link):
     need_link()
-    sockets = partial(ConsoleSockets, emulated=1)
+    carrier = carrier_of(transport)
+    if carrier.is_mqtt and (missing := MqttTransport().lacks()):
+        pytest.skip(missing)
+    sockets = partial(ConsoleSockets, emulated=1, carrier=carrier)
     changes = {f"link__{key}": value for key, value in link.items()}
     page = Page(monkeypatch, sockets=sockets, **QUIET, **changes)
     page.world.clock.go()
@@ -51,18 +56,21 @@ def programs(tmp_path):
 
 
 @pytest.mark.system
-def test_a_person_drives_over_the_link_and_sees_how_late_everything_is(monkeypatch):
-    page = page_over(monkeypatch, delay_s=EACH_WAY)
+@pytest.mark.parametrize("transport", [["zeromq"], ["mqtt"], ["mqtt", "broker=far"]])
+def test_a_person_drives_over_the_link_and_sees_how_late_everything_is(monkeypatch, transport):
+    page = page_over(monkeypatch, transport, delay_s=EACH_WAY)
     try:
         page.actions.take({"client": "c1", "do": "watch", "robots": [0]})
         assert page.do("pattern", robot=0, name="req-rep", within=PATIENCE_S)[0]
         drive(page)
         shown = partial(page.drive)
-        page.until(lambda: shown()["round_trip_ms"] is not None, PATIENCE_S, 0.02)
         page.until(lambda: shown()["loop_ms"] is not None, PATIENCE_S, 0.02)
+        # TCP is slow in its first seconds, and where one connection carries everything.
+        is_quick = lambda: 0 < (shown()["round_trip_ms"] or 0) < 4000 * EACH_WAY  # noqa: E731
+        page.until(is_quick, PATIENCE_S, 0.02)
         drive_shown = shown()
         picture = drive_shown["picture_arrived_ms"] - drive_shown["picture_ms"]
-        assert 2000 * EACH_WAY <= drive_shown["round_trip_ms"] < 4000 * EACH_WAY
+        assert drive_shown["round_trip_ms"] >= 2000 * EACH_WAY
         assert drive_shown["command_age_ms"] >= 1000 * EACH_WAY
         assert picture >= 1000 * EACH_WAY
         assert drive_shown["loop_ms"] >= 1000 * EACH_WAY

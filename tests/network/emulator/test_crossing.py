@@ -2,12 +2,12 @@
 
 import socket
 import time
-from contextlib import closing, suppress
+from contextlib import closing
 from functools import partial
 
 import pytest
 from helpers.network.emulated_link import need_link
-from helpers.processes.patience import PATIENCE_S, becomes
+from helpers.processes.patience import PATIENCE_S
 
 from dva_sim.network.emulator import crossing
 from dva_sim.network.emulator.crossing import CrossedLink
@@ -28,17 +28,9 @@ def listener(link: CrossedLink, number: int) -> socket.socket:
 
 
 def connected(link: CrossedLink, end: str, number: int) -> socket.socket:
-    """A connection, as soon as the relay listens."""
-    way, made = str(link.way(end, number)), socket.socket(socket.AF_UNIX)
+    made = socket.socket(socket.AF_UNIX)
     made.settimeout(PATIENCE_S)
-
-    def tried() -> bool:
-        with suppress(FileNotFoundError, ConnectionRefusedError):
-            made.connect(way)
-            return True
-        return False
-
-    assert becomes(tried)
+    made.connect(str(link.way(end, number)))
     return made
 
 
