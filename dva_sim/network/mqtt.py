@@ -45,11 +45,9 @@ pattern write wants/+/%c
 pattern read wants/%c/+
 pattern write gone/%c
 """
-MOST_WAITING: Final = (
-    1000  # messages of a client that are not sent yet, or of a paused subscription
-)
+MOST_WAITING: Final = 1000  # messages that a client has not sent, or a subscription holds
 MOST_TAKEN: Final = 10_000  # messages of a process that have arrived and wait for their turn
-MOST_WANTED: Final = 10_000  # topics that subscribers want of a node
+MOST_WANTED: Final = 1_000_000  # characters of all topics that subscribers want of a node
 LONGEST_TAG: Final = 64  # of the correlation data of a request [B]
 KEEP_ALIVE: Final = 10  # without a word either end takes the connection for lost after it [s]
 BEGIN: Final = 2.0  # for the first connection of a node, before anything else [s]
@@ -159,6 +157,10 @@ class MqttNetwork(RealNetwork):
                 f"{node} was disconnected from the MQTT broker for a moment: another program may "
                 "have connected under its id"
             )
+
+    def refused(self, node: str, why: str) -> None:
+        """Tell once that the broker does not take a node."""
+        self._tell_once(f"the MQTT broker at {self.broker} refuses {node}: {why}")
 
     def disconnected(self, node: str) -> None:
         """Note that a node has lost its connection, and see in a moment whether all have."""
@@ -282,6 +284,7 @@ class _Node:
         self._backlog = 0  # [B]
         self.client = self._new_client()
         self.hears(f"reply/{name}/+")
+        self.client.loop_start()  # at last: from here on its thread calls us
 
     def _new_client(self) -> Client:
         way, later = self._network.way(self.name), self._network.later
@@ -294,20 +297,21 @@ class _Node:
         client.will_set(f"gone/{self.name}", b"", qos=1)
         host, _, port = self._network.broker.rpartition(":")
         client.connect_async(str(way or host), int(port), KEEP_ALIVE)
-        client.loop_start()
         return client
 
     # --- the connection ----------------------------------------------------------------
 
     def _on_connect(self, _: Client, __: Any, ___: Any, code: Any, ____: Any) -> None:
         """Subscribe, also after a connection that was lost; in the library's thread."""
-        if not code.is_failure:
+        if code.is_failure:
+            self._network.later(lambda: self._network.refused(self.name, str(code)))
+        else:
             self._network.later(self._connected)
             self._subscribe(*list(self._filters))
 
     def _subscribe(self, *filters: str) -> None:
-        wanted = [(each, self._network.qos) for each in filters]
-        self._last = self.client.subscribe(wanted)[1] if wanted else None
+        _, number = self.client.subscribe([(each, self._network.qos) for each in filters])
+        self._last = self._last if number is None else number
 
     def _connected(self) -> None:
         for publisher in self.listening:
@@ -417,7 +421,8 @@ class _Node:
     def _take_wants(self, subscriber: str, data: bytes) -> None:
         self._wanted.pop(subscriber, None)
         topics = data.decode(errors="replace").split(_SEPARATOR)[:-1]
-        if topics and sum(map(len, self._wanted.values())) + len(topics) <= MOST_WANTED:
+        known = sum(len(topic) for wants in self._wanted.values() for topic in wants)
+        if topics and known + len(data) <= MOST_WANTED:
             self._wanted[subscriber] = tuple(map(unquote, topics))
 
 

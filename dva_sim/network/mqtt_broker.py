@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import socket
 import subprocess
 import time
@@ -16,7 +17,11 @@ from dva_sim.network.emulator.linux_calls import die_with_parent
 if TYPE_CHECKING:
     from paho.mqtt.client import Client
 
-PROGRAM: Final = "mosquitto"
+_SYSTEM: Final = os.pathsep.join(
+    (os.environ.get("PATH", os.defpath), "/usr/local/sbin", "/usr/sbin")
+)
+# Where Debian puts it is not on the path of everybody.
+PROGRAM: Final = shutil.which("mosquitto", path=_SYSTEM) or "mosquitto"
 _PATIENCE: Final = 10.0  # until it listens [s]
 _AGAIN: Final = 0.02  # between two looks whether it does [s]
 

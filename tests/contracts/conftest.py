@@ -8,6 +8,7 @@ from helpers.network.transports import (
     LOSSY,
     NODES,
     VIRTUAL,
+    WITH_MQTT,
     MqttWorld,
     SocketWorld,
     VirtualWorld,
@@ -19,9 +20,7 @@ from dva_sim.network.keys import KeyRing, create_keys
 SOCKETS = [
     pytest.param(kind, marks=pytest.mark.system) for kind in ("sockets", "sockets with keys")
 ]
-
-
-REAL = [*SOCKETS, pytest.param("mqtt", marks=pytest.mark.system)]
+MQTT = [pytest.param(kind, marks=pytest.mark.system) for kind in WITH_MQTT]
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +30,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> KeyRing:
     return KeyRing(folder)
 
 
-@pytest.fixture(params=[*VIRTUAL, LOSSY, *REAL])
+@pytest.fixture(params=[*VIRTUAL, LOSSY, *SOCKETS, *MQTT])
 def world(request: pytest.FixtureRequest) -> Iterator[World]:
     made = _world(request)
     yield made

@@ -5,24 +5,18 @@ import signal
 
 import pytest
 from helpers.network.emulated_link import need_link
+from helpers.network.transports import NO_MQTT
 from helpers.processes.programs import wait_until
 from helpers.wording import unnamed
 
-from dva_sim.cli.program import call
-from dva_sim.network.middleware.mqtt import MqttTransport
+pytestmark = pytest.mark.system
+if NO_MQTT:
+    pytest.skip(NO_MQTT, allow_module_level=True)
 
 LIVE = ("live", "drive-to-event", "--operators", "scripted", "--transport", "mqtt")
 RULES = ("S1 held", "S2 held", "S3 held", "S4 held", "S5 held", "S6 held", "S7 held")
 
 
-@pytest.fixture(autouse=True)
-def need_mqtt(request: pytest.FixtureRequest) -> None:
-    missing = MqttTransport().lacks()
-    if missing and request.node.get_closest_marker("system"):
-        pytest.skip(missing)
-
-
-@pytest.mark.system
 @pytest.mark.invariant("S1", "S2", "S3", "S4", "S5")
 def test_a_whole_run_keeps_the_rules(programs):
     """A drive, an emergency, a command that comes too late, a second drive."""
@@ -33,7 +27,6 @@ def test_a_whole_run_keeps_the_rules(programs):
     assert programs.processes() == {}
 
 
-@pytest.mark.system
 @pytest.mark.invariant("S1")
 def test_a_broker_that_is_killed_is_told_once_and_the_driven_robot_stands(programs):
     run = programs.start(*LIVE, "--for", "20")
@@ -47,7 +40,6 @@ def test_a_broker_that_is_killed_is_told_once_and_the_driven_robot_stands(progra
     assert programs.processes() == {}
 
 
-@pytest.mark.system
 @pytest.mark.parametrize("end", ["near", "far"])
 def test_robots_and_a_broker_may_be_at_either_end_of_a_link(programs, end):
     need_link()
@@ -58,17 +50,3 @@ def test_robots_and_a_broker_may_be_at_either_end_of_a_link(programs, end):
     assert run.ends() == 0, run.complained
     assert unnamed(run.said, "to the robots: ", *RULES) == []
     wait_until(lambda: programs.processes() == {}, "all parts end")
-
-
-@pytest.mark.parametrize(
-    ("words", "names"),
-    [
-        (["--transport", "mqtt", "--keys", "keys"], ("--keys", "mqtt")),
-        (["--transport", "mqtt", "--host", "0.0.0.0"], ("mqtt", "0.0.0.0")),
-        (["--transport", "mqtt", "--dva", "10.1.2.3:1883"], ("mqtt", "10.1.2.3")),
-        (["--transport", "dds"], ("dds", "zeromq", "mqtt")),
-    ],
-)
-def test_what_mqtt_cannot_do_is_refused_in_one_line(words, names, capsys):
-    assert call(["live", "drive-to-event", *words]) == 2
-    assert unnamed(capsys.readouterr().err, *names) == []

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from helpers.network.scripted_session import OPERATOR, PATIENT, ROBOT, _quick_network
 from helpers.network.scripted_session import Scene as AnyScene
-from helpers.network.transports import MqttWorld
+from helpers.network.transports import WITH_MQTT, MqttWorld
 
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
 from dva_sim.core.events import State
@@ -30,7 +30,7 @@ SUPERVISOR, OTHER = id_of("operator", 2), id_of("operator", 3)
 SHOWS_SMOKE = {"robot.sensors": [{"name": "smoke", "low": 0.5}], "dva.sensors": ["smoke"]}
 
 
-@pytest.fixture(params=["virtual", "sockets", "sockets with keys", "mqtt"])
+@pytest.fixture(params=["virtual", "sockets", "sockets with keys", *WITH_MQTT])
 def network(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Transport]:
     if request.param == "virtual":
         yield _quick_network()

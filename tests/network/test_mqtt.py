@@ -8,22 +8,24 @@ from contextlib import closing
 
 import pytest
 from helpers.network.scripted_session import ROBOT, Scene
-from helpers.network.transports import DVA, PHONE, TABLET, Asker, Listener, MqttWorld, echo
+from helpers.network.transports import DVA, NO_MQTT, PHONE, TABLET, Asker, Listener, MqttWorld, echo
 from helpers.network.transports import ROBOT as PLAIN
 from helpers.processes.patience import PATIENCE_S
 from helpers.wording import unnamed
 
 from dva_sim.agents.operator.scripted import Ask, Pause, Script, ScriptedOperator
-from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.recorder import Recorder
-from dva_sim.network.carriers import carrier_of
-from dva_sim.network.mqtt import open_broker
+from dva_sim.network.mqtt import MOST_WANTED, open_broker
 from dva_sim.network.mqtt_broker import new_client
 from dva_sim.network.real_network import NetworkError
 from dva_sim.protocol import messages as m
 from dva_sim.simulation import scenario as scenarios
 from dva_sim.simulation.full import stage as stages
 from dva_sim.simulation.full.stage import Stage, id_of
+
+pytestmark = pytest.mark.system
+if NO_MQTT:
+    pytest.skip(NO_MQTT, allow_module_level=True)
 
 STRANGER = "02:00:00:00:00:99"
 
@@ -71,7 +73,6 @@ class Outsider:
         self.client.loop_stop()
 
 
-@pytest.mark.system
 @pytest.mark.parametrize(
     "topic",
     [f"request/{PLAIN}/{PHONE}", f"reply/{PHONE}/{PLAIN}", f"news/{PHONE}/x|", f"gone/{PHONE}"],
@@ -88,7 +89,6 @@ def test_who_publishes_for_somebody_else_is_refused_by_the_broker(world, topic):
     assert heard == []  # its reply would have gone where the sender may not read
 
 
-@pytest.mark.system
 def test_a_client_reads_publications_and_nothing_that_is_for_others(world):
     world.serve(PLAIN, echo)
     with closing(Outsider(world, STRANGER)) as outsider:
@@ -101,7 +101,6 @@ def test_a_client_reads_publications_and_nothing_that_is_for_others(world):
     assert {topic.partition("/")[0] for topic in outsider.got} == {"news"}
 
 
-@pytest.mark.system
 def test_a_request_that_somebody_has_left_at_the_broker_is_not_obeyed(world):
     """It would come again with every connection, however old it is."""
     heard: list[bytes] = []
@@ -116,7 +115,6 @@ def test_a_request_that_somebody_has_left_at_the_broker_is_not_obeyed(world):
     assert heard == [b"old"]
 
 
-@pytest.mark.system
 def test_a_subscriber_that_ends_without_a_word_is_no_longer_wanted(world):
     outsider = Outsider(world, STRANGER)
     outsider.client.will_set(f"gone/{STRANGER}", b"")
@@ -128,7 +126,6 @@ def test_a_subscriber_that_ends_without_a_word_is_no_longer_wanted(world):
     outsider.close()
 
 
-@pytest.mark.system
 def test_who_takes_the_client_id_of_a_device_is_noticed(world):
     """Nothing keeps a client of this machine from it; SECURITY.md says what follows."""
     with closing(Outsider(world, PHONE)):
@@ -136,7 +133,6 @@ def test_who_takes_the_client_id_of_a_device_is_noticed(world):
     assert unnamed(world.said[0], PHONE) == []
 
 
-@pytest.mark.system
 def test_when_the_broker_is_back_everything_goes_on(world):
     world.serve(DVA, echo)
     listener = Listener(world, "news|")
@@ -171,7 +167,6 @@ def drives(_: ScriptedOperator) -> Script:
         yield Pause(0.02)
 
 
-@pytest.mark.system
 @pytest.mark.invariant("S1")
 def test_a_driven_robot_stands_when_its_broker_is_killed():
     scenario = scenarios.build(
@@ -197,50 +192,21 @@ def test_a_driven_robot_stands_when_its_broker_is_killed():
     assert unnamed(world.said[0], f"127.0.0.1:{world.port}") == []
 
 
-# --- what is missing ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("given", "names"),
-    [
-        (["udp"], ("udp", "zeromq", "mqtt")),
-        (["mqtt", "zeromq"], ("zeromq",)),
-        (["qos=1"], ("qos", "mqtt")),
-        (["mqtt", "qos=3"], ("qos", "3")),
-        (["mqtt", "broker=here"], ("broker", "near", "far")),
-        (["mqtt", "port=1"], ("port", "broker")),
-    ],
-)
-def test_a_carrier_that_cannot_be_is_refused_in_one_line(given, names):
-    with pytest.raises(ConfigError) as refused:
-        carrier_of(given)
-    assert unnamed(str(refused.value), "--transport", *names) == []
-
-
-def test_a_broker_has_no_keys_and_stays_on_this_machine():
-    mqtt = carrier_of(["mqtt"])
-    with pytest.raises(ConfigError, match="--keys"):
-        mqtt.check(["127.0.0.1"], has_keys=True)
-    with pytest.raises(ConfigError, match=r"192\.168\.1\.5"):
-        mqtt.check(["127.0.0.1", "192.168.1.5"], has_keys=False)
-    carrier_of([]).check(["192.168.1.5"], has_keys=True)
-
-
-def test_without_mosquitto_a_line_says_so(monkeypatch):
-    monkeypatch.setattr("dva_sim.network.middleware.ends.find_spec", lambda name: name)
-    monkeypatch.setenv("PATH", "")
-    with pytest.raises(ConfigError, match="mosquitto"):
-        carrier_of(["mqtt"]).check([], has_keys=False)
-
-
-def test_without_its_library_a_line_says_so(monkeypatch):
-    monkeypatch.setattr("dva_sim.network.middleware.ends.find_spec", lambda name: None)
-    with pytest.raises(ConfigError, match=r"dva-sim\[mqtt\]"):
-        carrier_of(["mqtt"]).check([], has_keys=False)
-
-
-@pytest.mark.system
 def test_a_port_that_is_taken_is_told_with_the_reason(world):
     with pytest.raises(NetworkError) as refused:
         open_broker("127.0.0.1", world.port)
     assert unnamed(str(refused.value), f"127.0.0.1:{world.port}") == []
+
+
+@pytest.mark.invariant("S10")
+def test_what_clients_want_of_a_device_is_bounded(world):
+    wanted = b"x" * (2 * MOST_WANTED // 3) + b"|\n"
+    outsiders = [Outsider(world, f"0A:00:00:00:00:0{number}") for number in range(3)]
+    for number, outsider in enumerate(outsiders):
+        outsider.publish(f"wants/{PHONE}/0A:00:00:00:00:0{number}", wanted, True)
+    Listener(world, "news|").await_a_mark()
+    for outsider in outsiders:
+        outsider.close()
+    known = world.network.node(PHONE)._wanted
+    assert sum(len(topic) for wants in known.values() for topic in wants) <= MOST_WANTED
+    assert not world.network.ready(PHONE, "frame|", 10)

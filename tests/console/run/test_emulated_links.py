@@ -7,6 +7,7 @@ from functools import partial
 import pytest
 from helpers.console.simulated_console import Page
 from helpers.network.emulated_link import need_link
+from helpers.network.transports import WITH_MQTT
 from helpers.processes.patience import PATIENCE_S
 from helpers.processes.programs import all_gone_after
 from helpers.wording import unnamed
@@ -17,19 +18,16 @@ from dva_sim.console.run.real_links import ConsoleSockets
 from dva_sim.network.carriers import carrier_of
 from dva_sim.network.emulator.needs import EmulatorError
 from dva_sim.network.emulator.process import LinkProcess
-from dva_sim.network.middleware.mqtt import MqttTransport
 
 QUIET = {"guard__count": 0, "bystander__count": 0}
+CARRIERS = [["zeromq"], *([kind, f"broker={end}"] for kind in WITH_MQTT for end in ("near", "far"))]
 EACH_WAY = 0.3  # [s]
 PARTITIONS = "link.partitions=[{from_s: 0, for_s: 1}]"
 
 
 def page_over(monkeypatch, transport=(), **link):
     need_link()
-    carrier = carrier_of(transport)
-    if carrier.is_mqtt and (missing := MqttTransport().lacks()):
-        pytest.skip(missing)
-    sockets = partial(ConsoleSockets, emulated=1, carrier=carrier)
+    sockets = partial(ConsoleSockets, emulated=1, carrier=carrier_of(transport))
     changes = {f"link__{key}": value for key, value in link.items()}
     page = Page(monkeypatch, sockets=sockets, **QUIET, **changes)
     page.world.clock.go()
@@ -56,7 +54,7 @@ def programs(tmp_path):
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("transport", [["zeromq"], ["mqtt"], ["mqtt", "broker=far"]])
+@pytest.mark.parametrize("transport", CARRIERS)
 def test_a_person_drives_over_the_link_and_sees_how_late_everything_is(monkeypatch, transport):
     page = page_over(monkeypatch, transport, delay_s=EACH_WAY)
     try:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
-import pytest
 import zmq
 from helpers.processes.patience import PATIENCE_S
 
@@ -55,6 +54,12 @@ VIRTUAL: dict[str, Callable[[], Connector]] = {
     "virtual datagrams": lambda: Connector("datagrams"),
 }
 """What carries messages in virtual time."""
+
+NO_MQTT = MqttTransport().lacks()
+"""A line that says what is missing for MQTT; empty where nothing is."""
+
+WITH_MQTT = () if NO_MQTT else ("mqtt",)
+"""A further case for tests of everything real; test_mqtt.py says once where there is none."""
 
 LOSSY = "virtual segments with loss"  # what is promised, TCP keeps through losses
 
@@ -188,11 +193,9 @@ class SocketWorld(World):
 
 
 class MqttWorld(World):
-    """Clients of a broker on this machine, in real time; skipped where there can be none."""
+    """Clients of a broker on this machine, in real time."""
 
     def __init__(self, nodes: Sequence[str] = NODES) -> None:
-        if missing := MqttTransport().lacks():
-            pytest.skip(missing)
         self.said, self.port = list[str](), free_port(LOCALHOST)
         self.broker = open_broker(LOCALHOST, self.port)
         address = f"{LOCALHOST}:{self.port}"

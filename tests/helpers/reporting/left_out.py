@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 MOST_SKIPPED = 40
-"""On Linux, where all is installed; 17 of them without an emulated link."""
+"""On Linux, where all is installed; 29 of them without an emulated link."""
 
 VERB = {"browser": "make test-browser", "soak": "make test-long", "system": "make test-system"}
 
