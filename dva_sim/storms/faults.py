@@ -16,7 +16,7 @@ from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.storms import interference as i
 from dva_sim.storms.plan import Fault
-from dva_sim.storms.scene import StormScene, StormRobot
+from dva_sim.storms.scene import StormRobot, StormScene
 
 End = Callable[[], object]
 Begin = Callable[[StormScene, Fault, random.Random], End | None]
