@@ -58,7 +58,7 @@ def draw(seed: int, profile: str = "all") -> StormPlan:
 
 
 def _scenario(chance: random.Random) -> dict[str, Any]:
-    robots, guards = chance.choice((2, 2, 3, 4, 6)), chance.choice((1, 1, 2, 4))
+    robots, guards = chance.choice((2, 2, 3, 4, 6)), chance.choice((0, 0, 1, 2))
     return {
         "site": _site(chance),
         "robot": {"count": robots, "watchdog_s": chance.choice((1.0, 3.0, 3.0))},
@@ -78,14 +78,14 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
         "dva": {"sensors": chance.choice(([], [], [], ["temperature", "smoke"]))},
         "dispatch": {
             "policy": chance.choice(sorted(POLICIES.keys() - {"oracle"})),
-            "containment": chance.random() < 0.5,
+            "containment": guards > 0 and chance.random() < 0.5,
             "escalate_after_s": chance.choice((30.0, 120.0)),
             "order_limit_s": 300.0,
             "depart_within_s": 60.0,
             "mode": chance.choice(("automatic", "automatic", "ask_first")),
             "decide_within_s": 10.0,
         },
-        "events": [_event(chance, number) for number in range(chance.randint(2, 8))],
+        "events": [_event(chance, number) for number in range(chance.randint(4, 12))],
     }
 
 
@@ -153,7 +153,7 @@ def _duration(chance: random.Random, kind: FaultKind) -> float:
 
 def _device(chance: random.Random, kinds: tuple[str, ...], scenario: dict[str, Any]) -> str:
     """Draw a device of some kinds, by label."""
-    kind = chance.choice(kinds)
+    kind = chance.choice([k for k in kinds if k != "guard" or scenario["guard"]["count"]])
     if kind in ("", "dva"):
         return kind
     return f"{kind}-{chance.randint(1, scenario[kind]['count'])}"
