@@ -14,7 +14,7 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.resources import refuse_to_replace
 from dva_sim.live.open_files import check_room_for
 from dva_sim.network.addresses import check_address
-from dva_sim.network.carriers import Carrier, carrier_of
+from dva_sim.network.carriers import RunCarrier, carrier_of
 from dva_sim.network.emulator.forwarder import links_of
 from dva_sim.network.link import LinkConfig
 from dva_sim.network.link.files import read_link
@@ -71,7 +71,7 @@ class LiveOptions:
     transport: tuple[str, ...] = ()
 
     @property
-    def carrier(self) -> Carrier:
+    def carrier(self) -> RunCarrier:
         """What carries the messages.
 
         Raises:

@@ -43,7 +43,7 @@ class MqttOptions(Config):
 
 
 @dataclass(frozen=True)
-class Carrier:
+class RunCarrier:
     """What carries the messages of a run's nodes.
 
     Attributes:
@@ -116,7 +116,7 @@ class Carrier:
             raise ConfigError(missing)
 
 
-def carrier_of(given: Sequence[str]) -> Carrier:
+def carrier_of(given: Sequence[str]) -> RunCarrier:
     """Read a carrier as it is given on the command line: its name, and `KEY=VALUE` of its own.
 
     Raises:
@@ -133,7 +133,7 @@ def carrier_of(given: Sequence[str]) -> Carrier:
         mqtt = build(MqttOptions, {}, parse_changes(options), lambda built, _: built)
     except ConfigError as error:
         raise ConfigError(f"{OPTION} {error.problem.removeprefix('--set ')}") from None
-    return Carrier(names[0] if names else ZEROMQ, mqtt)
+    return RunCarrier(names[0] if names else ZEROMQ, mqtt)
 
 
 def free_port(host: str) -> int:

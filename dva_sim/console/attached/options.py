@@ -13,7 +13,7 @@ from dva_sim.console.pages.page_options import PageOptions
 from dva_sim.kernel.config_overrides import parse_changes
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.network.addresses import check_address
-from dva_sim.network.carriers import Carrier, carrier_of
+from dva_sim.network.carriers import RunCarrier, carrier_of
 from dva_sim.network.keys import KeyRing
 from dva_sim.network.sockets import split_address
 from dva_sim.simulation.full.stage import id_of, kind_of
@@ -45,7 +45,7 @@ class AttachOptions(PageOptions):
     transport: tuple[str, ...] = ()
 
     @property
-    def carrier(self) -> Carrier:
+    def carrier(self) -> RunCarrier:
         """What carries the DVA's messages.
 
         Raises:

@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from dva_sim.console.run.recorder import ConsoleRecorder
 from dva_sim.kernel.clock import Clock
-from dva_sim.network.carriers import Carrier, free_port
+from dva_sim.network.carriers import RunCarrier, free_port
 from dva_sim.network.emulator.crossing import CrossedLink
 from dva_sim.network.emulator.forwarder import FAR, NEAR
 from dva_sim.network.emulator.report import LinkReport
@@ -109,12 +109,12 @@ class ConsoleSockets:
         host: str = "127.0.0.1",
         port: int = 0,
         ring: KeyRing | None = None,
-        carrier: Carrier | None = None,
+        carrier: RunCarrier | None = None,
         emulated: int | None = None,
     ) -> None:
         self._clock, self._recorder, self._host, self._port = clock, recorder, host, port
         self.dva, self.packets = "", None
-        carrier, broker, self._broker = carrier or Carrier(), "", None
+        carrier, broker, self._broker = carrier or RunCarrier(), "", None
         crossing = None if emulated is None else RobotCrossing(scenario.link, emulated)
         self.crossing = crossing
         ways = None
