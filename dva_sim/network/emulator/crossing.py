@@ -12,7 +12,7 @@ import asyncio
 import socket
 import subprocess
 import sys
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -45,12 +45,16 @@ class CrossedLink:
     """
 
     def __init__(self, config: LinkConfig, seed: int) -> None:
-        self._folder = TemporaryDirectory(prefix="dva-sim-")
-        if len(self._folder.name) > _LONGEST:
-            raise EmulatorError(
-                f"{self._folder.name} is too long for names of sockets; set TMPDIR to a shorter one"
-            )
-        self._link = LinkProcess(config, seed)
+        with ExitStack() as undone:
+            self._folder = TemporaryDirectory(prefix="dva-sim-")
+            undone.callback(self._folder.cleanup)
+            if len(self._folder.name) > _LONGEST:
+                raise EmulatorError(
+                    f"{self._folder.name} is too long for names of sockets; set TMPDIR to a "
+                    "shorter one"
+                )
+            self._link = LinkProcess(config, seed)
+            undone.pop_all()
         self._controls: dict[str, socket.socket] = {}  # of the relays, by end
         self._relays = {end: self._started(end) for end in ENDS}
         self._led: set[tuple[str, int]] = set()
