@@ -288,7 +288,7 @@ def _beside(asked: str, quick: bool, workers: int) -> ValidationResult:
     with _bar() as bar:
         task = bar.add_task("runs of the model")
         found = beside_measured.beside_of(
-            beside_measured.asked_by(study),
+            beside_measured.asked_by(study, results),
             None if results is None else beside_measured.measured_in(results),
             plays,
             workers,

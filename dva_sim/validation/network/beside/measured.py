@@ -28,8 +28,12 @@ MIN_INSIDE: Final = 0.90  # share of the rows that are judged
 BesideWord = Literal["inside", "outside", "predicted", "not predicted", "not judged"]
 
 
-def asked_by(study: Study) -> list[AskedCell]:
+def asked_by(study: Study, results: Results | None = None) -> list[AskedCell]:
     """The middleware configurations of a study, with the seeds of their runs.
+
+    Args:
+        study: What is asked.
+        results: Those of the study, whose scenarios may have been others.
 
     Raises:
         ConfigError: there is none, or a file that the study names cannot be read.
@@ -38,16 +42,15 @@ def asked_by(study: Study) -> list[AskedCell]:
     seeds: dict[str, dict[int, None]] = {}
     for job in jobs(study, grid):
         seeds.setdefault(job.config, {})[job.seed] = None
-    found = {
-        cell.config: AskedCell(
-            cell.config,
-            {factor: str(level) for factor, level in cell.levels},
-            cell.scenario,
-            tuple(seeds[cell.config]),
-        )
-        for cell in grid
-        if isinstance(cell.scenario, MiddlewareScenario)
-    }
+    rows = [] if results is None else results.manifest["cells"]
+    as_run = {(row["part"], row["cell"]): str(row["config"]) for row in rows}
+    found = {}
+    for cell in grid:
+        if isinstance(cell.scenario, MiddlewareScenario):
+            config = as_run.get((cell.part, cell.index), cell.config)
+            levels = {factor: str(level) for factor, level in cell.levels}
+            scenario = cell.scenario if config == cell.config else None
+            found[config] = AskedCell(config, levels, scenario, tuple(seeds[cell.config]))
     if not found:
         raise ConfigError("the study has no part whose model is middleware")
     return list(found.values())

@@ -100,16 +100,25 @@ class CellPrediction:
 
 @dataclass(frozen=True)
 class AskedCell:
-    """One configuration to predict: its place in the study, its scenario, and its seeds."""
+    """One configuration to predict.
+
+    Attributes:
+        config: Its hash.
+        levels: Its level of each factor.
+        scenario: What is run; None if it was run with another one than there is today.
+        seeds: Random seeds of the study's runs.
+    """
 
     config: str
     levels: Mapping[str, str]
-    scenario: MiddlewareScenario
+    scenario: MiddlewareScenario | None
     seeds: tuple[int, ...]
 
     @property
     def why_not(self) -> str:
         """Why the model says nothing of it; empty if it does."""
+        if self.scenario is None:
+            return "its scenario has changed since it was run"
         choice = self.scenario.transport
         return why_not(load_transport(choice.name, choice.options)())
 
@@ -157,6 +166,7 @@ def perform(job: StudyJob) -> Tables:
 
 
 def _bands(cell: AskedCell, by_seed: Sequence[Sequence[Row]]) -> dict[str, PredictedBand]:
+    assert cell.scenario is not None
     rng = np.random.default_rng(derive_seed("bands", cell.config))
     plays, seeds = len(by_seed[0]), range(len(by_seed))
     drawn = rng.integers(plays, size=(DRAWS, len(by_seed)))

@@ -151,6 +151,20 @@ def test_kept_bands_are_taken_before_any_are_made(results, monkeypatch):
     assert {row.band for row in found.rows} == {PredictedBand(1, 2, 3)}
 
 
+def test_runs_of_a_scenario_that_is_another_one_today_are_not_predicted_anew(results):
+    made = Results.load(results())
+    runs = measured_in(made)
+    for row in made.manifest["cells"]:
+        row["config"] = f"old-{row['config']}"
+    old = {f"old-{config}": each for config, each in runs.items()}
+    asked = asked_by(load_study("study.yaml"), made)
+    assert {cell.config for cell in asked} == set(old)
+    rows = beside_of(asked, old, 1, 1).rows
+    assert {row.word for row in rows} == {"not predicted"}
+    assert unnamed(rows[0].why, "scenario has changed") == []
+    assert len(rows[0].values) == 3
+
+
 @pytest.mark.parametrize(
     ("values", "word"),
     [([2.0, 3.0, 9.0], "inside"), ([2.0, 3.1, 9.0], "outside"), ([3.1, 3.1], "not judged")],
