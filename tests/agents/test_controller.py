@@ -177,6 +177,17 @@ def test_a_grant_that_the_dva_does_not_confirm_changes_nothing(driven, session):
 
 
 @pytest.mark.invariant("S3")
+def test_a_command_queued_before_an_emergency_does_not_move_a_drive_started_after_it(driven):
+    """A start that is overtaken by the commands behind it makes their numbers no older."""
+    driven.say(ANA, m.Emergency(), now=2.0)
+    assert driven.say(ANA, m.StartTeleOp(), now=2.2, number=10).code == m.OK
+    late = driven.say(ANA, m.SetTeleOp(0.4, 0.0), now=2.3, arrived=1.9, number=11)
+    assert late.code == m.STALE
+    assert late.set_point is None
+    assert driven.say(ANA, m.SetTeleOp(0.4, 0.0), now=2.4, number=12).code == m.OK
+
+
+@pytest.mark.invariant("S3")
 @pytest.mark.parametrize("source", [ANA, RUI, DVA])
 def test_an_emergency_stops_whoever_sends_it_and_nothing_earlier_moves_it(driven, source):
     driven.say(ANA, m.SetTeleOp(0.5, 0.0), now=1.0)

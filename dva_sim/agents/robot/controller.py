@@ -465,6 +465,8 @@ class RobotController:
         if message.message_id <= self.last_set_id:
             return Decision(m.OUT_OF_ORDER, "a newer command was received before")
         self.last_set_id = message.message_id
+        if arrived <= self.emergency_at:  # a start that it had overtaken has been accepted since
+            return Decision(m.STALE, "sent before the emergency")
         until = arrived + self.limits.watchdog
         if body.seen_tick is None:
             self.without_tick += 1
