@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Final
@@ -88,7 +89,7 @@ class Shrinker:
                 break
         for kind in ("robot", "guard", "operator"):
             named = [f.target for f in self.plan.faults] + [f.source for f in self.plan.faults]
-            numbers = [int(n.rpartition("-")[2]) for n in named if n.startswith(kind + "-")]
+            numbers = [int(n[len(kind) + 1 :]) for n in named if re.fullmatch(rf"{kind}-\d+", n)]
             for count in range(max([1, *numbers]), self.plan.scenario[kind]["count"]):
                 before = self.plan
                 yield self._with(kind, {**self.plan.scenario[kind], "count": count})

@@ -63,7 +63,7 @@ def test_a_bug_that_does_nothing_is_not_found(monkeypatch):
 EMERGENCY = Fault("emergency", 20.0, target="robot-*", on="SetTeleOp")
 OTHERS = (
     Fault("clock-drifts", 16.0, 5.0, "robot-1"),
-    Fault("messages-doubled", 17.0, 5.0, "guard-1", value=0.2),
+    Fault("messages-doubled", 17.0, 5.0, "operator-1", value=0.2),
     Fault("asks-twice", 30.0, 0.0, "operator-1", value=1.0),
 )
 

@@ -19,7 +19,7 @@ FOUND = sorted((Path(__file__).parent / "found").glob("*.yaml"))
 SMALL: dict[str, Any] = {
     "robot": {"count": 1},
     "operator": {"count": 1},
-    "guard": {"count": 1, "mobilisation_s": 60},
+    "guard": {"count": 0},
     "link": {"delay_s": 0.05},
     "camera": {"rate_hz": 2, "frame_bytes": 4000},
     "events": [{"kind": "flood", "at_s": 5, "reported": True}],
@@ -27,7 +27,7 @@ SMALL: dict[str, Any] = {
 
 
 def small(*faults: Fault, calm: float = 60.0) -> StormPlan:
-    """A storm of one robot, one operator and one guard."""
+    """A storm of one robot and one operator."""
     return StormPlan(1, SMALL, faults, calm)
 
 

@@ -246,7 +246,7 @@ class Sender:
         if end - start < self._options.mss:
             self._small_end = end
         charge = self.buffer.depart(end - start)
-        sent = SentSegment(start, end, now, charge, not self.buffer.is_cut)
+        sent = SentSegment(start, end, now, charge, pushes=not self.buffer.is_cut)
         self.board.queue.append(sent)
         self._leave(sent, now)
 
