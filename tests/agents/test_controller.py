@@ -176,6 +176,13 @@ def test_a_grant_that_the_dva_does_not_confirm_changes_nothing(driven, session):
     assert driven.say(ANA, m.SetTeleOp(0.4, 0.0)).code == m.OK
 
 
+@pytest.mark.invariant("S1")
+def test_a_robot_whose_computer_hung_is_stopped_by_its_driver(driven):
+    """Its motors may still have the last command, until the watchdog ends that."""
+    driven.robot.hang()
+    assert driven.say(ANA, m.StopTeleOp()).set_point == STAND
+
+
 @pytest.mark.invariant("S3")
 def test_a_command_queued_before_an_emergency_does_not_move_a_drive_started_after_it(driven):
     """A start that is overtaken by the commands behind it makes their numbers no older."""

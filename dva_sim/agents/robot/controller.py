@@ -487,6 +487,9 @@ class RobotController:
         refusal = self._refusal(message, "teleoperation") or self._order(message)
         if refusal is not None:
             return refusal
+        if self.mode is IDLE and self.by_hand is None:
+            # After its computer hung, its motors may still have what they were told before.
+            return Decision(m.OK, "not in teleoperation", STAND)
         if self.mode is not TELEOPERATION:
             return Decision(m.OK, "not in teleoperation")
         self._idle("")
