@@ -67,7 +67,7 @@ test-soak: $(DEV)  ## the same and all searches with 20 times as many cases, new
 storms: $(RUNTIME)  ## a hundred hours of a team in which much goes wrong; goes on where it stopped
 	@$(BIN)/dva-sim storm --hours $(or $(HOURS),100) -o results/storms
 
-tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript
+tools: $(DEV)  ## what some tests need besides Python: Chromium, node, TypeScript, Spin
 	@tests/install_tools.sh $(VENV)
 
 check: $(DEV)  ## lint, format, types, import contracts

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What some tests need besides Python, where it is missing: a browser, node and its packages.
+# What some tests need besides Python, where it is missing: a browser, node, a model checker.
 # `tests/install_tools.sh FOLDER` keeps those packages in FOLDER/node_modules.
 set -euo pipefail
 folder=$1
@@ -10,6 +10,8 @@ missing=()
 installed chromium || installed chromium-browser || installed google-chrome || missing+=(chromium)
 installed node || missing+=(nodejs)
 installed npm || missing+=(npm)
+installed spin || missing+=(spin)
+installed cc || missing+=(gcc libc6-dev)
 if ((${#missing[@]})); then
   if ! installed apt-get; then
     echo "please install: ${missing[*]}" >&2

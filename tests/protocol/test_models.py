@@ -13,7 +13,7 @@ from dva_sim.agents.robot.controller import RobotController
 MODEL = ROOT / "protocol" / "models" / "teleop.pml"
 MISSING = [name for name in ("spin", "cc") if shutil.which(name) is None]
 needs_spin = pytest.mark.skipif(
-    bool(MISSING), reason=f"{' and '.join(MISSING)} missing: apt-get install spin gcc"
+    bool(MISSING), reason=f"{' and '.join(MISSING)} missing: make tools"
 )
 
 ORDER = "SESSIONS=1", "LETTERS=2"
