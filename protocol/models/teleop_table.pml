@@ -12,7 +12,7 @@ inline decide() {
   :: state == FREE && message == ANSWER && !somebody -> accept()
   :: state == HELD && message == START && right && newer && still && later -> accept(); count_order(); count_set(); drive(); stand(); heard()
   :: state == HELD && message == START && !right -> ask()
-  :: state == HELD && message == STOP && right && newer -> accept(); count_order()
+  :: state == HELD && message == STOP && right && newer -> accept(); count_order(); stand()
   :: state == HELD && message == EMERGENCY -> accept(); stand(); latch()
   :: state == HELD && message == GRANT && right -> accept()
   :: state == HELD && message == GRANT && !right -> accept(); ask()
