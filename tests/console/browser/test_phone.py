@@ -201,7 +201,7 @@ def test_an_emergency_stop_is_asked_for_again_in_red_until_it_is_confirmed(hand)
     hand.page.evaluate("() => { window.fetch = window.usual; }")
     expect(hand.page.get_by_text("not confirmed")).to_have_count(0)
     hand.page.evaluate("window.hangs = false")
-    assert not driving(hand)
+    assert becomes(lambda: not driving(hand))
 
 
 def test_each_step_opens_the_next_and_wrong_fields_are_marked(hand):

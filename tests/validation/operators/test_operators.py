@@ -73,7 +73,7 @@ def test_an_unknown_strategy_is_refused_before_anything_is_played(monkeypatch):
         ("operators", {"case_file": "mine.yaml"}, "--cases .*`validate dispatch`"),
         ("dispatch", {"strategy": "pursuit"}, "--strategy .*`validate operators`"),
         ("network", {"strategy": "adaptive"}, "--strategy .*`validate operators`"),
-        ("dispatch", {"ablate": True}, "--ablate, --live and --measure"),
+        ("dispatch", {"ablate": True}, "--ablate, --live, --measure and --beside"),
     ],
 )
 def test_what_does_not_belong_together_is_refused(what, options, words):
