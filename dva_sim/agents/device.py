@@ -154,8 +154,8 @@ class AgentDevice:
             requester.close()
         self._requesters.clear()
 
-    def start_anew(self) -> None:
-        """Be the same device in a new process: it numbers from 1 and has answered nobody yet."""
+    def restart(self) -> None:
+        """Continue as the same device in a new process, which numbers from 1."""
         self.crash()
         self.outbox = Outbox(self.id_tag, *self.time_of_day)
         self._replies, self._nuisances = ReplyCache(), Nuisances()

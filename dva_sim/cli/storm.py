@@ -71,7 +71,7 @@ def storm(
     if plan is not None:
         raise typer.Exit(_replay(load_plan(plan)))
     first, last = _range(seeds)
-    draw(first, profile)  # an unknown profile is told before anything starts
+    draw(first, profile)  # an unknown profile is refused before anything starts
     if mutants:
         raise typer.Exit(_hunt(mutants, range(first, last + 1), profile))
     out.mkdir(parents=True, exist_ok=True)

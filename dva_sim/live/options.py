@@ -72,7 +72,7 @@ class LiveOptions:
 
     @property
     def carrier(self) -> RunCarrier:
-        """What carries the messages.
+        """Transport of the run.
 
         Raises:
             ConfigError: it is not given as it should be.

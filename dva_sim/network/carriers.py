@@ -31,7 +31,7 @@ LOCALHOST: Final = "127.0.0.1"
 
 
 class MqttOptions(Config):
-    """What MQTT can be given.
+    """Options of MQTT.
 
     Attributes:
         broker: The end of the link at which the broker is: the DVA's, or the robots'.
@@ -44,7 +44,7 @@ class MqttOptions(Config):
 
 @dataclass(frozen=True)
 class RunCarrier:
-    """What carries the messages of a run's nodes.
+    """Transport that carries the messages of a run.
 
     Attributes:
         name: ZeroMQ, or MQTT.
@@ -56,7 +56,7 @@ class RunCarrier:
 
     @property
     def is_mqtt(self) -> bool:
-        """Whether there is a broker."""
+        """Return True for MQTT, which needs a broker."""
         return self.name == MQTT
 
     @property

@@ -95,7 +95,7 @@ class Broker:
 
     @property
     def has_ended(self) -> bool:
-        """Whether it has ended by itself."""
+        """Return True if it has ended by itself."""
         return self._process.poll() is not None
 
     def wait(self) -> None:

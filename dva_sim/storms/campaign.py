@@ -25,12 +25,12 @@ LOOK_EVERY = 1.0  # after the processes [s]
 
 @dataclass
 class StormTally:
-    """What many storms add up to.
+    """Totals of many storms.
 
     Attributes:
         storms: Number of storms.
         hours: Simulated time of one team each [h].
-        cpu_s: What they cost [s].
+        cpu_s: CPU time [s].
         faults: Number of faults by kind.
         messages: Number of messages that faults have touched, by kind.
         failures: Seeds of the storms that broke a rule, with the rules.

@@ -1,4 +1,4 @@
-"""The lives of a DVA that is killed and started anew from its memory."""
+"""A DVA that is killed and restarted from its memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Killed(BaseException):
 
 
 class DvaLives:
-    """Kills the DVA of a run, and starts it anew.
+    """Kills and restarts the DVA of a run.
 
     Args:
         file: Its memory.

@@ -29,7 +29,7 @@ HAND: Final = "somebody at the robot"
 
 @dataclass(frozen=True)
 class FaultKind:
-    """What can go wrong.
+    """One kind of fault.
 
     Attributes:
         words: Description for people.
@@ -152,13 +152,13 @@ def _hang(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _restart(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    _start_anew(storm, storm.robot(fault.target), chance)
+    _restart_program(storm, storm.robot(fault.target), chance)
 
 
-def _start_anew(storm: StormScene, robot: StormRobot, chance: random.Random) -> None:
+def _restart_program(storm: StormScene, robot: StormRobot, chance: random.Random) -> None:
     """Restart the program of a robot, whose clock is another one then."""
     storm.run.deafened(robot.id, True)
-    robot.agent.start_anew(chance.uniform(0.0, 1e5))
+    robot.agent.restart(chance.uniform(0.0, 1e5))
     storm.run.deafened(robot.id, False)
 
 
@@ -170,7 +170,7 @@ def _power(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     def ends() -> None:
         robot.agent.drained = False
         robot.agent.power(True)
-        _start_anew(storm, robot, chance)
+        _restart_program(storm, robot, chance)
 
     return ends
 
@@ -304,7 +304,7 @@ def _give_back(storm: StormScene, device: AgentDevice, held: m.PermissionRevocat
 def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An operator asks for a robot in the midst of whatever it does, more than once.
 
-    What it gets so it gives back, whether it drives by that or not.
+    It gives back every permission that it gets, even one that it drives by.
     """
     device, robot = storm.device(fault.target), chance.choice(storm.robots)
 
@@ -451,7 +451,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
         weight=2.0,
     ),
     "robot-restarts": FaultKind(
-        "a robot's program starts anew", ("robot",), _restart, on=ON_DRIVING, weight=2.0
+        "a robot's program restarts", ("robot",), _restart, on=ON_DRIVING, weight=2.0
     ),
     "robot-without-power": FaultKind(
         "a robot's battery is empty, and is exchanged",

@@ -19,7 +19,7 @@ class Hunt:
         storms: Number of storms played.
         rules: Rules that were broken when it was found; none: it was not.
         acts: How often it has done the wrong thing.
-        first: What it did first.
+        first: Description of the first time.
     """
 
     mutant: str

@@ -34,7 +34,7 @@ class Bug:
     Attributes:
         name: Its name.
         acts: How often it has done the wrong thing.
-        first: What it did first.
+        first: Description of the first time.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Mutant:
 
     Attributes:
         rule: The rule that it breaks first.
-        words: What is wrong.
+        words: Description of the bug.
         place: Module and function, such as `dva_sim.core.orders:Orders.found`.
         make: Makes the wrong function from the right one.
     """
@@ -313,7 +313,7 @@ def _keeps_grant_over_restart(original: Original, bug: Bug) -> Original:
         kept = self.grant, self.last_order_id, self.last_set_id, self._numbered
         original(self, clock_offset)
         if kept[0] is not None:
-            bug.act(f"{self.id_tag} starts anew and is still held by {kept[0].holder}")
+            bug.act(f"{self.id_tag} restarts and is still held by {kept[0].holder}")
         self.grant, self.last_order_id, self.last_set_id, self._numbered = kept
         self.mode = Mode.TELEOPERATION if kept[0] is not None else self.mode
         self.owner = kept[0].holder if kept[0] is not None else None
@@ -388,7 +388,7 @@ def _resets_timer(original: Original, bug: Bug) -> Original:
 
 
 def _says_before_keeping(original: Original, bug: Bug) -> Original:
-    """What was promised is written down a second later, if the DVA lives by then."""
+    """The DVA writes its promises down five seconds late, if it is still alive."""
 
     def wrong(self: Any) -> Any:
         clock = self.device.clock
@@ -428,7 +428,7 @@ def _writes_half(original: Original, bug: Bug) -> Original:
 
 
 def _loses_open(original: Original, bug: Bug) -> Original:
-    """A DVA that starts anew has forgotten every second open event."""
+    """A restarted DVA has forgotten every second open event."""
 
     def wrong(self: Any, dva: Any, now: float) -> Any:
         found = original(self, dva, now)
@@ -617,8 +617,8 @@ MUTANTS: Final[dict[str, Mutant]] = {
     ),
     "grant-kept-over-restart": Mutant(
         "S1",
-        "a robot that starts anew is still driven",
-        f"{_ROBOT}.start_anew",
+        "a restarted robot is still driven",
+        f"{_ROBOT}.restart",
         _keeps_grant_over_restart,
     ),
     "timer-reset-by-reports": Mutant(
@@ -659,7 +659,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
     ),
     "events-lost-in-a-restart": Mutant(
         "S6",
-        "a DVA that starts anew forgets open events",
+        "a restarted DVA forgets open events",
         "dva_sim.core.store:Store._recall",
         _loses_open,
     ),
@@ -687,7 +687,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "stays-silent": Mutant(
         "S8",
         "a restarted program says nothing",
-        "dva_sim.agents.device:AgentDevice.start_anew",
+        "dva_sim.agents.device:AgentDevice.restart",
         lambda original, bug: _stays_silent(original, bug),
     ),
     "question-lost": Mutant(

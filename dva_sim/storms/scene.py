@@ -43,7 +43,7 @@ class StormScene:
         recorder: What happened.
         interference: What reaches whom.
         intruder: Does what no honest device does.
-        dva: Kills the DVA, and starts it anew.
+        dva: Kills and restarts the DVA.
         robots: All robots.
         labelled: Ids by label.
     """

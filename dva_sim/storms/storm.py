@@ -38,7 +38,7 @@ SILENCED = frozenset(
 
 @dataclass
 class StormOutcome:
-    """What a storm was, and what broke.
+    """Outcome of a storm: its size, and the rules that broke.
 
     Attributes:
         seed: Of the storm.

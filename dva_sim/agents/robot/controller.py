@@ -208,14 +208,14 @@ class RobotController:
         """Its computer hangs, and starts anew idle: an order that was under way is given up."""
         self._idle("its computer hung")
 
-    def start_anew(self, clock_offset: float) -> None:
-        """Begin as a program that was started anew: idle, and with nobody known who may act.
+    def restart(self, clock_offset: float) -> None:
+        """Begin again as after a restart of the program: idle, and with no known holder.
 
         Args:
             clock_offset: What its clock shows at the run's start from now on [s].
         """
         self._idle("its computer was restarted")
-        self.inquiry.start_anew()
+        self.inquiry.restart()
         self.grant, self.clock_offset = None, clock_offset
         self.observers.clear()
         self.last_order_id = self.last_set_id = self._numbered = 0

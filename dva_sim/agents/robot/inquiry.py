@@ -46,8 +46,8 @@ class Inquiry:
         """True while the question who holds the robot is open or under way."""
         return self._holder or (self.asked is not None and self.asked.level is None)
 
-    def start_anew(self) -> None:
-        """Forget every question, as a program that was started anew."""
+    def restart(self) -> None:
+        """Forget every question."""
         fresh = Inquiry()
         for name in vars(self):
             setattr(self, name, getattr(fresh, name))

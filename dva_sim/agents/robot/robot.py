@@ -235,15 +235,15 @@ class RobotAgent:
         if self.controller.mode is not before:
             self.mode_changed("")
 
-    def start_anew(self, clock_offset: float) -> None:
-        """Restart its program: it has forgotten its driver, and registers again.
+    def restart(self, clock_offset: float) -> None:
+        """Restart the program: it forgets its driver and registers again.
 
         Args:
-            clock_offset: See `RobotController.start_anew`.
+            clock_offset: See `RobotController.restart`.
         """
         self.hang()
-        self.controller.start_anew(clock_offset)
-        self.device.start_anew()
+        self.controller.restart(clock_offset)
+        self.device.restart()
         self.device.register()
         self.device.connect(self.device.dva)
 

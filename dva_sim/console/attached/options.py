@@ -46,7 +46,7 @@ class AttachOptions(PageOptions):
 
     @property
     def carrier(self) -> RunCarrier:
-        """What carries the DVA's messages.
+        """Transport to the DVA.
 
         Raises:
             ConfigError: it is not given as it should be.

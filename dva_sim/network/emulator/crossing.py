@@ -87,7 +87,7 @@ class CrossedLink:
 
     @property
     def has_ended(self) -> bool:
-        """Whether the link, or a relay, has ended by itself."""
+        """Return True if the link or a relay has ended by itself."""
         return self._link.has_ended or any(r.poll() is not None for r in self._relays.values())
 
     def report(self) -> LinkReport | None:
