@@ -7,6 +7,7 @@ page of its own, derived from it (`model_pages`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 from dva_sim.experiments.analysis.answer import Answer, Finding
@@ -50,7 +51,7 @@ class ModelPage:
 
     def told(self, finding: Finding) -> Finding:
         """The finding in the words of this page."""
-        return finding
+        return replace(finding, cluster=self.cluster)
 
     def answer(self, finding: Finding | None) -> Answer:
         """What a reader should take home."""
@@ -59,7 +60,7 @@ class ModelPage:
                 "The contrast that would answer the question was not declared or not run; "
                 "the figures and the table show what was."
             )
-        return answer(finding)
+        return answer(self.told(finding))
 
     def cells(self, part: RunGrid) -> CellTable | None:
         """Every cell of a part, where the page has a table of its own for it."""

@@ -35,6 +35,7 @@ _TITLE = 78  # characters of a title that the width holds
 _CROWDED = 45  # characters of ticks that fit beside each other in the width
 _DECADES = 5e3  # of the ends of a logarithmic axis, from which on 2 and 5 have no room
 _LEAST_TICK = 8  # characters of a tick's name in a line
+_MOST_UPRIGHT = 7  # names of levels side by side; more are turned
 _ROW_LABEL = 28  # characters that the height of a row holds
 ASIDE = "_aside"  # label of what is drawn but is no result: the site, a scale, a heading
 LEAST_WORDS = 6.0  # [pt] in this width
@@ -201,7 +202,10 @@ def stops_axis(axes: Axes, over: Factor | None) -> None:
         return
     names, unit = tick_names(over)
     narrow = max(_LEAST_TICK, _TITLE // len(names))
-    axes.set_xticks(range(len(names)), [wrapped(name, narrow) for name in names])
+    if over.is_numeric or len(names) <= _MOST_UPRIGHT:
+        axes.set_xticks(range(len(names)), [wrapped(name, narrow) for name in names])
+    else:
+        axes.set_xticks(range(len(names)), names, rotation=30, ha="right", rotation_mode="anchor")
     axes.set_xlabel(_factor_label(over, unit))
     axes.set_xlim(-0.5, len(names) - 0.5)
     if not over.is_numeric:
