@@ -12,7 +12,7 @@ import { engaged, interrupt, interrupted, watchInterruptions } from '../drive/ho
 import { choices } from './choices.js';
 import { keepAwake, vibrate } from './feel.js';
 import { screen } from './screens.js';
-import { ask as askSensor, isIos, lastHeard, state as sensor } from './sensor.js';
+import { ask as askSensor, countSilence, isIos, silentFor, state as sensor } from './sensor.js';
 
 const SILENT_MS = 300;
 const LOOK_MS = 50;
@@ -124,11 +124,12 @@ export function keepDriveInHand() {
 
 /** Who tilts a phone whose sensor says nothing steers nothing. */
 function watchSensor() {
+  countSilence(LOOK_MS);
   if (engaged.peek() && tilts.peek() && isSilent()) interrupt('The sensor was silent.');
 }
 
-const isSilent = () => performance.now() - lastHeard() > SILENT_MS;
-const silentText = () => `${((performance.now() - lastHeard()) / 1000).toFixed(1)} s`;
+const isSilent = () => silentFor() > SILENT_MS;
+const silentText = () => `${(silentFor() / 1000).toFixed(1)} s`;
 
 /** Outside of the effect that notices it. @param {string} why */
 const end = (why) => queueMicrotask(() => interrupt(why));

@@ -32,12 +32,24 @@ export const isIos =
 const hearers = new Set();
 /** @type {Sample[]} */
 let recent = [];
-let heard = -Infinity;
+let silent = 0;
+let looked = 0;
 let motion = false;
 let answered = false;
 
-/** When the sensor last said anything [ms]. */
-export const lastHeard = () => heard;
+/** How long the sensor has been silent [ms], as counted by `countSilence`. */
+export const silentFor = () => silent;
+
+/**
+ * Look again, every so many ms. A page that stood still in between could hear nothing, so a late
+ * look counts as two of them: events that wait are delivered before the next one.
+ * @param {number} every [ms]
+ */
+export function countSilence(every) {
+  const now = performance.now();
+  silent += Math.min(now - looked, 2 * every);
+  looked = now;
+}
 
 /** @param {(sample: Sample) => void} hear @returns {() => void} how to end that */
 export function onSample(hear) {
@@ -109,7 +121,7 @@ function firstSample() {
 function take(sample) {
   const last = recent.at(-1)?.at ?? -Infinity;
   if (sample.at <= last || !sample.xyz.every(Number.isFinite)) return;
-  heard = performance.now();
+  silent = 0;
   recent = [...recent.slice(-63), sample];
   state.value = 'live';
   if (sample.at - (shown.peek()?.at ?? -Infinity) >= SHOWN_MS) shown.value = sample;
