@@ -150,12 +150,14 @@ class LiveClock(Clock):
         self._running = False
 
     def run(self, until: float = math.inf) -> None:
-        """Live until a time [s], or until `stop` is called."""
+        """Live until a time [s], or until `stop` is called; who is late reads messages, too."""
         self._running = True
         end = math.inf if math.isinf(until) else round(until * US)
         self._catch_up(end)
-        while self._running and self._now_us < end:
+        while self._running:
             self._wait(end)
+            if self._now_us >= end:
+                break
         self._running = False
 
     def _wait(self, end: float) -> None:

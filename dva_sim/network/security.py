@@ -342,14 +342,6 @@ class Security:
         for socket in [s for s, (way, _) in self._greetings.items() if way[1] == peer]:
             self._end_greeting(socket)
 
-    def retry(self, socket: Socket) -> None:
-        """Connect again after ZeroMQ gave up; what waited in the socket was lost with that."""
-        last = socket.getsockopt(zmq.LAST_ENDPOINT)
-        assert isinstance(last, bytes)
-        endpoint = last.rstrip(b"\0").decode()
-        socket.disconnect(endpoint)
-        socket.connect(endpoint)
-
     def release(self, socket: Socket) -> None:
         """Watch a socket no longer; to be called before it is closed."""
         monitor = self._monitors.get(socket)

@@ -7,8 +7,7 @@ from typing import Final
 
 import zmq
 
-from dva_sim.network.realtime import has_more
-from dva_sim.network.security import Socket
+from dva_sim.network.realtime import Socket, has_more
 
 # As plain numbers: the arithmetic of pyzmq's enumerations costs more than a system call.
 NOBLOCK: Final = int(zmq.NOBLOCK)
@@ -44,6 +43,23 @@ def receive_parts(socket: Socket) -> tuple[list[bytes], zmq.Frame]:
         frame = recv(socket, NOBLOCK, False)
         parts.append(frame.bytes)
     return parts, frame
+
+
+def cut(socket: Socket) -> str:
+    """Disconnect a socket from the endpoint that it connected to last, and return that one.
+
+    A poll takes the first part of a publication out of its connection. One message is read
+    before, as libzmq aborts the process when the other parts are gone by the next read.
+    """
+    last = socket.getsockopt(zmq.LAST_ENDPOINT)
+    assert isinstance(last, bytes)
+    endpoint = last.rstrip(b"\0").decode()
+    if socket.getsockopt(zmq.TYPE) == zmq.SUB:
+        receive(socket)
+    with suppress(zmq.ZMQError):  # it may have been cut before
+        if endpoint:
+            socket.disconnect(endpoint)
+    return endpoint
 
 
 class PublisherSocket:

@@ -33,6 +33,7 @@ from dva_sim.network.socket_io import (
     MORE,
     NOBLOCK,
     PublisherSocket,
+    cut,
     next_of,
     receive,
     receive_parts,
@@ -466,17 +467,9 @@ class SocketNetwork(RealNetwork):
         if self._crossing is not None and self.is_here(peer):
             node = self._clients[peer][socket]
             endpoint = self._crossing.way(node, peer, endpoint) or endpoint
-        self._cut(socket)
+        cut(socket)
         socket.connect(endpoint)
         self.clock.look(socket)
-
-    @staticmethod
-    def _cut(socket: Socket) -> None:
-        """Disconnect from where a socket connects to, if it does."""
-        last = _text(socket.last_endpoint).rstrip("\0")
-        with suppress(zmq.ZMQError):  # it may have been cut before
-            if last:
-                socket.disconnect(last)
 
     def _read_keys(self, ring: KeyRing) -> bool:
         """Heed the keys that have come and gone: connections made with others end."""
@@ -488,7 +481,7 @@ class SocketNetwork(RealNetwork):
             came = "has changed" if peer in before else "is new"
             self._tell(f"the key of {peer} {came if known else 'has gone: it is not heard now'}")
             for socket, node in self._clients.get(peer, {}).items():
-                self._cut(socket)
+                cut(socket)
                 if known:
                     self._security.aim(socket, node, peer)
                     self._reach(socket, peer)
@@ -550,7 +543,7 @@ class SocketNetwork(RealNetwork):
         if self._security.trouble(node, peer) is None:
             return
         for socket in [s for s, one in self._clients.get(peer, {}).items() if one == node]:
-            self._security.retry(socket)
+            socket.connect(cut(socket))
             self.clock.look(socket)
         self.clock.call_after(RETRY, self._retry, node, peer)
 

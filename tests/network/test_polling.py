@@ -7,7 +7,8 @@ import zmq
 from helpers.processes.patience import becomes
 
 from dva_sim.network import realtime
-from dva_sim.network.realtime import Poller
+from dva_sim.network.realtime import LiveClock, Poller, has_more
+from dva_sim.network.socket_io import cut, next_of
 
 Socket = zmq.Socket[bytes]
 Make = Callable[[int], Socket]
@@ -90,3 +91,29 @@ def test_a_socket_that_was_read_out_is_not_asked_until_its_file_tells(make, monk
     assert poller.has_more(here)
     assert here.recv() == b"news"
     assert not poller.has_more(here)
+
+
+def test_a_subscription_can_be_cut_while_a_poll_has_begun_a_message(make):
+    """Reading on would have ended the process: libzmq asserts that the other part is there."""
+    publisher, subscriber = make(zmq.PUB), make(zmq.SUB)
+    subscriber.subscribe("frame|")
+    subscriber.connect(f"tcp://127.0.0.1:{publisher.bind_to_random_port('tcp://127.0.0.1')}")
+
+    def arrives() -> bool:
+        publisher.send_multipart([b"frame|", b"a picture"])
+        return has_more(subscriber)
+
+    assert becomes(arrives)
+    cut(subscriber)
+    assert next_of(subscriber) is None
+
+
+def test_a_clock_that_is_behind_reads_messages_all_the_same(make):
+    here, there = pair(make)
+    clock, got = LiveClock(), list[bytes]()
+    clock.watch(here, lambda: got.append(here.recv()))
+    there.send(b"news")
+    assert becomes(lambda: here.getsockopt(zmq.EVENTS) & zmq.POLLIN)
+    clock.look(here)
+    clock.run(clock.now)  # nothing is left of this time
+    assert got == [b"news"]

@@ -17,6 +17,7 @@ from dva_sim.network import security as module
 from dva_sim.network.keys import KeyRing, create_keys
 from dva_sim.network.realtime import Poller
 from dva_sim.network.security import Reason, Refusal, Security
+from dva_sim.network.socket_io import cut
 
 pytestmark = pytest.mark.system
 
@@ -238,12 +239,12 @@ def test_a_refused_client_can_be_told_to_try_again(ring, other_ring, make, tmp_p
     server, client = make(ring, ROBOT), make(half, OPERATOR)
     publisher, subscriber = open_both(server, client, zmq.PUB, zmq.SUB)
     both_say(server, client, Reason.UNKNOWN_KEY)
-    client.security.retry(subscriber)
+    subscriber.connect(cut(subscriber))
     run([server, client], lambda: server.security.refused[ROBOT, Reason.UNKNOWN_KEY] == 2)
     run([server, client], lambda: client.security.refused[OPERATOR, Reason.UNKNOWN_KEY] == 2)
     assert len(server.said) == len(client.said) == 1  # once is enough
     server.security._ring = half  # as if started again with the key known
-    client.security.retry(subscriber)
+    subscriber.connect(cut(subscriber))
     run([server, client], lambda: client.security.trouble(OPERATOR, ROBOT) is None)
     run([server, client], lambda: publisher.send(b"idle") or subscriber.poll(0))
 
