@@ -31,10 +31,10 @@ STATUS = "status|"
 HOLDER = "holder|"
 EVENT = "event|"
 AUDIT = "audit|"
-HEARTBEAT_PERIOD = 2.0  # [s]
-REGISTER_AGAIN = 2.0  # pause after a registration that was not answered, or refused [s]
-LONGEST_BID = 1e6  # no offer to go somewhere is longer [s]
-RENEW_PERIOD = 10.0  # from one registration to the next [s]
+HEARTBEAT_PERIOD = 2.0  # design: [s]
+REGISTER_AGAIN = 2.0  # design: pause after a registration that was not answered, or refused [s]
+LONGEST_BID = 1e6  # design: no offer to go somewhere is longer [s]
+RENEW_PERIOD = 10.0  # design: from one registration to the next [s]
 
 Handler = Callable[[m.Message], m.Reply]
 

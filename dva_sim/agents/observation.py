@@ -21,12 +21,10 @@ Point = tuple[float, float]
 CAMERA_SCHEME = "zmq+tcp://"  # host, port, topic: where simulated robots publish their frames
 FRAME = "frame|"  # that topic
 IN_VIEW = "in view"  # so ends what a robot says while it looks at a place
-MATCH_WITHIN = 4.0  # a hazard so near the place of an event is the one reported there [m]
-KEEP_OFF = 1.2  # from here the place of an event is looked at, by whoever drives [m]
-CLEAR = 1000.0  # visibility where there is no smoke [m]
+CLEAR = 1000.0  # design: visibility where there is no smoke [m]
 SEEN_THROUGH = 3.0
-"""Optical depth of smoke through which what does not shine is still made out (Jin). Smoke hides no
-fire: who sees it has found one."""
+"""Source: Jin: optical depth of smoke through which what does not shine is still made out. Smoke
+hides no fire: who sees it has found one."""
 
 
 class SeenHazard(NamedTuple):

@@ -10,12 +10,14 @@ References:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from dva_sim.agents.habits import OperatorHabits
+from dva_sim.kernel.assumed import Assumed
 from dva_sim.kernel.config import Config
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
@@ -53,36 +55,59 @@ class Population(Config):
         reaction_s: From the sight of a new goal to the first movement, the perceptual delay in it.
         margin: Gain x delay of the loops that the person closes stays below this; pi/2 is the
             limit of stability.
-        motor_noise: Standard deviation of what the hand does, as a share of it; assumed.
-        pointing_rad_s: Gain of bringing a cursor to its target, however short the delay; assumed,
-            of the order that manual control finds for the simplest things to steer.
+        motor_noise: Standard deviation of what the hand does, as a share of it.
+        pointing_rad_s: Gain of bringing a cursor to its target, however short the delay.
         sensitivity: How well a second in plain view tells an event from none, in standard
-            deviations [1/sqrt(s)]; assumed, so that with good pictures errors are rare.
+            deviations [1/sqrt(s)].
         search_s: How long the person looks around at a place before it says that nothing is
-            there; assumed.
-        patience_s: How long it goes on without getting anywhere, or without seeing anything;
-            assumed.
-        switch_s: From turning to another robot's picture to understanding it; assumed.
+            there.
+        patience_s: How long it goes on without getting anywhere, or without seeing anything.
+        switch_s: From turning to another robot's picture to understanding it.
+        habits: Numbers that are the same for all persons, none of them measured.
     """
 
     description: str = ""
     perceptual_delay_s: Trait = Trait(median=0.22, spread=0.15)
     hand_lag_s: Trait = Trait(median=0.15, spread=0.15)
     crossover_rad_s: Trait = Trait(median=1.5, spread=0.15)
-    caution: Trait = Trait(median=0.3, spread=0.15)
-    pace: Trait = Trait(median=0.95, spread=0.05)
-    confirm_look_s: Trait = Trait(median=1.5, spread=0.25)
-    reading_s: Trait = Trait(median=2.0, spread=0.3)
-    position_error_m: Trait = Trait(median=0.04, spread=0.3)
-    heading_error_rad: Trait = Trait(median=0.02, spread=0.3)
+    caution: Annotated[
+        Trait,
+        Assumed(0.2, 0.4, "stable up to 0.52 of the look-ahead; people keep away from it"),
+    ] = Trait(median=0.3, spread=0.15)
+    pace: Annotated[
+        Trait, Assumed(0.85, 1.0, "driving by tilt, most hold the phone near its limit")
+    ] = Trait(median=0.95, spread=0.05)
+    confirm_look_s: Annotated[
+        Trait, Assumed(0.8, 3.0, "from a few fixations to a careful look")
+    ] = Trait(median=1.5, spread=0.25)
+    reading_s: Annotated[Trait, Assumed(1.0, 5.0, "an order of ten to thirty words")] = Trait(
+        median=2.0, spread=0.3
+    )
+    position_error_m: Annotated[
+        Trait, Assumed(0.02, 0.15, "from a hand to a forearm, judged from a picture at 1 to 3 m")
+    ] = Trait(median=0.04, spread=0.3)
+    heading_error_rad: Annotated[
+        Trait, Assumed(0.01, 0.06, "1 to 3 degrees, judged from a picture")
+    ] = Trait(median=0.02, spread=0.3)
     reaction_s: Trait = Trait(median=0.30, spread=0.15)
     margin: Trait = Trait(median=0.5, spread=0.15)
     motor_noise: Trait = Trait(median=0.05, spread=0.3)
-    pointing_rad_s: Trait = Trait(median=4.0, spread=0.15)
-    sensitivity: Trait = Trait(median=4.5, spread=0.15)
-    search_s: Trait = Trait(median=25.0, spread=0.2)
-    patience_s: Trait = Trait(median=90.0, spread=0.25)
-    switch_s: Trait = Trait(median=1.0, spread=0.3)
+    pointing_rad_s: Annotated[
+        Trait, Assumed(3.0, 5.5, "of the order found for the simplest things to steer")
+    ] = Trait(median=4.0, spread=0.15)
+    sensitivity: Annotated[
+        Trait, Assumed(3.0, 6.0, "errors are rare with good pictures and do happen")
+    ] = Trait(median=4.5, spread=0.15)
+    search_s: Annotated[
+        Trait, Assumed(10.0, 60.0, "from one turn of the robot to a thorough search of a room")
+    ] = Trait(median=25.0, spread=0.2)
+    patience_s: Annotated[Trait, Assumed(30.0, 240.0, "from half a minute to a few")] = Trait(
+        median=90.0, spread=0.25
+    )
+    switch_s: Annotated[
+        Trait, Assumed(0.5, 3.0, "costs of switching a task, with a scene to be understood")
+    ] = Trait(median=1.0, spread=0.3)
+    habits: OperatorHabits = Field(default_factory=OperatorHabits)
 
     @property
     def traits(self) -> dict[str, Trait]:
@@ -113,7 +138,7 @@ class Population(Config):
 
 @dataclass(frozen=True)
 class Person:
-    """One simulated person; fields as in `Population` and in its order, in SI units."""
+    """One simulated person; fields as in `Population` and in its order, in SI units; see there."""
 
     perceptual_delay: float
     hand_lag: float
@@ -132,6 +157,7 @@ class Person:
     search: float
     patience: float
     switch: float
+    habits: OperatorHabits = field(default_factory=OperatorHabits, kw_only=True)
 
 
 def draw_person(population: Population, seed: int, index: int) -> Person:
@@ -139,7 +165,7 @@ def draw_person(population: Population, seed: int, index: int) -> Person:
     rng = Streams(seed).fresh(f"person-{index}")
     drawn = {name: trait.draw(rng) for name, trait in population.traits.items()}
     drawn["pace"] = min(1.0, drawn["pace"])
-    return Person(*drawn.values())
+    return Person(*drawn.values(), habits=population.habits)
 
 
 def median_person(population: Population) -> Person:

@@ -25,8 +25,8 @@ from dva_sim.agents.observation import Observation
 from dva_sim.agents.population import Person
 from dva_sim.kernel.makers import maker
 
-REACH = 2.0  # on a route in a building, one looks for one's place so far ahead of the last [m]
-BENT = 1.5  # way along a route to what one moves straight; around a right angle, up to 1.41
+REACH = 2.0  # design: one's place on a route is looked for so far ahead of the last [m]
+BENT = 1.5  # design: way along a route to what one moves straight; around a right angle, up to 1.41
 
 
 def wrap(angle: float) -> float:
@@ -82,9 +82,9 @@ class _Place:
     offset: float
 
 
-ROUNDED = 1e-6  # far more than lengths are rounded by [m]
-BEND = 0.6  # a route leads away from a place until it has turned by so much in all since [rad]
-AWAY = 1.0 / math.cos(BEND)  # way along it by which it is a metre away, at most
+ROUNDED = 1e-6  # design: far more than lengths are rounded by [m]
+BEND = 0.6  # design: a route leads away from a place until it has turned by so much [rad]
+AWAY = 1.0 / math.cos(BEND)  # design: way along it by which it is a metre away, at most
 
 
 class _Line:
@@ -279,7 +279,7 @@ class Reach:
         return Intent(min(abs(turn_rate) * self.radius, self.speed), turn_rate)
 
 
-SHORTEST = 1e-3  # a delay, or a share of noise, below this counts as this
+SHORTEST = 1e-3  # design: a delay, or a share of noise, below this counts as this
 
 
 def gain_at(limit: float, margin: float, delay: float) -> float:
@@ -296,11 +296,6 @@ def gain_at(limit: float, margin: float, delay: float) -> float:
     return gain if gain < limit else limit
 
 
-NEAREST_LOOK, FARTHEST_LOOK = 0.8, 1.8  # look-ahead inside a building [m]
-TURN_FROM, TURN_UNTIL = 0.9, 0.25  # bearing at which one stops to turn, and drives on [rad]
-IN_CURVES = 0.8  # share of the highest turn rate that one plans a curve with
-
-
 class PurePursuit:
     """Aims at a point ahead on the route, the farther the longer the delay.
 
@@ -315,6 +310,7 @@ class PurePursuit:
 
     def __init__(self, person: Person, reach: Reach) -> None:
         self.person, self.reach = person, reach
+        self._steering_habits = person.habits.steering
         self._turning = False
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
@@ -325,14 +321,15 @@ class PurePursuit:
             view: What is seen, and when.
             stop_before: Where to stop: so far before the end of the route [m].
         """
-        person, reach, seen = self.person, self.reach, view.seen
+        person, reach, seen, habits = self.person, self.reach, view.seen, self._steering_habits
         delay = view.delay if view.delay > SHORTEST else SHORTEST
         wanted = person.pace * reach.speed
         look = wanted * delay / person.caution
-        look = look if look > NEAREST_LOOK else NEAREST_LOOK
-        look = look if look < FARTHEST_LOOK else FARTHEST_LOOK
+        nearest, farthest = habits.nearest_look_m, habits.farthest_look_m
+        look = look if look > nearest else nearest
+        look = look if look < farthest else farthest
         ahead = route.ahead(seen.x, seen.y, seen.heading, look)
-        limit = TURN_UNTIL if self._turning else TURN_FROM
+        limit = habits.turns_until_rad if self._turning else habits.stops_from_rad
         self._turning = abs(ahead.bearing) > limit
         is_there = ahead.remaining < stop_before
         if is_there and reach.radius > 0.0:
@@ -356,7 +353,7 @@ class PurePursuit:
         """
         distance = ahead.distance
         curvature = 2.0 * math.sin(ahead.bearing) / (distance if distance > 0.2 else 0.2)
-        most = IN_CURVES * self.reach.turn_rate
+        most = self._steering_habits.in_curves * self.reach.turn_rate
         if abs(curvature) * speed > most:
             speed = most / abs(curvature)
         return make_intent(speed, self._clamp(curvature * speed))

@@ -83,6 +83,27 @@ def plugins(as_json: Json = False) -> None:
         names.tell(names.plugin_lines())
 
 
+@asks(page=(flag("--page", "Print them as the page docs/assumptions.md."), False))
+def assumed(page: bool, as_json: Json = False) -> None:
+    """List all numbers about people that were assumed.
+
+    Each is a key of a scenario, and may be a factor of a study.
+
+    Examples:
+        dva-sim assumed  # key, default, band and reason
+        dva-sim assumed --json  # for other programs
+    """
+    from dva_sim.cli import names  # late: start-up
+    from dva_sim.simulation.scenario import assumptions as listed  # late: start-up
+
+    if as_json:
+        print_json(listed.as_json())
+    elif page:
+        print(listed.as_page(), end="")
+    else:
+        names.tell(listed.lines())
+
+
 @asks(
     files=(argument(_FILES, "FILE...", of=list[str]), REQUIRED),
     set_=(several("An option of what is tried.", "KEY=VALUE", "--set"), ()),

@@ -103,8 +103,8 @@ class DvaSimProgram(PanelGroup):
             **_named(runs.robot, link.link, runs.keys),
         },
         "Names, files and evidence": {
-            **_named(files.list_, files.plugins, files.check, files.phone_log),
-            **_named(files.schema, files.validate, storm.storm),
+            **_named(files.list_, files.plugins, files.assumed, files.check),
+            **_named(files.phone_log, files.schema, files.validate, storm.storm),
             "site": typer_of(SiteGroup, help="Draw a site, or write it as files to edit."),
         },
     }

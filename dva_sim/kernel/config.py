@@ -78,7 +78,7 @@ class Key:
 def keys_said_of(model: Any) -> dict[str, Key]:
     """Every dotted key of a model that says how it is called, in the order of the model."""
     said: dict[str, Key] = {}
-    for path, info in _walk(model):
+    for path, info in fields_below(model):
         for key in (m for m in info.metadata if isinstance(m, Key)):
             said |= {path: said.get(path, key)} if key.title else {}
             said |= {f"{path}.{name}": inner for name, inner in key.inner.items()}
@@ -135,7 +135,7 @@ def model_in(annotation: Any) -> Any:
 def _every_name(models: tuple[Any, ...]) -> dict[str, str]:
     """All dotted keys by their names, and by what else they are called."""
     known: dict[str, str] = {}
-    for key, info in (item for model in models for item in _walk(model)):
+    for key, info in (item for model in models for item in fields_below(model)):
         for name in (key, *_others(info)):
             known.setdefault(name, key)
     return known
@@ -162,13 +162,14 @@ def _ask(given: str, keys: list[str]) -> str:
     return f"did you mean {either(map(repr, keys))}?{told}"
 
 
-def _walk(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
+def fields_below(model: Any, above: str = "", depth: int = _DEPTH) -> Iterator[tuple[str, Any]]:
+    """Every field of a model, by its dotted key, each followed by the fields of its own model."""
     for name, info in _fields(model).items():
         yield f"{above}{name}", info
         inner = model_in(info.annotation)
         if inner is not None and depth > 1:
             step = ".0" if "tuple" in str(info.annotation) else ""
-            yield from _walk(inner, f"{above}{name}{step}.", depth - 1)
+            yield from fields_below(inner, f"{above}{name}{step}.", depth - 1)
 
 
 def _fields(model: Any) -> dict[str, Any]:

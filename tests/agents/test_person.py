@@ -14,11 +14,11 @@ def test_a_person_is_always_the_same_one_and_another_one_differs_in_every_trait(
     people = Population()
     assert draw_person(people, 1, 3) == draw_person(people, 1, 3)
     one, other = asdict(draw_person(people, 1, 3)), asdict(draw_person(people, 1, 4))
-    assert all(one[trait] != other[trait] for trait in one)
+    assert [name for name in one if one[name] == other[name]] == ["habits"]
 
 
 def test_the_fields_of_a_person_are_the_traits_of_a_population_in_their_order():
-    names = [field.name for field in fields(Person)]
+    names = [field.name for field in fields(Person) if not field.kw_only]
     traits = [re.sub(r"(_rad|_s|_m)+$", "", name) for name in Population().traits]
     assert names == traits
 

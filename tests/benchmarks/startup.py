@@ -24,6 +24,7 @@ COMMANDS = {
     "--version": "--version",
     "list": "list",
     "plugins": "plugins",
+    "assumed": "assumed",
     "schema": "schema scenario",
     "check": "check {root}/experiments/scenarios/fire-drill.yaml",
     "site": "site show hall -o {out}/site.png",

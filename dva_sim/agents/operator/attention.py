@@ -21,6 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.habits import AttentionHabits
 from dva_sim.agents.observation import Observation, make_observation, topic_in
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import Driver, Reach, Truth
@@ -30,9 +31,6 @@ from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog
 from dva_sim.network.patterns import Pattern
 from dva_sim.worlds.planning import Planner
-
-GLANCE = 3.0  # at a robot that only drives [s]; assumed
-RECONSIDER = 0.5  # how often a person thinks about which screen to look at [s]; assumed
 
 
 class Screen(Protocol):
@@ -56,6 +54,7 @@ def next_screen(
     since: float,
     waits: Sequence[float | None],
     seen: Sequence[float],
+    glance: float,
 ) -> int:
     """Which screen to look at.
 
@@ -65,13 +64,14 @@ def next_screen(
         since: From when on it was [s].
         waits: From when on each robot has waited for a judgement [s]; None: it does not.
         seen: When each was looked at last [s].
+        glance: Time for which one that only drives is looked at [s].
     """
     waiting = [(time, place) for place, time in enumerate(waits) if time is not None]
     if current is not None and waits[current] is not None:
         return current
     if waiting:
         return min(waiting)[1]
-    if current is not None and now - since < GLANCE:
+    if current is not None and now - since < glance:
         return current
     others = [place for place in range(len(seen)) if place != current]
     return min(others, key=seen.__getitem__)
@@ -83,10 +83,11 @@ class Attention:
     Args:
         clock: The run's clock.
         switch: What it takes to find into another screen [s].
+        habits: Of the person.
     """
 
-    def __init__(self, clock: Clock, switch: float) -> None:
-        self._clock, self._switch = clock, switch
+    def __init__(self, clock: Clock, switch: float, habits: AttentionHabits) -> None:
+        self._clock, self._switch, self._habits = clock, switch, habits
         self._screens: list[Screen] = []
         self._seen: list[float] = []
         self._current: Screen | None = None
@@ -101,7 +102,7 @@ class Attention:
             self._look(screen, self._clock.now)
         elif not self._choosing:
             self._choosing = True
-            self._clock.every(RECONSIDER, self._reconsider)
+            self._clock.every(self._habits.reconsiders_s, self._reconsider)
 
     def end(self, screen: Screen) -> None:
         """A screen goes off; another is looked at, if there is one."""
@@ -129,7 +130,8 @@ class Attention:
     def _best(self) -> int:
         current = None if self._current is None else self._screens.index(self._current)
         waits = [screen.waits_since for screen in self._screens]
-        return next_screen(self._clock.now, current, self._since, waits, self._seen)
+        now, glance = self._clock.now, self._habits.glance_s
+        return next_screen(now, current, self._since, waits, self._seen, glance)
 
     def _turn_to(self, place: int) -> None:
         self._screens[place].log.turned_to += 1
@@ -148,9 +150,6 @@ class Attention:
         self._seen[self._screens.index(left)] = now
         left.look_away()
         self._current = None
-
-
-FIRST_GUESS = 0.6  # delay a person expects before having seen any [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,8 +214,9 @@ class DriverSeat:
         self.device, self.person, self.phone = device, person, phone
         self.strategy, self.reach = strategy, reach
         self.planner, self.setup = planner, setup
-        self.delay = DelayEstimate(0.0, FIRST_GUESS)
-        self.attention = Attention(device.clock, person.switch)
+        habits = person.habits
+        self.delay = DelayEstimate(0.0, habits.delay.first_guess_s, habits=habits.delay)
+        self.attention = Attention(device.clock, person.switch, habits.attention)
         self._errors = _normals(rng)
         self._looks, self._times = looks, Counter[int]()
 

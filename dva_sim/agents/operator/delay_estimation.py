@@ -7,15 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from dva_sim.agents.habits import DelayHabits
+
 Floats = NDArray[np.float64]
 
-STEP = 0.1  # resolution of the memory and of the guess while driving [s]
-LONGEST = 12.0  # nobody remembers what it did longer ago [s]; assumed
-LOOK_STEPS = 2  # the guess is looked at every so many steps
-FADES_IN = 5.0  # evidence counts e times less after so long [s]; assumed
-FIRM = 0.004  # what was learnt before counts as so much misfit for each second off it; assumed
-MOST = 0.5  # misfit of one look, whatever is seen
-DRIVING = (0.5, 1.0)  # by so much the motions must differ to count one [m/s, rad/s]
+STEP = 0.1  # design: resolution of the memory and of the guess while driving [s]
+LOOK_STEPS = 2  # design: the guess is looked at every so many steps
 
 
 class DelayEstimate:
@@ -31,7 +28,9 @@ class DelayEstimate:
         start: When the drive or the trial begins [s].
         guess: What the person expects at first: what it learnt before [s].
         step: Resolution of the guess [s].
-        scale: For each of the two channels, the difference that counts one, in its unit.
+        scale: For each of the two channels, the difference that counts one, in its unit; left
+            out: those of driving.
+        habits: Of the person.
 
     Attributes:
         value: The guess [s].
@@ -42,19 +41,22 @@ class DelayEstimate:
         start: float,
         guess: float,
         step: float = STEP,
-        scale: tuple[float, float] = DRIVING,
+        scale: tuple[float, float] | None = None,
+        habits: DelayHabits | None = None,
     ) -> None:
+        self._habits = habits = habits or DelayHabits()
+        scale = scale or (habits.speed_scale_mps, habits.turn_scale_rad_s)
         self._start = self._next_look = start
         self._step, self._period = step, LOOK_STEPS * step
         self._last: float | None = None
         self._motion = np.zeros((2, 1))
-        self._lags = np.arange(1, round(LONGEST / step) + 1) * step
+        self._lags = np.arange(1, round(habits.remembers_s / step) + 1) * step
         # One for each lag: NumPy takes three times as long to spread one over all.
         self._weights = np.repeat([[1.0 / scale[0]], [1.0 / scale[1]]], len(self._lags), axis=1)
         self._offset = self._filled = 2 * len(self._lags)
         self._asked = np.zeros((2, 4 * len(self._lags)))
         self._intent = 0.0, 0.0
-        self._misfit = FIRM * np.abs(self._lags - guess)
+        self._misfit = habits.firmness * np.abs(self._lags - guess)
         self.value = guess
 
     def intend(self, now: float, one: float, other: float) -> None:
@@ -85,14 +87,15 @@ class DelayEstimate:
         errors *= self._weights
         error = errors[0]
         error += errors[1]
-        np.minimum(error, MOST, out=error)
-        passed = 0.0 if self._last is None else min(now - self._last, FADES_IN)
+        np.minimum(error, self._habits.most_misfit, out=error)
+        fades_in = self._habits.fades_in_s
+        passed = 0.0 if self._last is None else min(now - self._last, fades_in)
         self._last = now
         if passed < 2.0 * self._period:  # frames come a little sooner or later than one looks
             passed = self._period
         error *= passed
         misfit = self._misfit
-        misfit *= math.exp(-passed / FADES_IN)
+        misfit *= math.exp(-passed / fades_in)
         misfit += error[::-1]
         self.value = float(self._lags[misfit.argmin()])
 

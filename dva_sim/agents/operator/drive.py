@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.observation import KEEP_OFF, Observation
+from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.attention import DriverSeat
 from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.operator.delay_estimation import DelayEstimate
@@ -37,21 +37,13 @@ from dva_sim.worlds.planning import Planner
 Floats = NDArray[np.float64]
 Point = tuple[float, float]
 
-LOOK = 0.35  # look-ahead [m]; assumed
-TURN_FROM, TURN_UNTIL = 0.2, 0.1  # bearing at which one stops to turn, and drives on [rad]
-SLOWLY = 0.3  # share of the top speed; assumed
-CRAWL = 0.1  # slower one would not see whether it moves [m/s]; assumed
-HELD_FOR = 1.5  # held back for so long, beside the delay, a person understands it [s]; assumed
-STEP_OUT = 0.5  # how far one goes to where there is room [m]; assumed
-HEADINGS = 16  # looked at for that
-CLEAR = 1.0  # driven so far, a person drives as before [m]; assumed
-ASKED, HELD_STILL = 0.05, 0.02  # asked for more, seen less: that is being held back [m/s]
+HEADINGS = 16  # design: looked at for a place with room
 
 
-def roomiest(here: Point, planner: Planner) -> Point:
-    """The place a step away that is farthest from walls, and is reached straight [m]."""
+def roomiest(here: Point, planner: Planner, step: float) -> Point:
+    """The place a step [m] away that is farthest from walls, and is reached straight [m]."""
     angles = np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS)
-    ring = np.array(here) + STEP_OUT * np.stack([np.cos(angles), np.sin(angles)], 1)
+    ring = np.array(here) + step * np.stack([np.cos(angles), np.sin(angles)], 1)
     half = 0.5 * (ring + np.array(here))
     least = np.minimum(planner.room_at(half), planner.room_at(ring))
     x, y = ring[int(least.argmax())].tolist()
@@ -68,6 +60,7 @@ class CloseQuarters:
 
     def __init__(self, person: Person, reach: Reach) -> None:
         self._person, self._reach = person, reach
+        self._habits = person.habits.close_quarters
         self._held, self._last_look = 0.0, math.inf
         self._from: tuple[float, float] | None = None
         self._turning = self._again = False
@@ -86,15 +79,15 @@ class CloseQuarters:
             asked: Speed that the person asks for [m/s].
             delay: What the person takes the whole delay to be [s].
         """
-        here = seen.x, seen.y
-        if self._from is not None and math.dist(here, self._from) > CLEAR:
+        here, habits = (seen.x, seen.y), self._habits
+        if self._from is not None and math.dist(here, self._from) > habits.clear_m:
             self._from = None
-        if seen.speed >= HELD_STILL:
+        if seen.speed >= habits.held_still_mps:
             self._held = 0.0
-        elif asked > ASKED:  # while turning on the spot is asked for, nothing is learnt
+        elif asked > habits.asked_mps:  # while turning on the spot is asked for, nothing is learnt
             self._held += max(now - self._last_look, 0.0)
         self._last_look = now
-        if self._held <= HELD_FOR + 2.0 * delay:
+        if self._held <= habits.understood_after_s + 2.0 * delay:
             return False
         self._again = self._from is not None
         self._held, self._from = 0.0, here
@@ -102,31 +95,25 @@ class CloseQuarters:
 
     def way(self, here: Point, goal: Point, planner: Planner) -> Floats | None:
         """The new way `(n, 2)` [m]; who is held back again first goes to where there is room."""
-        via = roomiest(here, planner) if self._again else here
+        via = roomiest(here, planner, self._habits.step_out_m) if self._again else here
         points = planner.path(via, goal)
         return points if points is None or not self._again else np.vstack([here, points])
 
     def drive(self, route: Route, seen: Observation, delay: float, stop_before: float) -> Intent:
         """See `Strategy`: turn on the spot towards a point close by on the way, then go there."""
-        ahead = route.ahead(seen.x, seen.y, seen.heading, LOOK)
-        most = self._reach.turn_rate
+        habits, look, most = self._habits, self._habits.look_m, self._reach.turn_rate
+        ahead = route.ahead(seen.x, seen.y, seen.heading, look)
         gain = gain_at(self._person.crossover, self._person.margin, delay)
         turn = min(max(gain * ahead.bearing, -most), most)
-        self._turning = abs(ahead.bearing) > (TURN_UNTIL if self._turning else TURN_FROM)
-        speed = min(SLOWLY * self._reach.speed, self._person.caution * LOOK / max(delay, SHORTEST))
-        speed = max(speed, CRAWL)
+        limit = habits.turns_until_rad if self._turning else habits.stops_from_rad
+        self._turning = abs(ahead.bearing) > limit
+        safe = self._person.caution * look / max(delay, SHORTEST)
+        speed = max(min(habits.slowly * self._reach.speed, safe), habits.crawl_mps)
         stands = self._turning or ahead.remaining < stop_before
         return Intent(0.0 if stands else speed, turn)
 
 
-STILL = 0.02  # a robot that moves less stands [m/s, rad/s]
-ASKED_SPEED, ASKED_TURN = 0.05, 0.1  # from here on one expects to see it move [m/s, rad/s]
-STUCK_AFTER = 4.0  # standing for so long though asked to drive, a person plans anew [s]
-ASKED_FOR = 1.0  # asked for less in all, it was a touch that may well have no effect [s]
-LET_GO_FOR = 1.0  # one who sees no effect levels the phone for so long, and tilts again [s]
-NEARER = 0.5  # less is no progress [m]
-ATTEMPTS = 3  # in a row without any motion: the link is lost, as after three unanswered sends
-KEEP_OFF_IN_SMOKE = 0.5  # by who sees nothing from there [m]; assumed
+ATTEMPTS = 3  # source: the document's app: after three sends without effect the link is lost
 
 
 class Teleoperation(Work):
@@ -158,9 +145,10 @@ class Teleoperation(Work):
         reach = seat.reach(self.robot)
         self._strategy = seat.strategy(seat.person, reach)
         self._close_quarters = CloseQuarters(seat.person, reach) if seat.setup.guarded else None
+        self._stuck = seat.person.habits.stuck
         self._asked_since: float | None = None  # to move, without any motion seen since
         self._asked_for = self._stuck_look = 0.0
-        self._stuck_after = STUCK_AFTER + 2.0 * seat.delay.value
+        self._stuck_after = self._stuck.plans_after_s + 2.0 * seat.delay.value
         self._let_go_until = 0.0
         self._without_effect = 0
         self._failures: dict[str, int] = {}
@@ -178,7 +166,7 @@ class Teleoperation(Work):
         super().begin()
         self.log.hand_lag = seat.phone.hand_lag
         self._device.recorder.drive_begins(self._device.id_tag)
-        seat.delay = DelayEstimate(now, seat.delay.value)
+        seat.delay = DelayEstimate(now, seat.delay.value, habits=seat.person.habits.delay)
         self._sender = self._make_sender()
         self._plugged_in.insert(
             1, (self._sender, "a pattern", "loses commands, as its pattern fails")
@@ -308,9 +296,10 @@ class Teleoperation(Work):
 
     def _keep_off(self, seen: Observation) -> float:
         """How far before the event to stop [m]; no wall may stand between."""
-        if not self._looking.has_place_before_it(seen, 2 * KEEP_OFF):
+        keeps_off = self._seat.person.habits.looking.keeps_off_m
+        if not self._looking.has_place_before_it(seen, 2 * keeps_off):
             return 0.0
-        return KEEP_OFF_IN_SMOKE if self._looking.wants_nearer else KEEP_OFF
+        return self._stuck.in_smoke_m if self._looking.wants_nearer else keeps_off
 
     # --- steering ----------------------------------------------------------------------
 
@@ -318,7 +307,7 @@ class Teleoperation(Work):
         """The way to the goal, for the strategy; planned anew when the robot does not get on."""
         if self._is_stuck(seen):
             self._route = self._lent = self._asked_since = None
-            self._let_go_until = self._clock.now + LET_GO_FOR
+            self._let_go_until = self._clock.now + self._stuck.lets_go_s
             self._device.recorder.counters["replans"] += 1
             self._without_effect += 1
             if self._without_effect >= ATTEMPTS:
@@ -349,9 +338,10 @@ class Teleoperation(Work):
         now = self._clock.now
         if self._looking.at_place:
             return False
-        if left < self._least_left - NEARER:
+        nearer = self._stuck.nearer_m
+        if left < self._least_left - nearer:
             self._least_left, self._nearer_at = left, now
-        return left > NEARER and now - self._nearer_at > self._seat.person.patience
+        return left > nearer and now - self._nearer_at > self._seat.person.patience
 
     def _is_stuck(self, seen: Observation) -> bool:
         """Whether the robot has stood for too long although it was asked to move.
@@ -360,19 +350,19 @@ class Teleoperation(Work):
         included. How long is too long is of the delay when motion was last seen, since a guess
         learns nothing from a picture that stands.
         """
-        now, intent = self._clock.now, self._intent
+        now, intent, habits = self._clock.now, self._intent, self._stuck
         passed, self._stuck_look = now - self._stuck_look, now
-        if abs(seen.speed) >= STILL or abs(seen.turn_rate) >= STILL:
+        if abs(seen.speed) >= habits.still or abs(seen.turn_rate) >= habits.still:
             self._without_effect = 0
-            self._stuck_after = STUCK_AFTER + 2.0 * self._seat.delay.value
+            self._stuck_after = self._stuck.plans_after_s + 2.0 * self._seat.delay.value
             self._asked_since = None
             return False
-        if intent.speed > ASKED_SPEED or abs(intent.turn_rate) > ASKED_TURN:
+        if intent.speed > habits.asked_mps or abs(intent.turn_rate) > habits.asked_rad_s:
             if self._asked_since is None:
                 self._asked_since, self._asked_for = now, 0.0
             else:
                 self._asked_for += passed
-        if self._asked_since is None or self._asked_for < ASKED_FOR:
+        if self._asked_since is None or self._asked_for < habits.asked_for_s:
             return False
         return now - self._asked_since > self._stuck_after
 

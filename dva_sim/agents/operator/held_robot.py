@@ -23,13 +23,11 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 HeldPhase = Literal["asking", "held", "starting", "driving", "stopping", "gone"]
-STILL_WANTED = 0.3  # what was wanted no longer ago holds when a drive begins [s]
-MOST_INPUTS = 4096  # that are remembered until they act
-GRANT_WITHIN = (
-    5.0  # the DVA's word to the robot may be on its way for so long, which is no news [s]
-)
-MOST_PICTURES = 1024  # whose ticks are remembered until they are drawn
-LOST_AFTER = 9.0  # without a word of the robot: three times its watchdog [s]
+STILL_WANTED = 0.3  # design: what was wanted no longer ago holds when a drive begins [s]
+MOST_INPUTS = 4096  # design: that are remembered until they act
+GRANT_WITHIN = 5.0  # design: the DVA's grant may be on its way to the robot for so long [s]
+MOST_PICTURES = 1024  # design: whose ticks are remembered until they are drawn
+LOST_AFTER = 9.0  # design: without a word of the robot: three times its watchdog [s]
 
 
 class HeldRobot:

@@ -20,17 +20,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from dva_sim.agents.observation import CLEAR, MATCH_WITHIN, SEEN_THROUGH, Observation, SeenHazard
+from dva_sim.agents.habits import LookingHabits
+from dva_sim.agents.observation import CLEAR, SEEN_THROUGH, Observation, SeenHazard
 from dva_sim.agents.population import Person
 from dva_sim.worlds.planning import Planner
 
-STILL = 1.0 / 3.0  # a picture that does not change tells something for one fixation [s]
-HALF_SEEN = 0.03  # what fills this angle looks half like what it is [rad]; assumed
+STILL = 1.0 / 3.0  # source: Nuthmann 2017: a still picture is worth one fixation [s]
 
 
-def clearness(angle: float) -> float:
-    """How much something looks like what it is, from 0 to 1, by the angle that it fills [rad]."""
-    return float(1.0 - 2.0 ** (-angle / HALF_SEEN))
+def clearness(angle: float, half_seen: float) -> float:
+    """How much something looks like what it is, from 0 to 1, by the angle that it fills [rad].
+
+    Args:
+        angle: [rad]
+        half_seen: Angle at which it looks half like it [rad].
+    """
+    return float(1.0 - 2.0 ** (-angle / half_seen))
 
 
 def worth(gap: float) -> float:
@@ -46,8 +51,9 @@ class Evidence:
 
     In a clear picture the level drifts by `sensitivity / 2` a second towards the criterion if the
     event fills the picture, and away from it if it is not there; the noise has a variance of 1 a
-    second. In a picture of contrast `c` the drift is `c^1.5` of that and the variance `c`: a
-    person discounts what is unclear, but less than would keep the errors as rare (assumed).
+    second. In a picture of contrast `c` the drift is `c^1.5` of that (with the usual discount) and
+    the variance `c`: a person discounts what is unclear, but less than would keep the errors as
+    rare.
 
     Args:
         sensitivity: Of the person: how well a second in plain view tells an event from none, in
@@ -55,14 +61,17 @@ class Evidence:
         look: How long an event in plain view is looked at until the person is sure [s]; the
             criterion is what that adds up to.
         luck: Standard normal numbers, one for each look.
+        habits: Of the person.
 
     Attributes:
         level: Of the evidence.
         criterion: From this level on, the person is sure.
     """
 
-    def __init__(self, sensitivity: float, look: float, luck: Iterator[float]) -> None:
-        self._sensitivity, self._luck = sensitivity, luck
+    def __init__(
+        self, sensitivity: float, look: float, luck: Iterator[float], habits: LookingHabits
+    ) -> None:
+        self._sensitivity, self._luck, self._habits = sensitivity, luck, habits
         self.criterion = 0.5 * sensitivity * look
         self.level = 0.0
 
@@ -74,7 +83,7 @@ class Evidence:
     @property
     def leans(self) -> bool:
         """Whether the person is more than half convinced."""
-        return self.level >= 0.5 * self.criterion
+        return self.level >= self._habits.leans_from * self.criterion
 
     def weigh(self, duration: float, clear: float, contrast: float) -> None:
         """Look for some time [s].
@@ -85,13 +94,10 @@ class Evidence:
             contrast: Share of the contrast that smoke leaves.
         """
         weight = math.sqrt(contrast)
-        drift = weight * contrast * self._sensitivity * (clear - 0.5)
+        drift = weight * contrast**self._habits.discount * self._sensitivity * (clear - 0.5)
         noise = weight * math.sqrt(duration) * next(self._luck)
         self.level = max(0.0, self.level + drift * duration + noise)
 
-
-AT_PLACE = 1.5  # nearer than this one is at the place [m]
-NEARER_AFTER = 5.0  # who could not see the place for so long looks from nearer [s]; assumed
 
 Conclusion = tuple[str, str]
 
@@ -123,7 +129,8 @@ class Looking:
         arrived: Callable[[], object],
     ) -> None:
         self._kind, self._place, self._planner, self._person = kind, place, planner, person
-        self._evidence = Evidence(person.sensitivity, person.confirm_look, luck)
+        self._habits = habits = person.habits.looking
+        self._evidence = Evidence(person.sensitivity, person.confirm_look, luck, habits)
         self._tell_arrived, self._arrived = arrived, False
         self._last: float | None = None
         self._searched = self._blind = 0.0
@@ -132,7 +139,7 @@ class Looking:
     @property
     def wants_nearer(self) -> bool:
         """Whether the place could not be seen for some time."""
-        return self._blind > NEARER_AFTER
+        return self._blind > self._habits.nearer_after_s
 
     def look(self, now: float, seen: Observation) -> Conclusion | None:
         """A picture is perceived at `now` [s]: the outcome and why, once there is one."""
@@ -141,8 +148,10 @@ class Looking:
         event = self._event_in(seen)
         if event is not None:
             self._arrive()
-            self._evidence.weigh(worth(gap), clearness(event.angle), event.contrast)
-        was_there, self.at_place = self.at_place, self.has_place_before_it(seen, AT_PLACE)
+            clear = clearness(event.angle, self._habits.half_seen_rad)
+            self._evidence.weigh(worth(gap), clear, event.contrast)
+        was_there = self.at_place
+        self.at_place = self.has_place_before_it(seen, self._habits.at_place_m)
         found = self._search(gap if was_there else 0.0, seen, event is None)
         return ("confirmed", "") if self._evidence.sure else found
 
@@ -160,7 +169,8 @@ class Looking:
         """The event, if it is in the picture."""
         if not seen.hazards:
             return None
-        near = (h for h in seen.hazards if math.dist((h.x, h.y), self._place) < MATCH_WITHIN)
+        place, within = self._place, self._habits.same_place_m
+        near = (h for h in seen.hazards if math.dist((h.x, h.y), place) < within)
         return next((h for h in near if h.kind == self._kind), None)
 
     def _search(self, gap: float, seen: Observation, nothing: bool) -> Conclusion | None:

@@ -20,9 +20,7 @@ from dva_sim.kernel.recorder import DriveLog
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-ASK_LATER = 2.0  # when the robot is held by somebody else [s]
-ASK_BEFORE, ASK_AFTER = 3, 1  # how often, for one order: before a drive has begun, and after
-STANDSTILL = 1.5  # after a stop, a robot certainly stands; before, it would refuse to start [s]
+ASK_BEFORE, ASK_AFTER = 3, 1  # design: asked so often for one order: before and in a drive
 TOLD = {
     "lost link": "takes the link for lost",
     REFUSED: "is refused",
@@ -47,6 +45,7 @@ class OperatorAgent:
         self.works: dict[str, Work] = {}
         self._waiting: list[tuple[float, m.Order]] = []  # since when [s]; oldest first
         self._again: tuple[m.Order | None, int] = (None, 0)  # what was refused, and how often
+        self._habits = seat.person.habits.asking
         self.device.serve(self._on_request)
 
     @property
@@ -183,7 +182,8 @@ class OperatorAgent:
                     self._turn_on_picture(drive)
                     self._start(drive)
             elif reply.code == m.BUSY and not self._asked_again(drive):
-                self.device.clock.call_after(ASK_LATER, self._ask_permission, drive)
+                later = self._habits.again_after_s
+                self.device.clock.call_after(later, self._ask_permission, drive)
             else:
                 drive.end("gave up", reply.text)
 
@@ -275,7 +275,8 @@ class OperatorAgent:
     def _be_free(self, drive: Work) -> None:
         """The robot was told to stop: what is next?"""
         if self._waiting and drive.session:
-            self.device.clock.call_after(STANDSTILL, self._put_away, drive)
+            # Before it stands, the robot would refuse to start.
+            self.device.clock.call_after(self._habits.stands_after_s, self._put_away, drive)
         else:
             self._put_away(drive)  # nothing moves
 

@@ -18,9 +18,9 @@ from dva_sim.agents.operator.steps import ask_emergency
 from dva_sim.agents.tilt import GivenTilt, TiltSources
 from dva_sim.protocol import messages as m
 
-MOST_ROBOTS = 2  # that one person drives by the same input
-DECLINED_AFTER = 30.0  # an order to a seat in which nobody sits [s]
-THERE = 3.0  # so near the place of an event a robot has arrived [m]
+MOST_ROBOTS = 2  # design: that one person drives by the same input
+DECLINED_AFTER = 30.0  # design: an order to a seat in which nobody sits [s]
+THERE = 3.0  # design: so near the place of an event a robot has arrived [m]
 
 
 class PersonAgent:

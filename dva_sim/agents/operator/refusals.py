@@ -13,11 +13,11 @@ from dva_sim.protocol import messages as m
 
 ASK_AGAIN = (m.NOT_PERMITTED, m.BAD_SESSION)  # whether the permission holds is for the DVA to say
 PASSES = (m.STALE, m.OUT_OF_ORDER)  # such a command came late: the next may not
-LATE_FOR = 10.0  # but if nothing else has come for so long, and `ENOUGH` of them, none will [s]
+LATE_FOR = 10.0  # design: if nothing else has come for so long, and `ENOUGH` such, none will [s]
 SAYS_LATE_FOR = 40.0
-"""The same of what is published [s]: the app alerts after `LATE_FOR`, but a robot that is only slow
-ends the drive itself by then, when it has obeyed nothing for 30 s."""
-ENOUGH = 3  # answers in a row of any other kind, as of sends without an answer
+"""Design: the same of what is published [s]: the app alerts after `LATE_FOR`, but a robot that is
+only slow ends the drive itself by then, when it has obeyed nothing for 30 s."""
+ENOUGH = 3  # design: answers in a row of any other kind, as of sends without an answer
 TAKEN = "somebody else holds the robot"
 
 

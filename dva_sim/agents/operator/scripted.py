@@ -172,10 +172,10 @@ def _answer(reply: m.Reply | None) -> str:
     return "obeyed" if reply.code == m.OK else f"refused ({m.CODE_NAMES[reply.code]})"
 
 
-COMMANDS_AGAIN = 10  # of the second drive
-STANDSTILL = 2.0  # after it a robot certainly stands [s]
-TRIES = 20  # to start
-AGAIN = 0.5  # before asking once more for what is not there yet [s]
+COMMANDS_AGAIN = 10  # design: of the second drive
+STANDSTILL = 2.0  # design: after it a robot certainly stands [s]
+TRIES = 20  # design: to start
+AGAIN = 0.5  # design: before asking once more for what is not there yet [s]
 
 
 def _take_a_robot(dva: str) -> Generator[Ask | Pause, m.Reply | None, tuple[str, int]]:

@@ -13,9 +13,9 @@ from dva_sim.agents.operator.handheld import Said
 from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
-START_TRIES = 20
-GIVE_BACK_AGAIN = 2.0  # after nobody has answered [s]
-START_AGAIN = 1.0  # when the grant may still be on its way to the robot [s]
+START_TRIES = 20  # design: to start, while the grant may be on its way
+GIVE_BACK_AGAIN = 2.0  # design: after nobody has answered [s]
+START_AGAIN = 1.0  # design: when the grant may still be on its way to the robot [s]
 NOT_YET = (m.BUSY, m.NOT_PERMITTED, m.BAD_SESSION)  # what is then answered
 
 

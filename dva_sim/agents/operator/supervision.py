@@ -19,7 +19,6 @@ from dva_sim.network.messaging import Subscription
 from dva_sim.protocol import messages as m
 
 REFUSED = "refused"  # how a drive ends when the robot obeys no more
-BLIND_AFTER = 20.0  # [s]; without a frame for so long the link counts as lost
 
 
 class Work:
@@ -130,14 +129,11 @@ class Work:
 
     def _watch_picture(self) -> bool:
         """No picture for too long: the link is lost, whatever the pattern."""
-        if not self.over and self._clock.now - self._last_frame > max(
-            BLIND_AFTER, self._device.timeout
-        ):
+        patience = self._seat.person.habits.looking.wait_for_picture_s
+        passed = self._clock.now - self._last_frame
+        if not self.over and passed > max(patience, self._device.timeout):
             self.link_lost()
         return not self.over
-
-
-ASK_PERIOD = 2.0  # how often the operator asks how the mission stands [s]
 
 
 class Supervision(Work):
@@ -160,7 +156,7 @@ class Supervision(Work):
     def begin(self) -> None:
         """The robot is on its way: watch the picture, and ask now and then how it stands."""
         super().begin()
-        self._clock.call_after(ASK_PERIOD, self._ask)
+        self._ask_later()
 
     def _see(self, observation: Observation) -> None:
         """A frame is on the screen; who looks at that perceives it a little later."""
@@ -190,10 +186,13 @@ class Supervision(Work):
                 self.end("gave up", f"the robot: {status.reason or status.mission_state}")
                 return
             self._note(status)
-            self._clock.call_after(ASK_PERIOD, self._ask)
+            self._ask_later()
 
         body = m.GetMissionStatus()
         self._device.ask(self.robot, body, answered, self.link_lost, self.session)
+
+    def _ask_later(self) -> None:
+        self._clock.call_after(self._seat.person.habits.asking.mission_every_s, self._ask)
 
     def _note(self, status: m.MissionStatus) -> None:
         """A robot that says what is in view is there, and waits for the judgement."""

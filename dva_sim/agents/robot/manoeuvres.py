@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.observation import IN_VIEW, KEEP_OFF, MATCH_WITHIN, Observation, SeenHazard
+from dva_sim.agents.observation import IN_VIEW, Observation, SeenHazard
 from dva_sim.agents.robot.collision_guard import CollisionGuard, Nearby
 from dva_sim.agents.route_following import Intent, wrap
 
@@ -166,6 +166,8 @@ class Aside(Manoeuvre):
         return True
 
 
+MATCH_WITHIN = 4.0  # a hazard so near the place of an event is the one reported there [m]
+KEEP_OFF = 1.2  # from here the place of an event is looked at [m]
 LOOK_FROM = 4.0  # an event in view no farther than this is looked at from here [m]; assumed
 FIRST_LOOK = 3.0  # with nothing in view for so long, it looks all around [s]; assumed
 LOOK_AROUND = 0.4  # turn rate meanwhile [rad/s]; assumed

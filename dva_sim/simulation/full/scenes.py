@@ -7,7 +7,6 @@ changes them. A study that is told of them needs fewer runs; see `statistics.con
 from __future__ import annotations
 
 import math
-from dataclasses import astuple
 
 from dva_sim.agents.population import draw_person
 from dva_sim.kernel.streams import Streams, derive_seed
@@ -31,7 +30,7 @@ def trait_off(scenario: Scenario, trait: str) -> float:
     people = population(operator)
     person = draw_person(people, operator.population_seed, operator.person)
     law = people.traits[trait]
-    value = dict(zip(people.traits, astuple(person), strict=True))[trait]
+    value = dict(zip(people.traits, vars(person).values(), strict=False))[trait]
     return math.log(value / law.median) / law.spread if law.spread else 0.0
 
 

@@ -8,11 +8,13 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dva_sim.agents.control_room.profile import DispatcherProfile, RoleName
+from dva_sim.agents.habits import OperatorHabits
 from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import FASTEST, SLOWEST, SensorConfig
 from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.core.assignments import Rules
 from dva_sim.core.permissions import LEVELS
+from dva_sim.kernel.assumed import OmitsUnset
 from dva_sim.kernel.config import AlsoCalled, Config, Key
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.worlds.hazards import KINDS, make_hazard
@@ -169,13 +171,15 @@ class PhoneConfig(BaseModel):
         return dict(self.__pydantic_extra__ or {})
 
 
-class OperatorConfig(Config):
+class OperatorConfig(OmitsUnset):
     """The operators: how they drive, and which simulated person each is.
 
     Attributes:
         strategy: By name, or a class in a file, `mine.py:Mine`.
         options: Of the strategy, such as `{inner: pursuit, quality: 0.8}` of the predictor.
         traits: Medians that take the place of the population's, such as `{margin: 0.4}`.
+        habits: Assumed numbers that take the place of the population's, such as
+            `{waiting: {shortest_s: 0.7}}`.
         span: How many robots one operator may have in hand at once.
         person: Index of the first operator's person in the population; the next operator
             is the next person.
@@ -189,6 +193,7 @@ class OperatorConfig(Config):
         dict[str, Any], Key(inner={"quality": Key("quality of the prediction", stated=False)})
     ] = Field(default_factory=dict)
     traits: dict[str, Positive] = Field(default_factory=dict)
+    habits: OperatorHabits = Field(default_factory=OperatorHabits)
     count: Annotated[
         int, Field(ge=0, le=50), AlsoCalled("operators", "n_operators"), Key("operators")
     ] = 1

@@ -203,13 +203,15 @@ def bystander_profile(scenario: Scenario) -> BystanderProfile:
 
 
 def population(operator: OperatorConfig) -> Population:
-    """The population that persons are drawn from, around the medians that are named otherwise.
+    """The population that persons are drawn from, with the medians and habits set otherwise.
 
     Raises:
         ConfigError: there is no such population or trait.
     """
     people = _profile(Population, operator.population, "agents/people")
-    return people.with_medians(operator.traits)
+    people = people.with_medians(operator.traits)
+    habits = people.habits.changed_by(operator.habits)
+    return people if habits is people.habits else people.model_copy(update={"habits": habits})
 
 
 def _profile(model: type[M], name: str, folder: str) -> M:

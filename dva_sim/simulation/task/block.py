@@ -65,10 +65,11 @@ def seat_of(scenario: TaskScenario) -> Seat:
     operator = scenario.operator
     person = draw_person(population(operator), operator.population_seed, operator.person)
     guess = person.perceptual_delay + person.hand_lag
-    delay = DelayEstimate(0.0, guess)
+    habits = person.habits.delay
+    delay = DelayEstimate(0.0, guess, habits=habits)
     if not scenario.is_driven:
         pace = max(first for first, _ in scenario.task.conditions())  # in a second; assumed
-        delay = DelayEstimate(0.0, guess, FINE, (pace, pace))
+        delay = DelayEstimate(0.0, guess, FINE, (pace, pace), habits)
     return Seat(person, load_strategy(operator.strategy, operator.options), delay)
 
 

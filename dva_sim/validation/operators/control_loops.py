@@ -20,7 +20,7 @@ from dva_sim.agents.operator.strategies.cursor import Sighting
 from dva_sim.agents.operator.strategies.predictor import Predictor
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.population import Person, Population, median_person
-from dva_sim.agents.route_following import NEAREST_LOOK, Reach, Route, View
+from dva_sim.agents.route_following import Reach, Route, View
 
 STEPS = 200  # of time in a delay
 SMITH_STEPS = 500  # the same under a Smith predictor
@@ -86,8 +86,9 @@ def pure_pursuit(speed_delay: float) -> list[float]:
     Returns:
         Distance from the line, signed, step by step [m].
     """
-    dt, speed = 1.0 / STEPS, speed_delay * NEAREST_LOOK
-    pursuit = Pursuit(replace(_person(), caution=_FAR), Reach(speed, _FAR))
+    person = replace(_person(), caution=_FAR)
+    dt, speed = 1.0 / STEPS, speed_delay * person.habits.steering.nearest_look_m
+    pursuit = Pursuit(person, Reach(speed, _FAR))
     route = Route(np.array([[0.0, 0.0], [2.0 * DELAYS, 0.0]]))
     x, y, heading = 1.0, 1e-3, 0.0
     frames, errors = deque([(x, y, heading)] * STEPS, maxlen=STEPS), []

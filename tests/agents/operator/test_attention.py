@@ -5,9 +5,12 @@ from itertools import pairwise
 
 import pytest
 
-from dva_sim.agents.operator.attention import GLANCE, Attention, next_screen
+from dva_sim.agents.habits import AttentionHabits
+from dva_sim.agents.operator.attention import Attention, next_screen
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.recorder import DriveLog
+
+HABITS = AttentionHabits()
 
 
 @dataclass
@@ -31,19 +34,19 @@ class Robot:
     ],
 )
 def test_judgements_come_first(why, waits, chosen):
-    assert next_screen(100.0, 0, 99.0, waits, (0.0, 50.0, 40.0)) == chosen, why
+    assert next_screen(100.0, 0, 99.0, waits, (0.0, 50.0, 40.0), HABITS.glance_s) == chosen, why
 
 
-def test_while_none_waits_each_is_glanced_at_in_turn_for_3_s():
+@pytest.mark.parametrize("glance", [1.5, 3.0])
+def test_while_none_waits_each_is_glanced_at_in_turn(glance):
     waits, seen = (None, None, None), (0.0, 50.0, 40.0)
-    assert GLANCE == 3.0
-    assert next_screen(100.0, 0, 97.1, waits, seen) == 0
-    assert next_screen(100.0, 0, 97.0, waits, seen) == 2  # not looked at for longest
+    assert next_screen(100.0, 0, 100.1 - glance, waits, seen, glance) == 0
+    assert next_screen(100.0, 0, 100.0 - glance, waits, seen, glance) == 2  # not seen for longest
 
 
 def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time():
     clock, robot = Clock(), Robot()
-    attention = Attention(clock, switch=1.0)
+    attention = Attention(clock, 1.0, HABITS)
     attention.begin(robot)
     assert attention.looks_at(robot)
     clock.run(60.0)
@@ -56,7 +59,7 @@ def test_of_a_single_robot_everything_is_seen_at_once_and_all_the_time():
 def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
     """3 s of looking, up to 0.5 s until the person moves on, 1 s to find into the other."""
     clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, switch=1.0)
+    attention = Attention(clock, 1.0, HABITS)
     attention.begin(one)
     attention.begin(two)
     clock.run(90.0)
@@ -74,7 +77,7 @@ def test_two_robots_share_the_eyes_and_each_turn_costs_the_switch():
 
 def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over():
     clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, switch=1.0)
+    attention = Attention(clock, 1.0, HABITS)
     attention.begin(one)
     attention.begin(two)
     clock.run(0.2)
@@ -90,7 +93,7 @@ def test_who_waits_for_a_judgement_keeps_the_eyes_until_it_is_over():
 
 def test_the_last_screen_that_goes_off_leaves_nothing_to_look_at():
     clock, one, two = Clock(), Robot(), Robot()
-    attention = Attention(clock, switch=1.0)
+    attention = Attention(clock, 1.0, HABITS)
     attention.begin(one)
     attention.end(one)
     attention.end(one)  # said twice

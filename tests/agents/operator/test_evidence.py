@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from helpers.worlds.delayed_loops import normals
 
+from dva_sim.agents.habits import LookingHabits
 from dva_sim.agents.operator.inspection import Evidence, clearness, worth
 
+HABITS = LookingHabits()
 SENSITIVITY, LOOK = 4.5, 1.5  # of the person in the middle of the population
 
 
@@ -36,7 +38,7 @@ def until_sure(
     at_most: float = math.inf,
 ) -> float:
     """How long a person looks until it is sure [s]; infinite if it never is."""
-    evidence, now = Evidence(sensitivity, look, normals(seed)), 0.0
+    evidence, now = Evidence(sensitivity, look, normals(seed), HABITS), 0.0
     while not evidence.sure:
         now += 1.0 / rate
         if now > at_most:
@@ -107,13 +109,13 @@ def test_a_still_picture_tells_something_for_a_third_of_a_s(rate, factor):
 
 def test_what_looks_small_speaks_against_itself():
     """From 0.03 rad on it looks more like the event than like none."""
-    assert clearness(0.03) == pytest.approx(0.5)
-    assert clearness(0.17) > 0.98  # 1 m across, 6 m away
-    assert np.isinf(times(count=50, clear=clearness(0.01), at_most=25.0)).all()
+    assert clearness(0.03, 0.03) == pytest.approx(0.5)
+    assert clearness(0.17, 0.03) > 0.98  # 1 m across, 6 m away
+    assert np.isinf(times(count=50, clear=clearness(0.01, 0.03), at_most=25.0)).all()
 
 
 def test_having_long_seen_nothing_makes_nobody_harder_to_convince():
-    evidence = Evidence(SENSITIVITY, LOOK, normals(1))
+    evidence = Evidence(SENSITIVITY, LOOK, normals(1), HABITS)
     for _ in range(3000):
         evidence.weigh(0.1, 0.0, 1.0)
     assert 0.0 <= evidence.level < evidence.criterion

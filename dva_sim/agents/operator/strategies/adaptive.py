@@ -12,21 +12,12 @@ from collections.abc import Mapping
 
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Velocity, fastest
-from dva_sim.agents.operator.strategies.move_and_wait import SHORT, MoveAndWait
+from dva_sim.agents.operator.strategies.move_and_wait import MoveAndWait
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
 from dva_sim.agents.population import Person
-from dva_sim.agents.route_following import (
-    FARTHEST_LOOK,
-    SHORTEST,
-    Intent,
-    Reach,
-    Route,
-    View,
-    gain_at,
-)
+from dva_sim.agents.route_following import SHORTEST, Intent, Reach, Route, View, gain_at
 
-BETTER = 0.8  # one changes to what takes less than this share of the time; assumed
-GAP = 1.0  # a longer time between two frames is not counted as driving [s]
+GAP = 1.0  # design: a longer time between two frames is not counted as driving [s]
 
 
 class Adaptive(Strategy):
@@ -51,6 +42,7 @@ class Adaptive(Strategy):
 
     def __init__(self, person: Person, reach: Reach, closed: Strategy | None = None) -> None:
         super().__init__(person, reach)
+        self._habits, self._farthest = person.habits.waiting, person.habits.steering.farthest_look_m
         self._closed = closed or Pursuit(person, reach)
         self._moves = MoveAndWait(person, reach)
         self.using = "closed"
@@ -65,7 +57,7 @@ class Adaptive(Strategy):
         left = route.remaining(seen.x, seen.y) - stop_before
         left = left if left > 0.0 else 0.0
         delay = view.delay if view.delay > SHORTEST else SHORTEST
-        pace, most = person.caution * FARTHEST_LOOK / delay, self._most
+        pace, most = person.caution * self._farthest / delay, self._most
         pace = pace if pace < most else most
         turn = 1.0 / gain_at(person.crossover, person.margin, delay)
         count = left / self._moves.trusted
@@ -111,7 +103,7 @@ class Adaptive(Strategy):
 
     def _waiting(self, way: float, moves: float, delay: float) -> float:
         """Expected time to finish by so many moves, each with its wait [s]."""
-        a_move = SHORT + self._moves.moves.usual_wait(delay)
+        a_move = self._habits.shortest_s + self._moves.moves.usual_wait(delay)
         return (way if way > 0.0 else 0.0) / self._most + moves * a_move
 
     def _choose(self, now: float, closed: float, waiting: float) -> None:
@@ -120,11 +112,12 @@ class Adaptive(Strategy):
             gap = now - self._last
             self._times[self.using] += gap if gap < GAP else GAP
         self._last = now
-        if self.using == "closed" and waiting < BETTER * closed:
+        better = self._habits.better
+        if self.using == "closed" and waiting < better * closed:
             self.using = "move_and_wait"
             if self._has_asked:
                 self._moves.halt(now)
             self.switches += 1
-        elif self.using != "closed" and closed < BETTER * waiting and self._moves.moves.rests:
+        elif self.using != "closed" and closed < better * waiting and self._moves.moves.rests:
             self.using = "closed"
             self.switches += 1

@@ -18,7 +18,7 @@ from dva_sim.agents.route_following import SHORTEST, Route, gain_at
 
 Velocity = tuple[float, float]
 
-BEND_PIECES = 8  # in which a path is looked at for bends
+BEND_PIECES = 8  # design: in which a path is looked at for bends
 
 
 class Sighting(NamedTuple):

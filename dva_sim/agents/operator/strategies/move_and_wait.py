@@ -12,16 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from dva_sim.agents.habits import WaitingHabits
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Velocity
 from dva_sim.agents.population import Person
-from dva_sim.agents.route_following import IN_CURVES, SHORTEST, Ahead, Intent, Reach, Route, View
-
-SETTLED_FOR = 0.3  # the picture must stand still for so long [s]; assumed
-STILL = 0.2  # slower than this share of the move, what is seen stands; assumed
-SHORT = 0.5  # no part of a move is shorter: it is made slower instead [s]; assumed
-PATIENCE = 3.0  # no motion seen after so many times the usual wait: one moves again; assumed
+from dva_sim.agents.route_following import SHORTEST, Ahead, Intent, Reach, Route, View
 
 Pair = tuple[float, float]
 MovePart = tuple[float, float, float]  # how long [s], and two wanted values
@@ -32,13 +28,15 @@ class Moves:
 
     Args:
         reaction: Of the person [s].
+        habits: Of the person.
 
     Attributes:
         waits: How often it has waited.
     """
 
-    def __init__(self, reaction: float) -> None:
-        self._reaction, self._least_wait = reaction, max(reaction, SETTLED_FOR)
+    def __init__(self, reaction: float, habits: WaitingHabits) -> None:
+        self._reaction, self._habits = reaction, habits
+        self._least_wait = max(reaction, habits.settled_s)
         self.waits = 0
         self._parts: list[MovePart] = []  # the first number is when it ends
         self._peak = 0.0
@@ -83,7 +81,7 @@ class Moves:
             delay: What the person takes the whole delay to be [s].
             pace: How fast the picture moves, in any one measure.
         """
-        still = pace <= STILL * self._peak
+        still = pace <= self._habits.still_share * self._peak
         self._was_seen = self._was_seen or not still
         if not still:
             self._still_since = None
@@ -102,9 +100,10 @@ class Moves:
         if self._ended is None:
             return False
         waited = now - self._ended
-        if waited > PATIENCE * self.usual_wait(delay):
+        if waited > self._habits.patience * self.usual_wait(delay):
             return False
-        settled = self._still_since is not None and now - self._still_since >= SETTLED_FOR
+        since = self._still_since
+        settled = since is not None and now - since >= self._habits.settled_s
         return not (settled and self._was_seen and waited >= self._reaction + delay)
 
 
@@ -134,11 +133,6 @@ def _apart(route: Route, here: Pair, along: float, way: float) -> float:
     return max(abs((bx - ax) * (y - ay) - (by - ay) * (x - ax)) for x, y in between) / length
 
 
-OFF = 0.15  # a robot may be so far off its way after a move [m]; assumed
-FACES = 0.1  # bearing at which one goes without turning first [rad]; assumed
-LEAST = 0.1  # shorter moves are not worth a wait [m]
-
-
 class MoveAndWait(Strategy):
     """Makes one open-loop move after the other, and waits until it has seen each one's result.
 
@@ -152,8 +146,10 @@ class MoveAndWait(Strategy):
 
     def __init__(self, person: Person, reach: Reach) -> None:
         super().__init__(person, reach)
-        self.moves = Moves(person.reaction)
-        self.trusted = OFF / max(person.heading_error + person.motor_noise, SHORTEST)
+        self._habits = habits = person.habits.waiting
+        self._in_curves = person.habits.steering.in_curves
+        self.moves = Moves(person.reaction, habits)
+        self.trusted = habits.off_way_m / max(person.heading_error + person.motor_noise, SHORTEST)
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
@@ -204,7 +200,7 @@ class MoveAndWait(Strategy):
 
     def halt(self, now: float) -> None:
         """Come from another way of steering: let go, and wait."""
-        self.moves.halt(now, 0.25)
+        self.moves.halt(now, self._habits.let_go)
 
     # --- moves -------------------------------------------------------------------------
 
@@ -213,29 +209,32 @@ class MoveAndWait(Strategy):
     ) -> list[MovePart]:
         """The next move of a robot, with so much way left [m]; none where it has come to stay."""
         here, turns, go = (seen.x, seen.y), self.reach.radius == 0.0, left - stop_before
-        most = max(min(self.trusted, go), LEAST)
-        way = straight_way(route, here, route.length - left, most, OFF)
+        habits = self._habits
+        most = max(min(self.trusted, go), habits.least_m)
+        way = straight_way(route, here, route.length - left, most, habits.off_way_m)
         ahead = route.ahead(*here, seen.heading, max(way, stop_before if go <= 0.0 else 0.0))
+        turns = turns and abs(ahead.bearing) > habits.faces_rad
         if go <= 0.0:
-            return [self._turn(ahead.bearing)] if turns and abs(ahead.bearing) > FACES else []
-        if turns and abs(ahead.bearing) > FACES:
+            return [self._turn(ahead.bearing)] if turns else []
+        if turns:
             lasts = self._lasting(ahead.distance, self._most)
             return [self._turn(ahead.bearing), (lasts, ahead.distance / lasts, 0.0)]
         return [self._curve(ahead)]
 
     def _turn(self, angle: float) -> MovePart:
         """On the spot by an angle [rad]."""
-        most = IN_CURVES * self.reach.turn_rate
-        lasts = max(abs(angle) / most, SHORT)
+        most = self._in_curves * self.reach.turn_rate
+        lasts = self._lasting(abs(angle), most)
         return (lasts, *self.reach.turn(angle / lasts))
 
     def _curve(self, ahead: Ahead) -> MovePart:
         """On an arc to a place ahead, no sharper than the robot can."""
-        curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, LEAST)
+        curvature = 2.0 * math.sin(ahead.bearing) / max(ahead.distance, self._habits.least_m)
         if self.reach.radius > 0.0:
             most = 1.0 / self.reach.radius
             curvature = min(max(curvature, -most), most)
-        fast = min(self._most, IN_CURVES * self.reach.turn_rate / max(abs(curvature), SHORTEST))
+        turns = self._in_curves * self.reach.turn_rate
+        fast = min(self._most, turns / max(abs(curvature), SHORTEST))
         lasts = self._lasting(ahead.distance, fast)
         speed = ahead.distance / lasts
         return lasts, speed, curvature * speed
@@ -246,10 +245,9 @@ class MoveAndWait(Strategy):
         vx, vy = dx / lasts, dy / lasts
         return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
 
-    @staticmethod
-    def _lasting(way: float, most: float) -> float:
-        """How long a move takes [s]."""
-        return max(way / most, SHORT)
+    def _lasting(self, way: float, most: float) -> float:
+        """How long a move, or a turn, takes at most so fast [s]."""
+        return max(way / most, self._habits.shortest_s)
 
     def _pace(self, speed: float, turn_rate: float) -> float:
         """How fast a robot moves, driving or turning, as a share of what it can."""

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar, final
 
 from dva_sim.agents.observation import Observation
-from dva_sim.agents.operator.delay_estimation import LONGEST
 from dva_sim.agents.operator.strategies.base import PathView, PointView, Strategy
 from dva_sim.agents.operator.strategies.cursor import Sighting, Velocity
 from dva_sim.agents.operator.strategies.pursuit import Pursuit
@@ -52,6 +51,7 @@ class Predictor(Strategy):
         self._inner = inner or Pursuit(person, reach)
         self._quality = options.number("quality", quality, least=0, most=1)
         self._asked: deque[tuple[float, float, float]] = deque()
+        self._remembers = person.habits.delay.remembers_s
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
@@ -115,7 +115,7 @@ class Predictor(Strategy):
     def _unseen(self, now: float, delay: float) -> list[tuple[float, float, float]]:
         """What was asked for since `now - delay`: for how long [s], and what."""
         asked, since, end = self._asked, now - delay, now
-        while len(asked) > 1 and asked[1][0] < now - LONGEST:
+        while len(asked) > 1 and asked[1][0] < now - self._remembers:
             asked.popleft()
         pieces = []
         for at, one, other in reversed(asked):
@@ -154,7 +154,7 @@ class Oracle:
         reach: Limits of what is steered.
     """
 
-    DELAY = 0.1  # its own period [s]
+    DELAY = 0.1  # design: its own period [s]
 
     def __init__(self, person: Person, reach: Reach) -> None:
         self._inner = Predictor(person, reach)

@@ -37,10 +37,9 @@ from dva_sim.agents.route_following import (
     wrap,
 )
 
-FAR, NEAR, INTEGRAL = 16.0, 4.0, 3.0  # gains as published, the last one in 1/s
-NEAR_TIME, FAR_TIME = 0.37, 0.93  # to the points, on the road [s]
-LARGEST = 0.07  # direction of the near point that the integral counts at most [rad]
-CYCLE = 0.2  # between two corrections; assumed, about the refractory time of such control [s]
+FAR, NEAR, INTEGRAL = 16.0, 4.0, 3.0  # source: Salvucci 2006: gains, the last one in 1/s
+NEAR_TIME, FAR_TIME = 0.37, 0.93  # source: Salvucci, Gray 2004: to the points, on the road [s]
+LARGEST = 0.07  # source: Salvucci 2006: direction of the near point that counts at most [rad]
 
 
 class Pursuit(PurePursuit, Strategy):
@@ -71,10 +70,10 @@ class TwoPoint(Pursuit):
 
     def _along(self, route: Route, view: View, ahead: Ahead, look: float, speed: float) -> Intent:
         speed = super()._along(route, view, ahead, look, speed).speed
-        passed = view.now - self._corrected
-        if passed >= CYCLE - 1e-6:
+        passed, cycle = view.now - self._corrected, self._steering_habits.cycle_s
+        if passed >= cycle - 1e-6:
             self._corrected = view.now
-            self._correct(route, view, ahead, look, speed, min(passed, 2.0 * CYCLE))
+            self._correct(route, view, ahead, look, speed, min(passed, 2.0 * cycle))
         return make_intent(speed, self._clamp(self._turn_rate))
 
     def _correct(

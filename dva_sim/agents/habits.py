@@ -1,0 +1,251 @@
+"""Habits: every number about people that was assumed, with its band and the reason for it.
+
+Nobody has measured these. A scenario sets one by its key, such as
+`operator.habits.waiting.shortest_s`, a study varies it as a factor, and `dva-sim assumed` lists
+all of them. Numbers with a source, and choices of the program itself (limits of memory,
+resolutions), stay beside the code that needs them and say so.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from dva_sim.kernel.assumed import Assumed, Sparse
+
+# --- operators -----------------------------------------------------------------------------
+
+
+class SteeringHabits(Sparse):
+    """How a person follows a route in a closed loop.
+
+    Attributes:
+        nearest_look_m: Shortest look-ahead.
+        farthest_look_m: Longest look-ahead.
+        stops_from_rad: Bearing from which on it stops to turn on the spot.
+        turns_until_rad: Bearing at which it drives on.
+        in_curves: Share of the highest turn rate with which it plans a curve.
+        cycle_s: Time between two corrections, with `two_point`.
+    """
+
+    nearest_look_m: Annotated[
+        float, Assumed(0.5, 1.2, "from a robot's own length to the width of a corridor")
+    ] = 0.8
+    farthest_look_m: Annotated[
+        float, Assumed(1.3, 3.0, "a building shows no farther around its corners")
+    ] = 1.8
+    stops_from_rad: Annotated[
+        float, Assumed(0.5, 1.2, "a target nearer the edge of a 70 deg picture is out of view")
+    ] = 0.9
+    turns_until_rad: Annotated[float, Assumed(0.1, 0.45, "from aimed exactly to roughly ahead")] = (
+        0.25
+    )
+    in_curves: Annotated[float, Assumed(0.6, 1.0, "some turn rate is kept for corrections")] = 0.8
+    cycle_s: Annotated[
+        float, Assumed(0.1, 0.35, "refractory times given for intermittent control")
+    ] = 0.2
+
+
+class WaitingHabits(Sparse):
+    """How a person moves and waits, and when it changes to that.
+
+    Attributes:
+        settled_s: Time for which the picture must stand still.
+        still_share: Share of a move's pace below which the picture counts as still.
+        shortest_s: Shortest part of a move; a shorter way is driven more slowly instead.
+        patience: Multiple of the usual wait after which it moves again, though it saw nothing.
+        off_way_m: Distance from its way that it accepts after a move.
+        faces_rad: Bearing within which it drives without turning first.
+        least_m: Shortest move worth a wait.
+        let_go: Pace, as a share of the limits, that it takes the robot to have had when it changes
+            to moving and waiting.
+        better: Share of the expected time below which it changes to the other way of steering.
+    """
+
+    settled_s: Annotated[float, Assumed(0.1, 1.0, "from one fixation to a careful second look")] = (
+        0.3
+    )
+    still_share: Annotated[float, Assumed(0.05, 0.4, "slower motion is hard to see")] = 0.2
+    shortest_s: Annotated[
+        float, Assumed(0.3, 2.5, "from a flick of the hand to more than one period of a slow link")
+    ] = 0.5
+    patience: Annotated[
+        float, Assumed(1.5, 6.0, "from soon after the usual wait to a minute at 10 s")
+    ] = 3.0
+    off_way_m: Annotated[
+        float, Assumed(0.08, 0.3, "half the room beside a robot in a door or a corridor")
+    ] = 0.15
+    faces_rad: Annotated[float, Assumed(0.05, 0.25, "from 3 to 15 degrees off")] = 0.1
+    least_m: Annotated[float, Assumed(0.05, 0.3, "from a hand's width to half a robot")] = 0.1
+    let_go: Annotated[float, Assumed(0.1, 0.6, "from creeping to well under way")] = 0.25
+    better: Annotated[
+        float, Assumed(0.6, 1.0, "from a clear gain to any gain: habits are not changed for less")
+    ] = 0.8
+
+
+class DelayHabits(Sparse):
+    """How a person learns the delay from what it did and what it sees.
+
+    Attributes:
+        first_guess_s: Delay that it expects before having seen any.
+        remembers_s: Time for which it remembers what it did.
+        fades_in_s: Time in which evidence loses its weight by a factor of e.
+        firmness: Misfit that stands against each second of change [1/s].
+        most_misfit: Highest misfit of one look.
+        speed_scale_mps: Difference of speeds that counts one.
+        turn_scale_rad_s: Difference of turn rates that counts one.
+    """
+
+    first_guess_s: Annotated[
+        float, Assumed(0.25, 1.5, "from a game over a good link to a bad video call")
+    ] = 0.6
+    remembers_s: Annotated[
+        float, Assumed(6.0, 20.0, "working memory without rehearsal lasts about that long")
+    ] = 12.0
+    fades_in_s: Annotated[
+        float, Assumed(2.0, 20.0, "from one move of a slow link to a whole corridor")
+    ] = 5.0
+    firmness: Annotated[float, Assumed(0.001, 0.016, "a factor of four either way")] = 0.004
+    most_misfit: Annotated[float, Assumed(0.25, 1.0, "a factor of two either way")] = 0.5
+    speed_scale_mps: Annotated[float, Assumed(0.25, 1.0, "a factor of two either way")] = 0.5
+    turn_scale_rad_s: Annotated[float, Assumed(0.5, 2.0, "a factor of two either way")] = 1.0
+
+
+class CloseQuarterHabits(Sparse):
+    """How a person drives whose robot is held back by its collision guard.
+
+    Attributes:
+        look_m: Look-ahead.
+        stops_from_rad: Bearing from which on it stops to turn on the spot.
+        turns_until_rad: Bearing at which it drives on.
+        slowly: Share of the top speed.
+        crawl_mps: Lowest speed.
+        understood_after_s: Time of being held back, beside two delays, until it understands.
+        step_out_m: Distance that it goes to where there is room.
+        clear_m: Way after which it drives as before.
+        asked_mps: Speed asked for from which on it expects to move.
+        held_still_mps: Speed seen below which it is held back.
+    """
+
+    look_m: Annotated[float, Assumed(0.2, 0.6, "less than a robot's length")] = 0.35
+    stops_from_rad: Annotated[float, Assumed(0.1, 0.4, "more careful than in the open")] = 0.2
+    turns_until_rad: Annotated[float, Assumed(0.05, 0.2, "half of where it stops to turn")] = 0.1
+    slowly: Annotated[float, Assumed(0.15, 0.5, "from creeping to half speed")] = 0.3
+    crawl_mps: Annotated[float, Assumed(0.05, 0.15, "slower motion is hard to see")] = 0.1
+    understood_after_s: Annotated[
+        float, Assumed(0.5, 5.0, "from a reaction with some choice to a puzzled look")
+    ] = 1.5
+    step_out_m: Annotated[float, Assumed(0.3, 1.0, "from half a robot's length to one")] = 0.5
+    clear_m: Annotated[float, Assumed(0.5, 2.0, "a robot's length to the width of a corridor")] = (
+        1.0
+    )
+    asked_mps: Annotated[float, Assumed(0.02, 0.1, "slower motion is hard to see")] = 0.05
+    held_still_mps: Annotated[float, Assumed(0.01, 0.05, "slower motion is not seen")] = 0.02
+
+
+class StuckHabits(Sparse):
+    """When a person takes its robot to be stuck, and what it does then.
+
+    Attributes:
+        still: Speed [m/s] and turn rate [rad/s] below which a robot stands.
+        asked_mps: Speed asked for from which on it expects to see motion.
+        asked_rad_s: Turn rate asked for from which on it does.
+        plans_after_s: Time of standing, beside two delays, after which it plans another way.
+        asked_for_s: Time for which motion must have been asked for in all; less is a touch that
+            may well have no effect.
+        lets_go_s: Time for which it levels the phone before it tries again.
+        nearer_m: Way below which it has made no progress.
+        in_smoke_m: Distance from which it looks at a place that it cannot see from farther.
+    """
+
+    still: Annotated[float, Assumed(0.01, 0.05, "slower motion is not seen")] = 0.02
+    asked_mps: Annotated[float, Assumed(0.02, 0.1, "slower motion is hard to see")] = 0.05
+    asked_rad_s: Annotated[float, Assumed(0.05, 0.2, "slower motion is hard to see")] = 0.1
+    plans_after_s: Annotated[
+        float, Assumed(2.0, 15.0, "from a moment's doubt to a slow page on the web")
+    ] = 4.0
+    asked_for_s: Annotated[float, Assumed(0.3, 3.0, "from a short touch to a deliberate try")] = 1.0
+    lets_go_s: Annotated[float, Assumed(0.3, 3.0, "from a twitch to a deliberate pause")] = 1.0
+    nearer_m: Annotated[float, Assumed(0.2, 1.0, "less is not seen in the picture")] = 0.5
+    in_smoke_m: Annotated[
+        float, Assumed(0.4, 0.8, "as near as a robot gets without touching it")
+    ] = 0.5
+
+
+class LookingHabits(Sparse):
+    """How a person becomes sure of an event from pictures of its place.
+
+    Attributes:
+        half_seen_rad: Angle filled by what looks half like what it is.
+        discount: Power of the contrast by which unclear evidence is discounted, beside the
+            half power of its noise.
+        leans_from: Share of the criterion from which on it is half convinced.
+        at_place_m: Distance within which it is at the place.
+        nearer_after_s: Time without seeing the place after which it looks from nearer.
+        keeps_off_m: Distance from which it looks at a place.
+        same_place_m: Distance from the reported place within which a hazard is the reported one.
+        wait_for_picture_s: Time without a picture after which it takes the link for lost.
+    """
+
+    half_seen_rad: Annotated[
+        float, Assumed(0.015, 0.06, "a factor of two either way: 9 to 36 cm from 6 m away")
+    ] = 0.03
+    discount: Annotated[
+        float, Assumed(0.5, 1.5, "from as rare errors in smoke as without to many more")
+    ] = 1.0
+    leans_from: Annotated[float, Assumed(0.3, 0.7, "around the half")] = 0.5
+    at_place_m: Annotated[float, Assumed(1.3, 3.0, "a robot stops before it, in the same room")] = (
+        1.5
+    )
+    nearer_after_s: Annotated[float, Assumed(2.0, 15.0, "from a look to a look around")] = 5.0
+    keeps_off_m: Annotated[float, Assumed(0.8, 1.3, "near enough to see it, and no contact")] = 1.2
+    same_place_m: Annotated[float, Assumed(2.0, 6.0, "the same room")] = 4.0
+    wait_for_picture_s: Annotated[
+        float, Assumed(8.0, 60.0, "from an app's time-out to a patient reload")
+    ] = 20.0
+
+
+class AttentionHabits(Sparse):
+    """How a person shares its eyes among the pictures of several robots.
+
+    Attributes:
+        glance_s: Time for which it looks at a robot that only drives.
+        reconsiders_s: Time between two decisions which screen to look at.
+    """
+
+    glance_s: Annotated[
+        float, Assumed(1.0, 12.0, "from a few fixations to the medians seen with two robots")
+    ] = 3.0
+    reconsiders_s: Annotated[float, Assumed(0.2, 2.0, "from one fixation to several")] = 0.5
+
+
+class AskingHabits(Sparse):
+    """How a person deals with a robot that it cannot have at once.
+
+    Attributes:
+        again_after_s: Time until it asks once more for a robot that somebody else holds.
+        stands_after_s: Time after a stop when it takes a robot to stand.
+        mission_every_s: Time between two questions how a mission stands.
+    """
+
+    again_after_s: Annotated[float, Assumed(1.0, 10.0, "from at once to after another look")] = 2.0
+    stands_after_s: Annotated[
+        float, Assumed(1.0, 3.0, "a robot stops within a second of the command")
+    ] = 1.5
+    mission_every_s: Annotated[float, Assumed(1.0, 10.0, "from at once to after another look")] = (
+        2.0
+    )
+
+
+class OperatorHabits(Sparse):
+    """All assumed habits of an operator, by what they are about."""
+
+    steering: SteeringHabits = Field(default_factory=SteeringHabits)
+    waiting: WaitingHabits = Field(default_factory=WaitingHabits)
+    delay: DelayHabits = Field(default_factory=DelayHabits)
+    close_quarters: CloseQuarterHabits = Field(default_factory=CloseQuarterHabits)
+    stuck: StuckHabits = Field(default_factory=StuckHabits)
+    looking: LookingHabits = Field(default_factory=LookingHabits)
+    attention: AttentionHabits = Field(default_factory=AttentionHabits)
+    asking: AskingHabits = Field(default_factory=AskingHabits)

@@ -1,0 +1,115 @@
+"""Numbers that nobody has measured: each is a key with a default, a band and a reason.
+
+A field says so beside its type: `Annotated[float, Assumed(0.2, 0.6, "reason")]`. From these notes
+come the list of all assumptions and what a screening of a study varies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, GetCoreSchemaHandler, model_serializer
+from pydantic_core import CoreSchema
+
+from dva_sim.kernel.config import Config, fields_below
+from dva_sim.kernel.units import unit_of
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """A band of plausible values, and why it is that one.
+
+    A value beyond the band is accepted as long as it has the sign of the band.
+
+    Attributes:
+        low: Lower end of the band; zero or above.
+        high: Upper end.
+        why: Reason for the band, in one sentence.
+    """
+
+    low: float
+    high: float
+    why: str
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """The schema of the field; a number must be above zero, or not below if the band has it."""
+        schema = handler(source)
+        if schema["type"] in ("float", "int"):
+            schema = {**schema, "gt" if self.low > 0 else "ge": 0}
+        return schema
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """One assumed number, under the key that sets it.
+
+    Attributes:
+        key: Dotted key of a scenario, as for `--set` and for a factor of a study.
+        default: Value unless something else is set.
+        low: Lower end of its band.
+        high: Upper end.
+        why: Reason for the band.
+        is_whole: Whether it counts something.
+    """
+
+    key: str
+    default: float
+    low: float
+    high: float
+    why: str
+    is_whole: bool = False
+
+    @property
+    def unit(self) -> str:
+        """The unit, as printed; empty for a plain number."""
+        return unit_of(self.key)
+
+
+def assumptions_in(model: type[BaseModel], above: str = "") -> Iterator[Assumption]:
+    """All assumptions in a model and below, in its order; a trait's default is its median.
+
+    Args:
+        model: Model of a file, or of a part of one.
+        above: Key of that part, with the dot at its end.
+    """
+    for key, info in fields_below(model, above):
+        for note in (note for note in info.metadata if isinstance(note, Assumed)):
+            default = info.get_default(call_default_factory=True)
+            whole = isinstance(default, int)
+            value = float(getattr(default, "median", default))
+            yield Assumption(key, value, note.low, note.high, note.why, whole)
+
+
+class OmitsUnset(Config):
+    """A configuration that leaves out parts of it in which nothing was set."""
+
+    @model_serializer(mode="wrap")
+    def _with_set(self, handler: Any) -> dict[str, Any]:
+        parts = (name for name, value in self if isinstance(value, Sparse))
+        unset = {name for name in parts if not getattr(self, name).model_fields_set}
+        return {key: value for key, value in handler(self).items() if key not in unset}
+
+
+class Sparse(Config):
+    """A configuration of which only the keys that were given are written.
+
+    Whatever was left out takes the default of the program, or of the profile that it changes.
+    """
+
+    @model_serializer(mode="wrap")
+    def _given(self, handler: Any) -> dict[str, Any]:
+        return {key: value for key, value in handler(self).items() if key in self.model_fields_set}
+
+    def changed_by(self, other: Sparse) -> Sparse:
+        """The same with every key that `other` was given."""
+        given = {name: getattr(other, name) for name in other.model_fields_set}
+        inner = {
+            name: getattr(self, name).changed_by(value)
+            for name, value in given.items()
+            if isinstance(value, Sparse)
+        }
+        return self.model_copy(update=given | inner) if given else self

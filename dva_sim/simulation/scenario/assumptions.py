@@ -1,0 +1,83 @@
+"""Every assumed number of the program: which key sets it, its band, and why it is that one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from dva_sim.agents.population import Population
+from dva_sim.kernel.assumed import Assumption, assumptions_in
+from dva_sim.kernel.suggestions import unknown
+from dva_sim.simulation.scenario.scenario import Scenario
+
+_TRAITS = "operator.traits."
+_PAGE = """# Assumptions
+
+<!-- Written by `dva-sim assumed --page`; do not edit. -->
+
+These numbers about people and their phones were not measured by anybody whom we found. Each has a
+band of plausible values. Any of them is set like every key (`--set KEY=VALUE`, a line of a
+scenario, a factor of a study), and the screening of a study says which of them move its answer.
+A trait is the median of a distribution over persons.
+"""
+
+
+def all_assumptions() -> list[Assumption]:
+    """Traits of operators first, then all habits and parts, in the order of a scenario."""
+    traits = Population().traits
+    of_persons = [
+        each
+        for each in assumptions_in(Population, _TRAITS)
+        if each.key.removeprefix(_TRAITS) in traits
+    ]
+    return of_persons + list(assumptions_in(Scenario))
+
+
+def as_json() -> list[dict[str, object]]:
+    """The list for other programs."""
+    return [{**vars(each), "unit": each.unit} for each in all_assumptions()]
+
+
+def lines() -> Iterator[str]:
+    """The list for people, one line for each number."""
+    for group, members in _groups():
+        yield group
+        for name, each in members:
+            yield f"  {name:<22} {_value(each):<32} {each.why}".rstrip()
+
+
+def as_page() -> str:
+    """The list as a page in Markdown."""
+    text = _PAGE
+    for group, members in _groups():
+        text += (
+            f"\n## `{group}`\n\n| key | default | band | reason for the band |\n|---|---|---|---|\n"
+        )
+        for name, each in members:
+            unit = f" {each.unit}" if each.unit else ""
+            band = f"{each.low:g} to {each.high:g}{unit}"
+            text += f"| `{name}` | {each.default:g}{unit} | {band} | {each.why} |\n"
+    return text
+
+
+def assumption_at(key: str) -> Assumption:
+    """The assumed number that a key sets.
+
+    Raises:
+        ValueError: there is none.
+    """
+    known = {each.key: each for each in all_assumptions()}
+    if key not in known:
+        raise ValueError(unknown("assumption", key, known))
+    return known[key]
+
+
+def _groups() -> Iterator[tuple[str, list[tuple[str, Assumption]]]]:
+    """Assumptions by the part of their key up to the last dot."""
+    for group, members in groupby(all_assumptions(), lambda each: each.key.rpartition(".")[0]):
+        yield group, [(each.key.rpartition(".")[2], each) for each in members]
+
+
+def _value(each: Assumption) -> str:
+    unit = f" {each.unit}" if each.unit else ""
+    return f"{each.default:g}{unit}  [{each.low:g}, {each.high:g}]"
