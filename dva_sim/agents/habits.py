@@ -13,6 +13,7 @@ from typing import Annotated
 from pydantic import Field
 
 from dva_sim.kernel.assumed import Assumed, Sparse
+from dva_sim.kernel.config import Config
 
 # --- operators -----------------------------------------------------------------------------
 
@@ -249,3 +250,206 @@ class OperatorHabits(Sparse):
     looking: LookingHabits = Field(default_factory=LookingHabits)
     attention: AttentionHabits = Field(default_factory=AttentionHabits)
     asking: AskingHabits = Field(default_factory=AskingHabits)
+
+
+# --- people on foot ------------------------------------------------------------------------
+
+
+class WalkingHabits(Sparse):
+    """How a person walks, and gives way to others.
+
+    Attributes:
+        radius_m: Radius of the disc that stands for a person, seen from above.
+        sideways_m: Half the depth of a chest, of a person who squeezes through a gap.
+        reach_m: Distance within which others count, indoors.
+        berth_m: Gap kept to other bodies where there is room.
+        keeps_right_m2: Handicap of passing on the left, against the square of the miss.
+        look_ahead_m: Look-ahead on the way.
+        look_past_m: The same where others are and no wall stands between.
+        astray_m: Distance from the way beyond which it plans another.
+        arrived_m: Distance from the end within which it is there.
+        crowded_m: The same where others keep it from coming nearer.
+        braking_s: Time by which the way left is divided, for the highest speed before the end.
+        nearer_m: Way below which it has made no progress.
+        tired_s: Time without progress after which it looks for a way around.
+        gives_up_s: Time without progress after which it gives up.
+        beside_m: Gap to a robot within which it squeezes past.
+        sideways_mps: Speed of squeezing past.
+        standing_mps: Speed below which somebody stands in the way.
+        narrow_m: Width of a door beyond which nobody gives way.
+        gives_way_from_m: Distance before a door from which on it can wait.
+        gives_way_to_m: Distance before a door up to which it still can.
+        waits_before_m: Distance before the door at which it waits.
+        waits_aside_m: Distance from the way through the door at which it waits.
+        oncoming_mps: Speed from which on somebody comes towards it.
+        in_door_m: Distance from its middle within which a robot is in a door.
+        patience_s: Longest wait for people at a door.
+        patience_with_robots_s: Longest wait for a robot that moves.
+    """
+
+    radius_m: Annotated[float, Assumed(0.18, 0.25, "as much floor as 0.46 m by 0.28 m")] = 0.2
+    sideways_m: Annotated[float, Assumed(0.1, 0.15, "half the depth of a chest")] = 0.12
+    reach_m: Annotated[float, Assumed(2.0, 5.0, "from arm's reach to the length of a room")] = 3.0
+    berth_m: Annotated[float, Assumed(0.05, 0.3, "from touching clothes to keeping off")] = 0.1
+    keeps_right_m2: Annotated[float, Assumed(0.0, 3.0, "from no preference to a clear one")] = 1.0
+    look_ahead_m: Annotated[float, Assumed(0.5, 1.5, "half a second to a second's walk")] = 0.8
+    look_past_m: Annotated[float, Assumed(1.5, 4.0, "one to three seconds' walk")] = 2.5
+    astray_m: Annotated[float, Assumed(0.5, 2.0, "half a corridor to a whole one")] = 1.0
+    arrived_m: Annotated[float, Assumed(0.1, 0.4, "less than a step")] = 0.15
+    crowded_m: Annotated[float, Assumed(1.0, 3.0, "one to four people around a place")] = 1.5
+    braking_s: Annotated[float, Assumed(0.5, 1.5, "one to two steps")] = 1.0
+    nearer_m: Annotated[float, Assumed(0.1, 0.5, "less than a step")] = 0.25
+    tired_s: Annotated[float, Assumed(2.0, 10.0, "from impatient to polite")] = 4.0
+    gives_up_s: Annotated[float, Assumed(30.0, 180.0, "half a minute to a few")] = 60.0
+    beside_m: Annotated[float, Assumed(0.5, 1.2, "within arm's reach")] = 0.8
+    sideways_mps: Annotated[float, Assumed(0.3, 0.8, "a fraction of walking")] = 0.5
+    standing_mps: Annotated[float, Assumed(0.05, 0.2, "shifting from foot to foot")] = 0.1
+    narrow_m: Annotated[float, Assumed(1.2, 2.0, "two shoulders pass a wider door at once")] = 1.6
+    gives_way_from_m: Annotated[float, Assumed(0.2, 0.6, "a step before the door")] = 0.3
+    gives_way_to_m: Annotated[float, Assumed(1.0, 4.0, "one to three seconds' walk")] = 2.0
+    waits_before_m: Annotated[float, Assumed(0.5, 1.5, "a step or two back")] = 0.8
+    waits_aside_m: Annotated[float, Assumed(0.6, 1.2, "out of the way of a body")] = 0.9
+    oncoming_mps: Annotated[float, Assumed(0.05, 0.3, "from creeping to a slow walk")] = 0.1
+    in_door_m: Annotated[float, Assumed(0.6, 1.5, "a robot's length and more")] = 1.0
+    patience_s: Annotated[float, Assumed(2.0, 10.0, "from impatient to polite")] = 5.0
+    patience_with_robots_s: Annotated[float, Assumed(5.0, 40.0, "robots are slow")] = 15.0
+
+
+class LeavingHabits(Sparse):
+    """When a person takes the air for too much, and how it gets out.
+
+    Attributes:
+        untenable_c: Air temperature in which nobody stays.
+        untenable_water_m: Depth of water in which nobody stays.
+        deadly_c: Air temperature through which nobody goes.
+        deadly_water_m: Depth of water through which nobody goes.
+        keeps_off_m: Distance kept to a bad place of the way.
+        close_m: Longest way through bad air that it takes to the end, if it gets no worse.
+        through_m: Distance from the middle of an exit within which it is out.
+        chooses_again_s: Shortest time between two choices of a way.
+        at_latest_s: Longest time between two choices that mended nothing.
+        looks_ahead_m: Distance along its way for which it looks for bad air.
+    """
+
+    untenable_c: Annotated[float, Assumed(50.0, 80.0, "minutes in moist to dry air")] = 60.0
+    untenable_water_m: Annotated[float, Assumed(0.5, 1.2, "from the knee to the chest")] = 1.0
+    deadly_c: Annotated[float, Assumed(90.0, 160.0, "pain within seconds to a minute")] = 120.0
+    deadly_water_m: Annotated[float, Assumed(1.2, 1.8, "from the chest to the head")] = 1.5
+    keeps_off_m: Annotated[float, Assumed(0.5, 2.0, "a step or two")] = 1.0
+    close_m: Annotated[float, Assumed(5.0, 20.0, "a breath held at a run or two")] = 10.0
+    through_m: Annotated[float, Assumed(0.5, 1.2, "within the frame of a door")] = 0.8
+    chooses_again_s: Annotated[float, Assumed(1.0, 5.0, "a look and a thought")] = 2.0
+    at_latest_s: Annotated[float, Assumed(8.0, 60.0, "nobody stands still for longer")] = 16.0
+    looks_ahead_m: Annotated[float, Assumed(3.0, 12.0, "a room to a corridor")] = 6.0
+
+
+class OnFootHabits(Sparse):
+    """All assumed habits that guards and bystanders share."""
+
+    walking: WalkingHabits = Field(default_factory=WalkingHabits)
+    leaving: LeavingHabits = Field(default_factory=LeavingHabits)
+
+
+class GuardWorkHabits(Sparse):
+    """How a guard deals with an event.
+
+    Attributes:
+        sees_from_m: Distance from which it sees what there is.
+        extinguishes_from_m: Reach of a hand-held extinguisher.
+        keeps_off_m: Distance that it keeps from untenable air while it shuts a valve.
+        is_there_m: Distance within which it stands at a place.
+        stands_off_m: Distance from an event at which it stands by.
+        stands_by_s: Longest time for which it stands by without a word of the DVA.
+        looks_ahead_m: Distance along its way for which it looks for deadly air.
+        in_sight_m: Distance from which it has seen enough if it is driven back.
+    """
+
+    sees_from_m: Annotated[float, Assumed(1.0, 5.0, "from a step away to across a room")] = 2.0
+    extinguishes_from_m: Annotated[float, Assumed(2.0, 6.0, "streams of extinguishers")] = 3.0
+    keeps_off_m: Annotated[float, Assumed(2.0, 10.0, "a valve is a room away, or a few")] = 5.0
+    is_there_m: Annotated[float, Assumed(0.5, 2.0, "a step or two")] = 1.0
+    stands_off_m: Annotated[
+        float, Assumed(8.5, 15.0, "beyond the 7 m of the worst usual hazard, and an error")
+    ] = 10.0
+    stands_by_s: Annotated[float, Assumed(300.0, 1800.0, "five minutes to half an hour")] = 900.0
+    looks_ahead_m: Annotated[float, Assumed(1.0, 3.0, "one to two seconds' walk")] = 1.5
+    in_sight_m: Annotated[float, Assumed(5.0, 15.0, "a room to a corridor")] = 10.0
+
+
+class GuardHabits(OnFootHabits):
+    """All assumed habits of a guard."""
+
+    work: GuardWorkHabits = Field(default_factory=GuardWorkHabits)
+
+
+class NoticingHabits(Sparse):
+    """What makes a bystander notice that something is wrong.
+
+    Attributes:
+        warm_c: Air temperature.
+        heat_kw_m2: Radiant heat.
+        smoke_per_m: Extinction coefficient of smoke.
+        water_m: Depth of water.
+        too_near_kw_m2: Radiant heat at which it leaves at once.
+    """
+
+    warm_c: Annotated[float, Assumed(30.0, 50.0, "from a hot day to a sauna's door")] = 40.0
+    heat_kw_m2: Annotated[float, Assumed(0.3, 1.0, "less than the sun to as much")] = 0.5
+    smoke_per_m: Annotated[float, Assumed(0.03, 0.3, "a smell to a haze: 100 to 10 m of sight")] = (
+        0.1
+    )
+    water_m: Annotated[float, Assumed(0.005, 0.05, "a film to over the sole")] = 0.02
+    too_near_kw_m2: Annotated[float, Assumed(0.7, 2.0, "the sun to below the limit of pain")] = 1.0
+
+
+class BystanderHabits(OnFootHabits):
+    """All assumed habits of a bystander."""
+
+    noticing: NoticingHabits = Field(default_factory=NoticingHabits)
+
+
+# --- phones, and the hands that hold them --------------------------------------------------
+
+
+class PhoneHabits(Config):
+    """What was assumed about a phone, how it is held, and how its owner set it up.
+
+    Attributes:
+        sample_jitter: Standard deviation of the time of a sample, as a share of the time between
+            two.
+        tremor_deg: Of the hand, as apparent tilt, standard deviation.
+        tremor_width_hz: Of the resonance of the tremor, between its half-power frequencies.
+        max_tilt_deg: Farthest that the hand tilts the phone away from rest.
+        max_tilt_speed_deg_s: Fastest that it does.
+        warming_k: Standard deviation of the temperature in a session, against the calibration's.
+        reference_error_mps2: How far off the pose that means nothing was when the owner calibrated,
+            standard deviation of x and y; the offset of the part itself is calibrated away.
+        speed_step_mps2: Acceleration along the tilt axis for one level of speed.
+        turn_step_mps2: Acceleration across it for one degree per second of turn.
+    """
+
+    sample_jitter: Annotated[
+        float, Field(le=0.3), Assumed(0.0, 0.3, "from a steady sensor to one of a busy phone")
+    ] = 0.1
+    tremor_deg: Annotated[float, Assumed(0.0, 0.6, "from a rested hand to a tired one")] = 0.25
+    tremor_width_hz: Annotated[
+        float, Assumed(1.0, 4.0, "most of the power lies between 8 and 12 Hz")
+    ] = 2.0
+    max_tilt_deg: Annotated[
+        float, Field(le=80), Assumed(30.0, 60.0, "beyond it the screen is hard to read")
+    ] = 45.0
+    max_tilt_speed_deg_s: Annotated[
+        float, Assumed(80.0, 400.0, "while looking at a picture on the phone")
+    ] = 200.0
+    warming_k: Annotated[
+        float, Assumed(0.0, 15.0, "from a phone at rest to one that has streamed video")
+    ] = 5.0
+    reference_error_mps2: Annotated[
+        float, Assumed(0.0, 0.3, "half a degree to two, held by hand")
+    ] = 0.08
+    speed_step_mps2: Annotated[
+        float, Assumed(0.2, 0.5, "full speed at 12 to 31 degrees of tilt")
+    ] = 0.35
+    turn_step_mps2: Annotated[
+        float, Assumed(0.07, 0.17, "full turn rate at 12 to 31 degrees of tilt")
+    ] = 0.12

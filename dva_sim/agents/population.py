@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -115,25 +115,37 @@ class Population(Config):
         return {name: value for name, value in self if isinstance(value, Trait)}
 
     def with_medians(self, medians: Mapping[str, float]) -> Population:
-        """The same population around other medians; the spreads between persons stay.
+        """The same population around other medians; see `with_medians`."""
+        return with_medians(self, medians, "operator")
 
-        Args:
-            medians: By the name of the trait, such as `{"margin": 0.4}`.
 
-        Raises:
-            ConfigError: there is no such trait, or its median is not above 0.
-        """
-        traits = self.traits
-        for name, median in medians.items():
-            if name not in traits:
-                raise ConfigError(unknown("operator.traits", name, traits))
-            if not median > 0:
-                raise ConfigError(f"operator.traits {name!r} is {median!r}; should be above 0")
-        changed = {
-            name: Trait(median=median, spread=traits[name].spread)
-            for name, median in medians.items()
-        }
-        return self.model_copy(update=changed)
+P = TypeVar("P", bound=Config)
+
+
+def with_medians(profile: P, medians: Mapping[str, float], whose: str) -> P:
+    """The same profile around other medians; the spreads between persons stay.
+
+    Args:
+        profile: Whose fields are traits, or numbers that all persons share.
+        medians: By the name of the trait, such as `{"margin": 0.4}`.
+        whose: Part of a scenario that names them.
+
+    Raises:
+        ConfigError: there is no such trait, or its median is not above 0.
+    """
+    traits = {name: value for name, value in profile if isinstance(value, Trait | float)}
+    changed: dict[str, Trait | float] = {}
+    for name, median in medians.items():
+        if name not in traits:
+            raise ConfigError(unknown(f"{whose}.traits", name, traits))
+        trait = traits[name]
+        if not isinstance(trait, Trait):
+            changed[name] = median
+        elif median > 0:
+            changed[name] = Trait(median=median, spread=trait.spread)
+        else:
+            raise ConfigError(f"{whose}.traits {name!r} is {median!r}; should be above 0")
+    return profile.model_copy(update=changed) if changed else profile
 
 
 @dataclass(frozen=True)

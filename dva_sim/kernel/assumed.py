@@ -66,22 +66,26 @@ class Assumption:
     @property
     def unit(self) -> str:
         """The unit, as printed; empty for a plain number."""
-        return unit_of(self.key)
+        return unit_of(self.key.removesuffix(".median"))
 
 
-def assumptions_in(model: type[BaseModel], above: str = "") -> Iterator[Assumption]:
-    """All assumptions in a model and below, in its order; a trait's default is its median.
+def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> Iterator[Assumption]:
+    """All assumptions in a model and below, in its order; of a trait its median counts.
+
+    In a scenario a median has a key of its own; in a profile (`depth` 1) the trait's key is it.
 
     Args:
         model: Model of a file, or of a part of one.
         above: Key of that part, with the dot at its end.
+        depth: Of keys in keys.
     """
-    for key, info in fields_below(model, above):
+    for key, info in fields_below(model, above, depth):
         for note in (note for note in info.metadata if isinstance(note, Assumed)):
             default = info.get_default(call_default_factory=True)
             whole = isinstance(default, int)
-            value = float(getattr(default, "median", default))
-            yield Assumption(key, value, note.low, note.high, note.why, whole)
+            value, is_trait = getattr(default, "median", default), hasattr(default, "median")
+            own = f"{key}.median" if is_trait and depth > 1 else key
+            yield Assumption(own, float(value), note.low, note.high, note.why, whole)
 
 
 class OmitsUnset(Config):

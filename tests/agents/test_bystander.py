@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from helpers.worlds.hall_with_people import People, hall, two_rooms
 
+from dva_sim.agents.habits import LeavingHabits
 from dva_sim.agents.people import evacuation
 from dva_sim.agents.people.bystander import APART, BystanderAgent, draw_places, nothing_seen
 from dva_sim.agents.people.evacuation import (
-    AT_LATEST,
     PERIOD,
-    THROUGH,
     UNTENABLE,
     choose_escape,
     clean_air,
@@ -30,6 +29,7 @@ from dva_sim.worlds.hazards import CLEAR, Surroundings, make_hazard, pace_in_smo
 from dva_sim.worlds.planning import Planner
 from dva_sim.worlds.site import load_site
 
+LEAVING = LeavingHabits()
 EAST, WEST = (39.0, 1.5), (1.0, 1.5)
 SPEED, PREMOVEMENT = 1.2, 20.0
 
@@ -96,7 +96,7 @@ def test_who_hears_the_alarm_gets_ready_walks_to_the_nearer_exit_and_is_out():
     assert one.activity == "evacuating"
     building.pass_time(60.0)
     assert one.activity == "safe"
-    assert math.dist((one.x, one.y), WEST) < THROUGH
+    assert math.dist((one.x, one.y), WEST) < LEAVING.through_m
     assert building.told == ["leaves", "is out"]
     assert building.world.people == []
 
@@ -111,7 +111,7 @@ def test_the_time_to_get_out_of_an_empty_corridor_is_premovement_and_distance_by
         one = building.bystander((15.0, 1.5), speed=who.speed, premovement=who.premovement)
         one.alarm(0.0)
         building.run_until(lambda: one.activity == "safe", 600.0)  # noqa: B023
-        late.append(one.out_at - (who.premovement + (14.0 - THROUGH) / who.speed))
+        late.append(one.out_at - (who.premovement + (14.0 - LEAVING.through_m) / who.speed))
     assert min(late) > -0.3  # nobody is faster than possible, but for one look in five a second
     assert max(late) < 2.5
     assert np.mean(late) < 1.5
@@ -201,7 +201,7 @@ def test_the_nearer_exit_is_not_taken_through_what_nobody_endures():
     one.alarm(0.0)
     building.pass_time(70.0)
     assert one.activity == "safe"
-    assert math.dist((one.x, one.y), EAST) < THROUGH
+    assert math.dist((one.x, one.y), EAST) < LEAVING.through_m
     assert one.dose.heat == 0.0
 
 
@@ -211,7 +211,7 @@ def test_who_finds_the_way_ahead_become_so_turns_round():
     one = building.bystander((10.0, 1.5), air=fire)
     one.alarm(0.0)
     building.pass_time(90.0)
-    assert math.dist((one.x, one.y), EAST) < THROUGH
+    assert math.dist((one.x, one.y), EAST) < LEAVING.through_m
     assert one.dose.heat == 0.0
 
 
@@ -309,7 +309,7 @@ def test_who_has_no_way_left_stands_still_and_leaves_when_there_is_one_again():
     assert (one.activity, one.walking.walks) == ("evacuating", False)
     building.pass_time(59.0)
     assert one.x == pytest.approx(here, abs=0.05)
-    building.pass_time(60.0 + AT_LATEST + 20.0)
+    building.pass_time(60.0 + LEAVING.at_latest_s + 20.0)
     assert (one.activity, one.dose.heat) == ("safe", 0.0)
 
 
@@ -366,7 +366,9 @@ def test_smoke_and_water_slow_people_down_by_the_share_that_hazards_say(conditio
     one = building.bystander(air=from_then_on(0.0, conditions))
     one.alarm(0.0)
     building.run_until(lambda: one.activity == "safe", 200.0)
-    assert one.out_at == pytest.approx(PREMOVEMENT + (9.0 - THROUGH) / (SPEED * pace), rel=0.1)
+    assert one.out_at == pytest.approx(
+        PREMOVEMENT + (9.0 - LEAVING.through_m) / (SPEED * pace), rel=0.1
+    )
 
 
 def test_a_dose_adds_up_and_who_has_too_much_stays_where_it_is():

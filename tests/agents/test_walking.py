@@ -10,9 +10,8 @@ from helpers.processes.second_process import told_here_and_elsewhere
 from helpers.worlds.hall_with_people import People, gap, hall, two_rooms
 
 from dva_sim.agents.people.pedestrian_avoidance import (
-    BERTH,
-    RADIUS,
     RELAXATION,
+    USUAL,
     Courtesy,
     Door,
     Mover,
@@ -23,7 +22,7 @@ from dva_sim.agents.people.pedestrian_avoidance import (
     velocity,
 )
 from dva_sim.agents.people.profiles import FASTEST, SLOWEST, PaceProfile
-from dva_sim.agents.people.walking import ARRIVED, GIVE_UP, TIRED, Walking
+from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.bodies import Body
 from dva_sim.worlds.drives import DriveSpec
@@ -39,7 +38,7 @@ class FreeBody:
 
     def __init__(self, clock: Clock, x: float, y: float) -> None:
         self._clock, self._since = clock, clock.now
-        self._x, self._y, self.radius = x, y, RADIUS
+        self._x, self._y, self.radius = x, y, USUAL.radius_m
         self.velocity = 0.0, 0.0
 
     @property
@@ -103,7 +102,7 @@ def test_who_cannot_pass_walks_no_faster_than_stops_in_half_a_second_before_who_
     for distance in (1.0, 0.8, 0.6):
         queue = [Mover(distance, y, 0.0, 0.0, 0.2) for y in np.arange(-9.0, 9.1, 0.3)]
         vx, _ = velocity(ME, 0.0, SPEED, queue, wide_open)
-        assert 0.0 < vx < 1.2 * (distance - 0.4 - BERTH) / RELAXATION
+        assert 0.0 < vx < 1.2 * (distance - 0.4 - USUAL.berth_m) / RELAXATION
 
 
 def test_nobody_steps_aside_into_a_wall():
@@ -141,7 +140,7 @@ def body(x, y, vx=0.0, vy=0.0):
 def test_the_doors_of_a_way_are_found_in_its_order_and_wide_ones_need_no_manners():
     ends = np.array([[7, -0.5, 7, 0.5], [3, -0.5, 3, 0.5], [5, -2, 5, 2], [5, 8, 5, 9]], float)
     way = np.stack([np.arange(0, 10.01, 0.25), np.zeros(41)], 1)
-    doors = doors_on(way, middles_of(ends))
+    doors = doors_on(way, middles_of(ends, USUAL.narrow_m))
     assert [(d.along, d.x) for d in doors] == [(3.0, 3.0), (7.0, 7.0)]
     assert doors_on(way, np.empty((0, 2))) == []
 
@@ -184,7 +183,7 @@ def test_a_walk_takes_its_length_by_its_speed_and_little_more():
     walker = people.add((1.0, 1.2), (19.0, 1.2))
     people.run_until(people.all_settled, 30.0)
     assert 18.0 / SPEED < people.arrived[0] < 18.0 / SPEED + 1.6  # to begin and to stop
-    assert math.dist(walker.place, (19.0, 1.2)) < 2 * ARRIVED
+    assert math.dist(walker.place, (19.0, 1.2)) < 2 * USUAL.arrived_m
 
 
 def test_a_slower_pace_takes_longer_in_proportion():
@@ -373,7 +372,7 @@ def test_who_is_held_up_by_a_robot_in_a_door_squeezes_past_if_there_is_a_gap():
     walker = people.add((1, 5), (11, 5))
     people.run_until(people.all_settled, 60.0)
     assert people.arrived
-    assert walker.body.radius == RADIUS  # and turns back
+    assert walker.body.radius == USUAL.radius_m  # and turns back
     assert math.dist(robot.pose()[:2], (6, 5)) < 0.05
 
 
@@ -383,7 +382,7 @@ def test_who_can_get_through_nowhere_says_so_and_does_not_push_for_ever():
     people.add((1, 5), (11, 5))
     people.run_until(people.all_settled, 200.0)
     assert people.arrived == {}
-    assert GIVE_UP < people.gave_up[0] < 2 * GIVE_UP
+    assert USUAL.gives_up_s < people.gave_up[0] < 2 * USUAL.gives_up_s
     assert math.dist(robot.pose()[:2], (6, 5)) < 0.05
 
 
@@ -403,7 +402,7 @@ def test_two_who_are_sent_to_one_place_both_arrive():
     people.add((9, 5), (5, 5))
     people.run_until(people.all_settled, 30.0)
     assert len(people.arrived) == 2
-    assert max(people.arrived.values()) < 4.0 / SPEED + TIRED + 4.0
+    assert max(people.arrived.values()) < 4.0 / SPEED + USUAL.tired_s + 4.0
 
 
 # --- the same again --------------------------------------------------------------------

@@ -12,13 +12,13 @@ from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.scenario.assumptions import all_assumptions, as_page
 
 AGENTS = ROOT / "dva_sim" / "agents"
-ROOMS = ["operator", "."]
+ROOMS = ["control_room", "operator", "people", "tilt", "."]
 FILES = sorted(
     path
     for room in ROOMS
     for path in ((AGENTS / room).rglob("*.py") if room != "." else AGENTS.glob("*.py"))
 )
-MARK = re.compile(r"\b(source|design): \S", re.IGNORECASE)
+MARK = re.compile(r"\b(source|design):\s+\S", re.IGNORECASE)
 """`source: Jin`: somebody measured or prescribed it. `design: why`: a choice of the program."""
 
 
@@ -88,7 +88,7 @@ def test_a_number_without_a_source_is_found(source, names):
 
 def test_every_default_lies_within_its_band_and_no_key_is_listed_twice():
     listed = all_assumptions()
-    assert len(listed) == len({each.key for each in listed}) > 60
+    assert len(listed) == len({each.key for each in listed}) > 110
     for each in listed:
         assert each.low <= each.default <= each.high, each
         assert 0 <= each.low < each.high, each

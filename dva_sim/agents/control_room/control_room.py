@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dva_sim.agents.device import AUDIT, EVENT, AgentDevice, do_nothing
 from dva_sim.protocol import messages as m
 
-REFRESH = 10.0  # from one look at the whole list to the next: what is published may be lost [s]
-MOST_CLOSED = 200  # events that are over and still known
+REFRESH = 10.0  # design: from one look at the whole list to the next, as news may be lost [s]
+MOST_CLOSED = 200  # design: events that are over and still known
 
 
 class ControlRoomAgent:

@@ -18,7 +18,7 @@ from dva_sim.protocol import messages as m
 
 FREE = "free"  # what the DVA says of a candidate that can be sent
 KINDS = {"Robot": "robot", "Guard": "guard"}
-MOST_TRIES = 3  # of one decision, when others decide meanwhile
+MOST_TRIES = 3  # design: of one decision, when others decide meanwhile
 
 
 @dataclass

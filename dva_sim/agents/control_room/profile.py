@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from dva_sim.agents.population import Trait
+from dva_sim.kernel.assumed import Assumed
 from dva_sim.kernel.config import Config, Key
 from dva_sim.protocol.event_kinds import EventKind
 
@@ -38,8 +39,6 @@ class Overrule(Config):
 class DispatcherProfile(Config):
     """A person at a control room who acknowledges events and decides on them, one at a time.
 
-    The medians are assumed, and of the order of what call-takers need; see `experiments/README.md`.
-
     Attributes:
         role: What it may do: `look`, `drive`, `dispatch` or `supervise`.
         acknowledge_s: From when it turns to an event until it has acknowledged it.
@@ -48,10 +47,14 @@ class DispatcherProfile(Config):
     """
 
     role: RoleName = "dispatch"
-    acknowledge_s: Annotated[Trait, Key(inner={"median": Key("time to acknowledge")})] = Trait(
-        median=8.0, spread=0.5
-    )
-    decide_s: Annotated[Trait, Key(inner={"median": Key("time to decide")})] = Trait(
-        median=12.0, spread=0.5
-    )
+    acknowledge_s: Annotated[
+        Trait,
+        Key(inner={"median": Key("time to acknowledge")}),
+        Assumed(3.0, 30.0, "of the order of what call-takers need"),
+    ] = Trait(median=8.0, spread=0.5)
+    decide_s: Annotated[
+        Trait,
+        Key(inner={"median": Key("time to decide")}),
+        Assumed(5.0, 60.0, "of the order of what call-takers need"),
+    ] = Trait(median=12.0, spread=0.5)
     overrules: tuple[Overrule, ...] = ()

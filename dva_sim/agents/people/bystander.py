@@ -48,9 +48,9 @@ NOTICED: Final = Conditions(
     water=0.02,
     explosive=0.2,
 )
-"""From any of it on people notice that something is wrong; assumed, but for gas: it is given a
-smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has none."""
-TOO_NEAR: Final = 1.0  # who feels a fire so hot waits for nothing [kW/m^2]; assumed
+"""From any of it on people notice that something is wrong: habits of a person, but for gas. Source:
+gas is given a smell that is noticed at a fifth of its lower explosive limit. Carbon monoxide has
+none."""
 
 Point = tuple[float, float]
 
@@ -100,6 +100,13 @@ class BystanderAgent(OnFoot):
         tell: Callable[[str], object] = do_nothing,
     ) -> None:
         super().__init__(walking, Exposure(clock, walking, air))
+        own = self._habits = occupant.habits.noticing
+        self._noticed = NOTICED._replace(
+            temperature=own.warm_c,
+            heat_flux=own.heat_kw_m2,
+            extinction=own.smoke_per_m,
+            water=own.water_m,
+        )
         self.name, self._clock, self._occupant = name, clock, occupant
         self._way_out = WayOut(clock, planner, walking, self.exposure, lambda: refuges)
         self._places, self._luck = places, luck
@@ -151,14 +158,18 @@ class BystanderAgent(OnFoot):
             self._collapse()
         elif self.activity == EVACUATING:
             self._way_out.look_ahead()
-        elif self.exposure.is_too_much or self.exposure.conditions.heat_flux >= TOO_NEAR:
+        elif self.exposure.is_too_much or self._feels_fire():
             self._leave_at(now)
         elif self.activity != ALARMED and self._notices(now):
             self._tell("notices danger")
             self._leave_at(now + self._occupant.premovement)
 
+    def _feels_fire(self) -> bool:
+        """Whether it feels a fire so near that it waits for nothing."""
+        return self.exposure.conditions.heat_flux >= self._habits.too_near_kw_m2
+
     def _notices(self, now: float) -> bool:
-        felt = zip(self.exposure.conditions, NOTICED, strict=True)
+        felt = zip(self.exposure.conditions, self._noticed, strict=True)
         return any(is_ >= least for is_, least in felt) or self._sees(*self.walking.place, now)
 
     def _collapse(self) -> None:
@@ -182,10 +193,10 @@ class BystanderAgent(OnFoot):
         self._leaves()
 
 
-ELBOW_ROOM: Final = 0.3  # radius that must fit where somebody works [m]
-APART: Final = 0.8  # nobody begins nearer to somebody else [m]
-PASSAGE: Final = 3.5  # a room so many times as long as wide is a corridor, where nobody works
-TRIES: Final = 100
+ELBOW_ROOM: Final = 0.3  # design: radius that must fit where somebody works [m]
+APART: Final = 0.8  # design: nobody begins nearer to somebody else [m]
+PASSAGE: Final = 3.5  # design: a room so many times as long as wide is a corridor
+TRIES: Final = 100  # design: to find a place
 
 
 def draw_places(

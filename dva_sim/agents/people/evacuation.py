@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.device import do_nothing
+from dva_sim.agents.habits import LeavingHabits
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.hazards import CLEAR, Conditions, Dose, pace_in_smoke, pace_in_water
@@ -39,7 +40,8 @@ UNTENABLE: Final = Conditions(
     water=1.0,
     explosive=1.0,
 )
-"""Any of it is more than anybody goes into, or stays in."""
+"""Any of it is more than anybody goes into, or stays in. Source: see above; temperature and depth
+of water are habits of a person."""
 DEADLY: Final = Conditions(
     temperature=120.0,
     heat_flux=10.0,
@@ -49,15 +51,14 @@ DEADLY: Final = Conditions(
     water=1.5,
     explosive=math.inf,
 )
-"""Flames and what is next to them: nobody goes through, whatever the other ways are like; in
-10 kW/m^2 skin burns within seconds (ISO 13571), the rest is assumed."""
-EVERY: Final = 1.0  # a way is looked at so often [m]
-KEEPS_OFF: Final = 1.0  # around a bad place of a way [m]
-TRIES: Final = 3  # to find a way around bad places
-CLOSE: Final = 10.0  # so far one goes through bad air to the end, if it gets no worse; assumed [m]
-WITHIN: Final = 0.05  # of the line of an exit, still indoors [m]
-ROUNDING: Final = 1e-6  # a straight way of many steps may seem so much shorter than it is [m]
+"""Flames and what is next to them: nobody goes through, whatever the other ways are like. Source:
+ISO 13571: in 10 kW/m^2 skin burns within seconds; the rest are habits of a person."""
+EVERY: Final = 1.0  # design: a way is looked at so often [m]
+TRIES: Final = 3  # design: to find a way around bad places
+WITHIN: Final = 0.05  # design: of the line of an exit, still indoors [m]
+ROUNDING: Final = 1e-6  # design: a straight way of many steps may seem so much shorter [m]
 
+USUAL: Final = LeavingHabits()
 Point = tuple[float, float]
 Floats = NDArray[np.float64]
 StrainLimit = Callable[[Point], float]  # 1 and more is more than one bears
@@ -97,7 +98,11 @@ def refuges_of(site: Site) -> list[Point]:
 
 
 def choose_escape(
-    planner: Planner, here: Point, refuges: Sequence[Point], limits: Sequence[StrainLimit]
+    planner: Planner,
+    here: Point,
+    refuges: Sequence[Point],
+    limits: Sequence[StrainLimit],
+    habits: LeavingHabits = USUAL,
 ) -> Escape | None:
     """The nearest refuge by the way there, on a way without bad places.
 
@@ -110,30 +115,35 @@ def choose_escape(
         here: Where one is; who stands in bad air goes through no worse to the first good place.
         refuges: Where one is safe, whatever it is like right there: outdoors is beyond [m].
         limits: Each says how much of what one bears a place is; the strictest first.
+        habits: Of the person.
     """
     for k in range(len(limits)):
-        escape = _keeping(planner, here, refuges, limits[k:])
+        escape = _keeping(planner, here, refuges, limits[k:], habits)
         if escape is not None:
             return escape
     return None
 
 
 def _keeping(
-    planner: Planner, here: Point, refuges: Sequence[Point], limits: Sequence[StrainLimit]
+    planner: Planner,
+    here: Point,
+    refuges: Sequence[Point],
+    limits: Sequence[StrainLimit],
+    habits: LeavingHabits,
 ) -> Escape | None:
     """The nearest refuge on a way that keeps some limits, around more and more bad places."""
     avoid: tuple[Disc, ...] = ()
     for _ in range(TRIES):
         found: dict[Point, None] = {}
         for refuge, way in _nearest_first(planner, here, refuges, avoid):
-            judged = [_judge(way, one, CLOSE) for one in limits[:-1]]
+            judged = [_judge(way, one, habits.close_m) for one in limits[:-1]]
             judged.append(_judge(way, limits[-1], math.inf))
             if all(will_do for will_do, _ in judged):
                 return Escape(refuge, avoid)
             found.update((place, None) for _, bad in judged for place in bad)
         if not found:
             return None
-        avoid = (*avoid, *(Disc(x, y, KEEPS_OFF) for x, y in found))
+        avoid = (*avoid, *(Disc(x, y, habits.keeps_off_m) for x, y in found))
     return None
 
 
@@ -177,10 +187,10 @@ def _length(way: Floats) -> float:
     return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
-PERIOD: Final = 0.5  # between two looks at the air [s]
+PERIOD: Final = 0.5  # design: between two looks at the air [s]
 HURT: Final = 0.3
-"""A dose beyond which a guard works no more; 1 stops half of all people (ISO 13571, which takes
-0.3 as what all but the most susceptible still bear)."""
+"""Source: ISO 13571: a dose beyond which a guard works no more; 1 stops half of all people, 0.3 is
+what all but the most susceptible still bear."""
 
 AirAt = Callable[[float, float, float], Conditions]
 
@@ -205,6 +215,10 @@ class Exposure:
 
     def __init__(self, clock: Clock, walking: Walking, air: AirAt = clean_air) -> None:
         self._clock, self._walking, self._air = clock, walking, air
+        own = walking.habits.leaving
+        warm = {"temperature": own.untenable_c, "water": own.untenable_water_m}
+        hot = {"temperature": own.deadly_c, "water": own.deadly_water_m}
+        self._untenable, self._deadly = UNTENABLE._replace(**warm), DEADLY._replace(**hot)
         self.dose, self.conditions = Dose(), CLEAR
         self._over = self._is_outdoors = False
 
@@ -237,7 +251,7 @@ class Exposure:
     @property
     def is_too_much(self) -> bool:
         """Whether the person has to leave: the air is untenable, or its dose is."""
-        return self.is_hurt or is_untenable(self.conditions)
+        return self.is_hurt or strain(self.conditions, self._untenable) >= 1.0
 
     @property
     def is_hurt(self) -> bool:
@@ -246,26 +260,20 @@ class Exposure:
 
     def is_bad(self, place: tuple[float, float]) -> bool:
         """Whether it is untenable at a place [m] now."""
-        return is_untenable(self._air(*place, self._clock.now))
+        return strain(self._air(*place, self._clock.now), self._untenable) >= 1.0
 
     def is_deadly(self, place: tuple[float, float]) -> bool:
         """Whether nobody would go through a place [m] now."""
-        return is_deadly(self._air(*place, self._clock.now))
+        return strain(self._air(*place, self._clock.now), self._deadly) >= 1.0
 
     @property
     def limits(self) -> tuple[StrainLimit, StrainLimit]:
         """What to keep off: what is untenable, or where that cannot be, what is deadly."""
-        return self._strain(UNTENABLE), self._strain(DEADLY)
+        return self._strain(self._untenable), self._strain(self._deadly)
 
     def _strain(self, most: Conditions) -> StrainLimit:
         """How much of some limit it is at a place now."""
         return lambda place: strain(self._air(*place, self._clock.now), most)
-
-
-THROUGH: Final = 0.8  # so near to the middle of an exit one is through [m]
-CHOOSES_AGAIN: Final = 2.0  # no sooner than this after the last choice of a way [s] ...
-AT_LATEST: Final = 16.0  # ... and twice as long after each that mended nothing, up to this [s]
-LOOKS_AHEAD: Final = 6.0  # along its way, for what nobody endures [m]
 
 
 class WayOut:
@@ -292,12 +300,13 @@ class WayOut:
         self._clock, self._planner, self._walking = clock, planner, walking
         self._exposure, self._refuges = exposure, refuges
         self._arrived: Callable[[], object] = do_nothing
-        self._chosen, self._pause = -math.inf, CHOOSES_AGAIN
+        self._habits = habits = walking.habits.leaving
+        self._chosen, self._pause = -math.inf, habits.chooses_again_s
         self._choices = 0
 
     def leave(self, arrived: Callable[[], object]) -> None:
         """Set out; `arrived` is called at a safe place."""
-        self._arrived, self._pause = arrived, CHOOSES_AGAIN
+        self._arrived, self._pause = arrived, self._habits.chooses_again_s
         self._choose()
 
     def end(self) -> None:
@@ -307,26 +316,28 @@ class WayOut:
 
     def look_ahead(self) -> None:
         """Choose again if what is next on the way has become bad; at once, if deadly."""
-        ahead = self._walking.places_ahead(1.0, LOOKS_AHEAD)
+        soonest = self._habits.chooses_again_s
+        ahead = self._walking.places_ahead(1.0, self._habits.looks_ahead_m)
         since = self._clock.now - self._chosen
-        if since < CHOOSES_AGAIN or not ahead:
+        if since < soonest or not ahead:
             return
         if not any(map(self._exposure.is_bad, ahead)):
-            self._pause = CHOOSES_AGAIN
+            self._pause = soonest
         elif since >= self._pause or any(map(self._exposure.is_deadly, ahead)):
             self._choose()
 
     def _choose(self) -> None:
         """Set out for the refuge that is best now; if none can be reached, wait."""
         self._chosen, self._choices = self._clock.now, self._choices + 1
-        pause, self._pause = self._pause, min(2.0 * self._pause, AT_LATEST)
+        habits, pause = self._habits, self._pause
+        self._pause = min(2.0 * pause, habits.at_latest_s)
         here, limits = self._walking.place, self._exposure.limits
-        escape = choose_escape(self._planner, here, self._refuges(), limits)
+        escape = choose_escape(self._planner, here, self._refuges(), limits, habits)
         if escape is None or not self._walking.go(
             escape.goal,
             self._arrived,
             self._choose,
-            lambda at: math.dist(at, escape.goal) < THROUGH,
+            lambda at: math.dist(at, escape.goal) < habits.through_m,
             escape.avoid,
         ):
             self._walking.stop()

@@ -28,18 +28,7 @@ from dva_sim.protocol import messages as m
 from dva_sim.worlds.hazards import KINDS
 from dva_sim.worlds.planning import Planner
 
-STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # of where a guard is [s]
-AT_MOST = 2.0  # from where a guard sees what there is, if nothing stands between [m]
-EXTINGUISHED_FROM = 3.0  # the stream of a hand-held extinguisher carries so far; assumed [m]
-KEEPS_OFF = 5.0  # who shuts a valve keeps so far from what nobody endures [m]
-HERE = 1.0  # who is so near a place stands at it [m]
-STAND_OFF = 10.0
-"""Who stands by waits so far from the place [m]: no hazard of the default settings is dangerous
-beyond 7 m (a greater one, set in a scenario, may be), one step may lead a metre too far, and a
-place is reported a metre or two wrong."""
-STAND_BY_FOR = 900.0  # who stands by gives up if the DVA says nothing for so long [s]
-LOOKS_AHEAD = 1.5  # on an errand, for what nobody survives; about a second's walk [m]
-IN_SIGHT = 10.0  # from where who is driven back has seen what there is [m]
+STATUS_PERIOD, FIRST_STATUS = 2.0, 0.5  # design: of where a guard is [s]
 CONFIRMED, REFUTED, CONTAINED = "confirmed", "refuted", "contained"
 
 Point = tuple[float, float]
@@ -75,6 +64,7 @@ class GuardAgent(OnFoot):
     ) -> None:
         super().__init__(walking, Exposure(device.clock, walking, air))
         self.device, self._walker, self._planner = device, walker, planner
+        self._habits = walker.habits.work
         device.meanwhile = "an order in hand goes on"
         self._post, self._refuges = walking.place, refuges
         self._way_out = WayOut(device.clock, planner, walking, self.exposure, self._safe_places)
@@ -154,21 +144,23 @@ class GuardAgent(OnFoot):
             return place, lambda at: False
         if errand.order.task != "stand_by":
             return place, partial(self._is_near_enough, errand.order, place)
-        if math.dist(self.walking.place, place) < STAND_OFF:
-            return self._post, lambda at: math.dist(at, place) >= STAND_OFF  # too near: back off
-        return place, lambda at: math.dist(at, place) <= STAND_OFF
+        off = self._habits.stands_off_m
+        if math.dist(self.walking.place, place) < off:
+            return self._post, lambda at: math.dist(at, place) >= off  # too near: back off
+        return place, lambda at: math.dist(at, place) <= off
 
     def _stands_at(self, place: m.Position) -> bool:
-        return math.dist(self.walking.place, self._xy(place)) < HERE
+        return math.dist(self.walking.place, self._xy(place)) < self._habits.is_there_m
 
     def _is_near_enough(self, order: m.Order, place: Point, at: Point) -> bool:
         """Whether what is to be looked at, or dealt with, can be so from here."""
         has_valve = order.task == "contain" and not _is_extinguished(order.kind)
-        ahead = self.walking.places_ahead(1.0, KEEPS_OFF) if has_valve else []
+        ahead = self.walking.places_ahead(1.0, self._habits.keeps_off_m) if has_valve else []
         return any(map(self.exposure.is_bad, ahead)) or self._is_in_reach(order, place, at)
 
     def _is_in_reach(self, order: m.Order, place: Point, at: Point) -> bool:
-        within = EXTINGUISHED_FROM if _is_extinguished(order.kind) else AT_MOST
+        own = self._habits
+        within = own.extinguishes_from_m if _is_extinguished(order.kind) else own.sees_from_m
         return self._sees(order.kind, at, place, within)
 
     def _sees(self, kind: str, at: Point, place: Point, within: float) -> bool:
@@ -189,7 +181,7 @@ class GuardAgent(OnFoot):
             self._finish()
         elif order.task == "stand_by":
             self.activity = "standing by"
-            clock.call_after(STAND_BY_FOR, self._give_up, errand)
+            clock.call_after(self._habits.stands_by_s, self._give_up, errand)
         else:
             self.device.progress(order.event_id, "arrived")
             if order.task == "contain" and self._is_there(order.kind, *self._xy(order.position)):
@@ -262,7 +254,8 @@ class GuardAgent(OnFoot):
         """Whether an errand leads on into what nobody survives, before it is near enough."""
         if self.activity != "walking":
             return False
-        ahead = takewhile(self._goes_on_from, self.walking.places_ahead(0.5, LOOKS_AHEAD))
+        far = self._habits.looks_ahead_m
+        ahead = takewhile(self._goes_on_from, self.walking.places_ahead(0.5, far))
         return any(map(self.exposure.is_deadly, ahead))
 
     def _goes_on_from(self, at: Point) -> bool:
@@ -281,8 +274,8 @@ class GuardAgent(OnFoot):
             self._finish("failed")
 
     def _has_seen(self, order: m.Order) -> bool:
-        at, place = self.walking.place, self._xy(order.position)
-        return self._sees(order.kind, at, place, IN_SIGHT) and self._is_there(order.kind, *place)
+        at, place, within = self.walking.place, self._xy(order.position), self._habits.in_sight_m
+        return self._sees(order.kind, at, place, within) and self._is_there(order.kind, *place)
 
     def _safe_places(self) -> list[Point]:
         """Where to withdraw to: its post, unless it is bad there, and the ways out."""
@@ -291,7 +284,8 @@ class GuardAgent(OnFoot):
 
     def _is_safe(self) -> None:
         """At a refuge: fit for service again, unless hurt; who is at an exit steps out."""
-        if any(math.dist(self.walking.place, place) < HERE for place in self._refuges):
+        here, near = self.walking.place, self._habits.is_there_m
+        if any(math.dist(here, place) < near for place in self._refuges):
             self.exposure.step_out()
         self._protocol.unfit = "is hurt" if self.exposure.is_hurt else ""
         self.activity = "hurt" if self.exposure.is_hurt else "waiting"

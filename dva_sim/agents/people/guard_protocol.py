@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from dva_sim.protocol import messages as m
 
-AWARD_WITHIN = 60.0  # after the last bid for so long an award may come [s]
-MOST_ANNOUNCED = 32  # announcements that are remembered; the oldest are forgotten first
+AWARD_WITHIN = 60.0  # design: after the last bid for so long an award may come [s]
+MOST_ANNOUNCED = 32  # design: announcements that are remembered; the oldest are forgotten first
 OVER = "done"  # the DVA's word that an order is over
 
 

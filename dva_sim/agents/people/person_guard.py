@@ -16,8 +16,6 @@ from dva_sim.agents.people.guard import (
     CONFIRMED,
     CONTAINED,
     FIRST_STATUS,
-    HERE,
-    KEEPS_OFF,
     REFUTED,
     STATUS_PERIOD,
     Point,
@@ -29,12 +27,12 @@ from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol import messages as m
 from dva_sim.worlds.planning import Planner
 
-DECLINED_AFTER: Final = 30.0  # an order to a guard whom nobody plays [s]
-SET_OUT: Final = 2.0  # who is so far from where the order came has departed [m]
+DECLINED_AFTER: Final = 30.0  # design: an order to a guard whom nobody plays [s]
+SET_OUT: Final = 2.0  # design: who is so far from where the order came has departed [m]
 FINDINGS: Final = (CONFIRMED, REFUTED, CONTAINED)
 SAYINGS: Final = ("departed", "arrived", *FINDINGS, "help")
 SEVERITIES: Final = {"low": 0.15, "medium": 0.4, "high": 0.6, "critical": 0.9}
-"""What a report's word stands for, as a share; assumed."""
+"""Design: the share that a word of a report stands for."""
 KINDS: Final = ("fire", "gas_leak", "flood")
 
 Said = Callable[[bool, str], object]
@@ -182,8 +180,9 @@ class PersonGuard(OnFoot):
     def _find(self, order: m.Order, finding: str, said: Said) -> None:
         place = self._xy(order.position)
         off = math.dist(self.walking.place, place)
-        if finding == CONTAINED and off > KEEPS_OFF:
-            said(False, f"it is {off:.0f} m away: go within {KEEPS_OFF:g} m to contain it")
+        most = self._walker.habits.work.keeps_off_m
+        if finding == CONTAINED and off > most:
+            said(False, f"it is {off:.0f} m away: go within {most:g} m to contain it")
             return
         self._reach(order, "arrived")
         if finding == CONTAINED:
@@ -272,7 +271,8 @@ class PersonGuard(OnFoot):
         self.device.publish(STATUS, m.PersonStatus(self.activity, position))
 
     def _stands_at(self, place: m.Position) -> bool:
-        return math.dist(self.walking.place, self._xy(place)) < HERE
+        here = self._walker.habits.work.is_there_m
+        return math.dist(self.walking.place, self._xy(place)) < here
 
     def _xy(self, place: m.Position) -> Point:
         return self.device.frame.to_xy(place.latitude, place.longitude)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
+from dva_sim.agents.habits import BystanderHabits, GuardHabits
 from dva_sim.agents.population import Trait
+from dva_sim.kernel.assumed import Assumed
 from dva_sim.kernel.config import Config
 
-SLOWEST, FASTEST = 0.6, 2.2  # walking [m/s]
+SLOWEST, FASTEST = 0.6, 2.2  # design: where the law of walking speeds is cut [m/s]
 
 
 class PaceProfile(Config):
@@ -41,18 +43,25 @@ class GuardProfile(PaceProfile):
     Attributes:
         mobilisation_s: From the order to the first step.
         confirm_look_s: From arrival to being sure.
-        contain_s: From arrival until a leak or flood is over: a valve found and shut. Assumed.
-        extinguish_s: From arrival until a young fire is put out. Assumed, as of some discharges
-            of a hand-held extinguisher.
+        contain_s: From arrival until a leak or flood is over: a valve found and shut.
+        extinguish_s: From arrival until a young fire is put out.
+        habits: Numbers that are the same for all guards, none of them measured.
 
     References:
         Turnout within 80 s in 90 % of all cases: NFPA 1710.
     """
 
     mobilisation_s: Trait = Trait(median=45.0, spread=0.45)
-    confirm_look_s: Trait = Trait(median=3.0, spread=0.3)
-    contain_s: Trait = Trait(median=120.0, spread=0.5)
-    extinguish_s: Trait = Trait(median=30.0, spread=0.5)
+    confirm_look_s: Annotated[
+        Trait, Assumed(1.0, 10.0, "from a glance to a look around a room")
+    ] = Trait(median=3.0, spread=0.3)
+    contain_s: Annotated[
+        Trait, Assumed(30.0, 600.0, "from a valve at hand to one that must be found")
+    ] = Trait(median=120.0, spread=0.5)
+    extinguish_s: Annotated[
+        Trait, Assumed(10.0, 90.0, "one to some discharges of a hand-held extinguisher")
+    ] = Trait(median=30.0, spread=0.5)
+    habits: GuardHabits = Field(default_factory=GuardHabits)
 
 
 @dataclass(frozen=True)
@@ -67,6 +76,7 @@ class Walker:
         extinguish: From arrival until a fire is out [s].
         usual_mobilisation: What the guard itself expects of getting ready [s]: as long as
             guards usually need. How long it takes this time shows when it is over.
+        habits: As of all guards.
     """
 
     speed: float
@@ -75,6 +85,7 @@ class Walker:
     contain: float = 60.0
     extinguish: float = 30.0
     usual_mobilisation: float = 45.0
+    habits: GuardHabits = field(default_factory=GuardHabits, kw_only=True)
 
     @classmethod
     def draw(cls, profile: GuardProfile, rng: np.random.Generator) -> Walker:
@@ -86,6 +97,7 @@ class Walker:
             contain=profile.contain_s.draw(rng),
             extinguish=profile.extinguish_s.draw(rng),
             usual_mobilisation=profile.mobilisation_s.median,
+            habits=profile.habits,
         )
 
 
@@ -94,19 +106,26 @@ class BystanderProfile(PaceProfile):
 
     Attributes:
         premovement_s: From the alarm, or from noticing the danger, to the first step outwards.
-        moving_share: Share of the people who change their place now and then. Assumed.
-        stay_s: How long those stay at a place. Assumed.
+        moving_share: Share of the people who change their place now and then.
+        stay_s: How long those stay at a place.
+        habits: Numbers that are the same for all bystanders, none of them measured.
 
     References:
         Pre-movement times are log-normal in most evacuations: M. Forssberg, J. Kjellstroem,
         H. Frantzich, A. Mossberg, D. Nilsson: The variation of pre-movement time in building
-        evacuation. Fire Technology 55, 2019. A minute in the median is assumed, as of people
-        who are awake, know the building and hear a bell.
+        evacuation. Fire Technology 55, 2019.
     """
 
-    premovement_s: Trait = Trait(median=60.0, spread=0.6)
-    moving_share: Annotated[float, Field(ge=0, le=1)] = 0.3
-    stay_s: Trait = Trait(median=180.0, spread=0.8)
+    premovement_s: Annotated[
+        Trait, Assumed(20.0, 180.0, "people awake who know the building and hear a bell")
+    ] = Trait(median=60.0, spread=0.6)
+    moving_share: Annotated[
+        float, Field(le=1), Assumed(0.0, 0.7, "from an office to a workshop")
+    ] = 0.3
+    stay_s: Annotated[Trait, Assumed(60.0, 900.0, "one to fifteen minutes")] = Trait(
+        median=180.0, spread=0.8
+    )
+    habits: BystanderHabits = Field(default_factory=BystanderHabits)
 
 
 @dataclass(frozen=True)
@@ -118,12 +137,14 @@ class Occupant:
         premovement: From the alarm to the first step [s].
         moves: Whether it changes its place now and then.
         stay: How long it then stays at a place [s].
+        habits: As of all bystanders.
     """
 
     speed: float
     premovement: float
     moves: bool
     stay: Trait
+    habits: BystanderHabits = field(default_factory=BystanderHabits, kw_only=True)
 
     @classmethod
     def draw(cls, profile: BystanderProfile, rng: np.random.Generator) -> Occupant:
@@ -133,4 +154,5 @@ class Occupant:
             premovement=profile.premovement_s.draw(rng),
             moves=bool(rng.random() < profile.moving_share),
             stay=profile.stay_s,
+            habits=profile.habits,
         )

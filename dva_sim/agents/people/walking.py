@@ -10,7 +10,7 @@ push towards:
 - **In doors** one gives way, by its rules of doors.
 - **Held up by a robot**, one turns sideways and squeezes past, if there is a gap.
 - **Blocked**: who has come no nearer for some seconds looks for a way around whoever stands
-  there, again and again at longer intervals; who has come no nearer for `GIVE_UP` says so, and
+  there, again and again at longer intervals; who has come no nearer for long says so, and
   it is for the agent to decide what then. So nobody is stuck for ever.
 - **At a crowded place** one is there as soon as others keep one from coming nearer.
 
@@ -24,10 +24,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Final
 
+from dva_sim.agents.habits import OnFootHabits
 from dva_sim.agents.people.pedestrian_avoidance import (
-    RADIUS,
-    REACH,
-    SIDEWAYS,
     Courtesy,
     Floats,
     Mover,
@@ -45,23 +43,10 @@ from dva_sim.worlds.bodies import Body, RobotBody
 from dva_sim.worlds.physics import PersonBody, World
 from dva_sim.worlds.planning import Disc, Planner
 
-STEP: Final = 0.2  # between looks at the way [s]
-CALM: Final = 0.4  # the same while nobody is near and the end is not [s]
-LOOK_AHEAD: Final = 0.8  # on the way [m]
-LOOK_PAST: Final = 2.5  # on the way, where others are and no wall is between [m]
-ASTRAY: Final = 1.0  # who was pushed so far off the way takes another [m] ...
-PLANS_EVERY: Final = 1.0  # ... no more often than this [s]
-ARRIVED: Final = 0.15  # so near to its end one is there [m]
-BRAKING: Final = 1.0  # the end is approached at the distance left, by this [s]
-CROWDED: Final = 1.5  # who is held up so near to the end is there [m]
-MOST_SEEN: Final = 8  # of those near, the nearest count
-
-NEARER: Final = 0.25  # less is no progress [m]
-TIRED: Final = 4.0  # of no progress; then one looks for another way [s]
-GIVE_UP: Final = 60.0  # of no progress; then one gives up [s]
-BESIDE: Final = 0.8  # so near one squeezes past [m]
-SIDEWAYS_SPEED: Final = 0.5  # of who squeezes past; assumed [m/s]
-STANDING: Final = 0.1  # slower than this is in the way [m/s]
+STEP: Final = 0.2  # design: between looks at the way [s]
+CALM: Final = 0.4  # design: the same while nobody is near and the end is not [s]
+PLANS_EVERY: Final = 1.0  # design: no other way is planned sooner than this after the last [s]
+MOST_SEEN: Final = 8  # design: of those near, the nearest count
 
 
 @dataclass(eq=False)
@@ -102,8 +87,10 @@ class Walking:
         body: Its own.
         speed: Of free walking [m/s].
         doors: Ends of the doors, shape `(n, 4)` [m].
+        habits: Of the person; left out: the usual ones.
 
     Attributes:
+        habits: Of the person.
         heading: Where the person looks [rad].
         pace: Share of the free speed that smoke and water leave.
     """
@@ -117,13 +104,16 @@ class Walking:
         *,
         speed: float,
         doors: Floats,
+        habits: OnFootHabits | None = None,
     ) -> None:
+        self.habits = habits or OnFootHabits()
+        self._own = own = self.habits.walking
         self._clock, self._planner, self._ground = clock, planner, ground
         self.body, self.speed = body, speed
         self.heading, self.pace = 0.0, 1.0
-        self._doors = middles_of(doors)
+        self._doors = middles_of(doors, own.narrow_m)
         self._walk: Walk | None = None
-        self._reach = REACH  # less in a crowd
+        self._reach = own.reach_m  # less in a crowd
 
     @property
     def place(self) -> Point:
@@ -161,7 +151,7 @@ class Walking:
             self.stop()
             return False
         now = self._clock.now
-        courtesy = Courtesy(doors_on(points, self._doors))
+        courtesy = Courtesy(doors_on(points, self._doors), self._own)
         route, keep_off = Route(points), tuple(avoid)
         walk = Walk(
             goal,
@@ -172,7 +162,7 @@ class Walking:
             courtesy=courtesy,
             avoid=keep_off,
         )
-        walk.nearer_at, walk.looks_around = now, now + TIRED
+        walk.nearer_at, walk.looks_around = now, now + self._own.tired_s
         self._walk = walk
         self._clock.call_after(0.0, self._step, walk)
         return True
@@ -195,39 +185,42 @@ class Walking:
     def _step(self, walk: Walk) -> None:
         if walk is not self._walk:
             return
-        x, y = here = self.place
-        ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
+        here, own = self.place, self._own
+        x, y = here
+        ahead = walk.route.ahead(x, y, 0.0, own.look_ahead_m)
         walk.gone = walk.route.length - ahead.remaining
-        if ahead.remaining <= ARRIVED or walk.is_far_enough(here) or self._is_held_up(walk, ahead):
+        is_near = ahead.remaining <= own.arrived_m
+        if is_near or walk.is_far_enough(here) or self._is_held_up(walk, ahead):
             self.stop()
             walk.arrived()
-        elif self._clock.now - walk.nearer_at > GIVE_UP:
+        elif self._clock.now - walk.nearer_at > own.gives_up_s:
             self.stop()
             walk.blocked()
         else:
-            if ahead.offset > ASTRAY and self._clock.now >= walk.planned + PLANS_EVERY:
+            if ahead.offset > own.astray_m and self._clock.now >= walk.planned + PLANS_EVERY:
                 self._plan(walk, ())
-                ahead = walk.route.ahead(x, y, 0.0, LOOK_AHEAD)
-            calm = not self._push_on(walk, ahead) and ahead.remaining > CROWDED
+                ahead = walk.route.ahead(x, y, 0.0, own.look_ahead_m)
+            calm = not self._push_on(walk, ahead) and ahead.remaining > own.crowded_m
             self._clock.call_after(CALM if calm else STEP, self._step, walk)
 
     def _is_held_up(self, walk: Walk, ahead: Ahead) -> bool:
         """Whether others keep one from coming nearer to an end that is near; notes progress."""
-        now = self._clock.now
-        if ahead.remaining < walk.least - NEARER:
-            walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + TIRED
-        return ahead.remaining < CROWDED and now - walk.nearer_at > TIRED
+        now, own = self._clock.now, self._own
+        if ahead.remaining < walk.least - own.nearer_m:
+            walk.least, walk.nearer_at, walk.looks_around = ahead.remaining, now, now + own.tired_s
+        return ahead.remaining < own.crowded_m and now - walk.nearer_at > own.tired_s
 
     def _push_on(self, walk: Walk, ahead: Ahead) -> bool:
         """Want a velocity for the next step; whether somebody is near."""
-        speed = min(self.speed * self.pace, ahead.remaining / BRAKING)
+        speed = min(self.speed * self.pace, ahead.remaining / self._own.braking_s)
         near = self._others()
         if near and self._clock.now >= walk.looks_around:
             self._look_around(walk, near)
         heading, slot = ahead.bearing, self._slot(walk, near)
         if slot is not None:
             heading = math.atan2(slot[1] - self.body.y, slot[0] - self.body.x)
-            vx, vy = SIDEWAYS_SPEED * math.cos(heading), SIDEWAYS_SPEED * math.sin(heading)
+            aside = self._own.sideways_mps
+            vx, vy = aside * math.cos(heading), aside * math.sin(heading)
         elif near:
             heading, vx, vy = self._among(walk, ahead, speed, near)
         else:
@@ -240,24 +233,24 @@ class Walking:
         self, walk: Walk, ahead: Ahead, speed: float, near: Sequence[Body]
     ) -> tuple[float, float, float]:
         """Where to look [rad] and how to walk [m/s] among others."""
-        body, heading = self.body, ahead.bearing
+        body, heading, own = self.body, ahead.bearing, self._own
         me = Mover(body.x, body.y, *body.velocity, body.radius)
         movers = [Mover(o.x, o.y, *o.velocity, o.radius) for o in near]
         door = walk.courtesy.waits_for(body, walk.gone, near, self._clock.now)
         if door is not None:
-            x, y = beside(door, body, self._planner.room_at)
+            x, y = beside(door, body, self._planner.room_at, own)
             heading = math.atan2(y - me.y, x - me.x)
-            speed = min(speed, math.dist((x, y), (me.x, me.y)) / BRAKING)
-        elif is_clear(me, heading, speed, movers):
+            speed = min(speed, math.dist((x, y), (me.x, me.y)) / own.braking_s)
+        elif is_clear(me, heading, speed, movers, own):
             return heading, speed * math.cos(heading), speed * math.sin(heading)
         else:
             heading = self._past_others(walk, ahead)
-        return heading, *velocity(me, heading, speed, movers, self._planner.room_at)
+        return heading, *velocity(me, heading, speed, movers, self._planner.room_at, own)
 
     def _past_others(self, walk: Walk, ahead: Ahead) -> float:
         """Where to, seen from farther off: who steps aside does not want back at once [rad]."""
         x, y = self.body.x, self.body.y
-        far = walk.route.point_at(walk.gone + LOOK_PAST)
+        far = walk.route.point_at(walk.gone + self._own.look_past_m)
         if not self._planner.line_of_sight((x, y), far):
             return ahead.bearing
         return math.atan2(far[1] - y, far[0] - x)
@@ -266,35 +259,38 @@ class Walking:
         """Who is near."""
         body = self.body
         around = self._ground.neighbours(body.x, body.y, self._reach)
-        self._reach = 0.5 * REACH if len(around) > 2 * MOST_SEEN else REACH
+        reach = self._own.reach_m
+        self._reach = 0.5 * reach if len(around) > 2 * MOST_SEEN else reach
         return [other for other, _ in around if other is not body][:MOST_SEEN]
 
     # --- in the way --------------------------------------------------------------------
 
     def _slot(self, walk: Walk, near: Sequence[Body]) -> Point | None:
         """Where to squeeze past a robot that holds one up; sideways until it is passed."""
-        body, squeezes = self.body, self.body.radius == SIDEWAYS
+        body, own = self.body, self._own
+        squeezes = body.radius == own.sideways_m
         robots = (o for o in near if isinstance(o, RobotBody))
-        robot = next((r for r in robots if _gap(r, body) < BESIDE), None)
-        tired = self._clock.now - walk.nearer_at > TIRED
+        robot = next((r for r in robots if _gap(r, body) < own.beside_m), None)
+        tired = self._clock.now - walk.nearer_at > own.tired_s
         if robot is None or not (tired or squeezes):
             if squeezes:
-                body.take_up(RADIUS)
+                body.take_up(own.radius_m)
             return None
-        (ax, ay), (bx, by) = (walk.route.point_at(walk.gone + k) for k in (0.0, LOOK_PAST))
+        (ax, ay), (bx, by) = (walk.route.point_at(walk.gone + k) for k in (0.0, own.look_past_m))
         length = math.hypot(bx - ax, by - ay)
         along = (bx - ax) / length, (by - ay) / length
         if (robot.x - body.x) * along[0] + (robot.y - body.y) * along[1] < -robot.radius:
-            body.take_up(RADIUS)
+            body.take_up(own.radius_m)
             return None
-        body.take_up(SIDEWAYS)
-        return past(robot, along, body, self._planner.room_at)
+        body.take_up(own.sideways_m)
+        return past(robot, along, body, self._planner.room_at, own.sideways_m)
 
     def _look_around(self, walk: Walk, near: Sequence[Body]) -> None:
         """Look for a way around who stands there; longer and longer pauses between."""
         now = self._clock.now
-        walk.looks_around = now + max(TIRED, now - walk.nearer_at)
-        standing = [o for o in near if math.hypot(*o.velocity) < STANDING]
+        walk.looks_around = now + max(self._own.tired_s, now - walk.nearer_at)
+        slow = self._own.standing_mps
+        standing = [o for o in near if math.hypot(*o.velocity) < slow]
         walk.robots.update(Disc(o.x, o.y, o.radius) for o in standing if isinstance(o, RobotBody))
         in_way = sorted(walk.robots | {Disc(o.x, o.y, o.radius) for o in standing})
         if in_way and self._plan(walk, in_way):
@@ -305,7 +301,8 @@ class Walking:
         points = self._planner.path(self.place, walk.goal, (*walk.avoid, *avoid))
         if points is None:
             return False
-        walk.route, walk.courtesy = Route(points), Courtesy(doors_on(points, self._doors))
+        walk.route = Route(points)
+        walk.courtesy = Courtesy(doors_on(points, self._doors), self._own)
         walk.planned, walk.gone = self._clock.now, 0.0
         return True
 

@@ -16,10 +16,9 @@ from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
 from dva_sim.kernel.yaml_files import load_yaml
 
-GRAVITY: Final = 9.80665  # [m/s^2]
-WHOLE: Final = 1.5 * 2.0**52  # added and taken away again: what `round` does, four times as fast
-TICK: Final = 2.0**-12  # of the clock that tells when a sample is taken [s]
-WARMING_K: Final = 5.0  # how much warmer or colder a session is, standard deviation; assumed
+GRAVITY: Final = 9.80665  # source: ISO 80000-3: [m/s^2]
+WHOLE: Final = 1.5 * 2.0**52  # design: added and taken away, which rounds four times as fast
+TICK: Final = 2.0**-12  # design: of the clock that tells when a sample is taken [s]
 
 NonNegative = Annotated[float, Field(ge=0)]
 Positive = Annotated[float, Field(gt=0)]
@@ -104,6 +103,7 @@ class Accelerometer:
             its owner; if not given, of this run.
         rate_hz: How often the app is told, if not as the part measures.
         jitter: Standard deviation of the time of a sample, as a share of the time between two.
+        warming: Standard deviation of a session's temperature, against the calibration's [K].
         block: How many samples of luck are drawn at once; changes no number.
 
     Attributes:
@@ -120,13 +120,14 @@ class Accelerometer:
         *,
         rate_hz: float | None = None,
         jitter: float = 0.0,
+        warming: float = 5.0,
         block: int = 256,
     ) -> None:
         noise, times, self._sessions, spare = rng.spawn(4)
         self.period = 1.0 / (rate_hz or part.rate_hz)
         mg = 1e-3 * GRAVITY
         self.offset: Triple = tuple((own or spare).normal(0.0, mg * part.offset_mg, 3).tolist())
-        self._warming = mg * part.offset_mg_per_k * WARMING_K
+        self._warming = mg * part.offset_mg_per_k * warming
         self._drift = mg * part.drift_mg_per_sqrt_min * math.sqrt(self.period / 60.0)
         self._errors = self._drawn(noise, part.noise, block)
         self._step, self._range = mg * part.resolution_mg, GRAVITY * part.range_g

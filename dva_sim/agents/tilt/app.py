@@ -19,8 +19,8 @@ from dva_sim.agents.tilt.mappings import load_guarded_mapping
 from dva_sim.agents.tilt.profile import PhoneProfile
 from dva_sim.kernel.makers import maker
 
-TIE: Final = 1e-9  # moments nearer than this are the same [s]
-_TICK: Final = 1e-6  # who looks by a clock that rounds may come so much too soon [s]
+TIE: Final = 1e-9  # design: moments nearer than this are the same [s]
+_TICK: Final = 1e-6  # design: a look by a clock that rounds may come so much too soon [s]
 
 
 def calibrated(profile: PhoneProfile, reference: Triple) -> Calibration:

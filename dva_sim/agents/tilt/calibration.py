@@ -7,13 +7,13 @@ from typing import Final
 
 from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
 
-LEVELS: Final = 10.0  # speed levels of the phone; one is SPEED_PER_LEVEL
-SPEED_PER_LEVEL: Final = 0.05  # [m/s]
-MAX_TURN_DEG: Final = 30.0  # either way, per second
+LEVELS: Final = 10.0  # source: the document: speed levels; one is SPEED_PER_LEVEL
+SPEED_PER_LEVEL: Final = 0.05  # source: the document: [m/s]
+MAX_TURN_DEG: Final = 30.0  # source: the document: either way, per second
 
 Reading = tuple[float, float]  # speed level, turn [deg/s]
-SIDE_KNOWN: Final = 3.0  # who calibrates a phone that stands so upright has no side up [m/s^2]
-NEUTRAL: Final[Reading] = (0.0, 0.0)  # of a phone at rest: stand
+SIDE_KNOWN: Final = 3.0  # design: a phone calibrated so upright has no side up [m/s^2]
+NEUTRAL: Final[Reading] = (0.0, 0.0)  # design: of a phone at rest: stand
 
 
 class Calibration:

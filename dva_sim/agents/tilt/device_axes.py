@@ -20,7 +20,7 @@ from dva_sim.agents.tilt.accelerometer import Triple
 Orientation = Literal[0, 90, 180, 270]
 
 # Where the screen's right and its top lie along the phone's x and y.
-_SCREEN: Final[dict[int, tuple[float, float, float, float]]] = {
+_SCREEN: Final[dict[int, tuple[float, float, float, float]]] = {  # source: W3C Device Orientation
     0: (1.0, 0.0, 0.0, 1.0),
     90: (0.0, -1.0, 1.0, 0.0),
     180: (-1.0, 0.0, 0.0, -1.0),

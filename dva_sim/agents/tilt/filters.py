@@ -19,8 +19,8 @@ from dva_sim.kernel import options
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, said
 
-BATCH: Final = 20  # slots of the dissertation's buffer
-MOST_BATCH: Final = 1000  # samples of a batch
+BATCH: Final = 20  # source: the document: slots of the dissertation's buffer
+MOST_BATCH: Final = 1000  # design: samples of a batch
 
 
 class Filter(ABC):

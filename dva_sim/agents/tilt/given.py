@@ -14,7 +14,7 @@ from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL
 from dva_sim.agents.tilt.mappings import limited
 from dva_sim.agents.tilt.profile import PhoneProfile
 
-LEAST_WITHIN = 0.1  # in what time a gap on the display is closed at the soonest [s]; assumed
+LEAST_WITHIN = 0.1  # design: a gap on the display is closed no sooner than in this time [s]
 
 
 class GivenTilt(TiltApp):

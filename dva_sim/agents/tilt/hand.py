@@ -10,11 +10,10 @@ from typing import Final
 
 import numpy as np
 
-TREMOR_HZ: Final = 10.0  # middle of the 8-12 Hz band of physiological hand tremor
-TREMOR_WIDTH_HZ: Final = 2.0  # between the half-power frequencies; assumed
-TREMOR: Final = 0.0043  # apparent tilt, standard deviation [rad]; assumed
-MAX_TILT: Final = math.radians(45.0)  # beyond it the screen is hard to read; assumed [rad]
-MAX_SPEED: Final = math.radians(200.0)  # of tilting while looking at a picture; assumed [rad/s]
+TREMOR_HZ: Final = 10.0  # source: Lakie 2015: middle of the 8-12 Hz band of hand tremor
+TREMOR: Final = 0.0043  # design: of devices in tasks [rad]; phones have a key for each of these
+MAX_TILT: Final = math.radians(45.0)  # design: the same [rad]
+MAX_SPEED: Final = math.radians(200.0)  # design: the same [rad/s]
 
 
 class Hand:
@@ -36,6 +35,7 @@ class Hand:
         tremor: Apparent tilt, standard deviation of each axis [rad].
         max_tilt: Away from rest, each axis [rad].
         max_speed: Of tilting, each axis [rad/s].
+        tremor_width: Of the resonance of the tremor, between half-power frequencies [Hz].
         block: How many steps of luck are drawn at once; changes no number.
 
     References:
@@ -54,10 +54,12 @@ class Hand:
         tremor: float = TREMOR,
         max_tilt: float = MAX_TILT,
         max_speed: float = MAX_SPEED,
+        tremor_width: float = 2.0,
         block: int = 256,
     ) -> None:
         self._lag, self._noise, self._tremor = lag, motor_noise, tremor
         self._max_tilt, self._max_speed = max_tilt, max_speed
+        self._damping = math.pi * tremor_width
         self._luck = _luck(rng, block)
         self._shake_pitch, self._shake_roll, self._off_pitch, self._off_roll = next(self._luck)
         self._pitch = self._roll = 0.0
@@ -91,7 +93,7 @@ class Hand:
     def _tune(self, dt: float) -> tuple[float, float, float, complex, float]:
         """What depends on the length of a step alone; there are few of them."""
         keep = math.exp(-dt / self._lag) if self._lag > 0.0 else 0.0
-        damping = math.pi * TREMOR_WIDTH_HZ
+        damping = self._damping
         swing = cmath.exp(complex(-damping, 2.0 * math.pi * TREMOR_HZ) * dt)
         drive = math.sqrt(1.0 - math.exp(-2.0 * damping * dt))
         if len(self._tuned) > 1000:

@@ -8,7 +8,7 @@ from dva_sim.agents.tilt.accelerometer import Triple
 from dva_sim.agents.tilt.app import TiltApp
 from dva_sim.agents.tilt.calibration import Reading
 
-SOONEST: Final = 0.005  # from one look to the next, while a batch is late [s]
+SOONEST: Final = 0.005  # design: from one look to the next, while a batch is late [s]
 
 
 class MeasuredTilt(TiltApp):

@@ -25,7 +25,7 @@ from dva_sim.agents.tilt.profile import PhoneProfile
 
 __all__ = ["Phone", "PhoneProfile", "TiltCommand", "Trail", "try_phone"]
 
-SURELY: Final = -1.0  # the level that a person tilts to who wants to stand
+SURELY: Final = -1.0  # design: the level that a person tilts to who wants to stand
 
 
 class Phone(TiltApp):
@@ -72,6 +72,7 @@ class Phone(TiltApp):
             own,
             rate_hz=profile.sample_rate_hz,
             jitter=profile.sample_jitter,
+            warming=profile.warming_k,
         )
         self._hand = Hand(
             holder.hand_lag,
@@ -80,6 +81,7 @@ class Phone(TiltApp):
             tremor=math.radians(profile.tremor_deg),
             max_tilt=math.radians(profile.max_tilt_deg),
             max_speed=math.radians(profile.max_tilt_speed_deg_s),
+            tremor_width=profile.tremor_width_hz,
         )
         self._interval = self._accelerometer.interval
         period = self._accelerometer.period

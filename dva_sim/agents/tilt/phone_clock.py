@@ -12,8 +12,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-DRIFT: Final = 300e-6  # by how much the offset may grow in a second; crystals keep within 100 ppm
-ANEW: Final = 2.0  # who tells times so far back has begun to count anew, as after a reload [s]
+DRIFT: Final = 300e-6  # design: growth of the offset in a second; crystals keep within 100 ppm
+ANEW: Final = 2.0  # design: times so far back are of another count, as after a reload [s]
 
 
 class PhoneClock:

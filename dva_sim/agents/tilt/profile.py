@@ -6,26 +6,20 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dva_sim.agents.tilt.accelerometer import GRAVITY, NonNegative, Positive, Triple
-from dva_sim.kernel.config import Config, Key
+from dva_sim.agents.habits import PhoneHabits
+from dva_sim.agents.tilt.accelerometer import GRAVITY, Triple
+from dva_sim.kernel.config import Key
 
 
-class PhoneProfile(Config):
+class PhoneProfile(PhoneHabits):
     """A phone, how it is held, and how its app reads, filters, maps and sends.
+
+    What was assumed of all that stands in `PhoneHabits`.
 
     Attributes:
         accelerometer: Name of a part, or a file with one.
         sample_rate_hz: Samples per second that the app gets.
-        sample_jitter: Standard deviation of the time of a sample, as a share of the time between
-            two.
-        tremor_deg: Of the hand, as apparent tilt, standard deviation.
-        max_tilt_deg: Farthest that the hand tilts the phone away from rest.
-        max_tilt_speed_deg_s: Fastest that it does.
         reference_mps2: x, y, z of the pose that means nothing: speed zero, straight on.
-        reference_error_mps2: How far off that pose was when the owner calibrated, standard
-            deviation of x and y; the offset of the part itself is calibrated away.
-        speed_step_mps2: Acceleration along the tilt axis for one level of speed.
-        turn_step_mps2: Acceleration across it for one degree per second of turn.
         filter: By name, or a class in a file, `mine.py:Mine`.
         filter_options: Of the filter, such as `{window: 9}` of the median.
         mapping: By name, or a class in a file.
@@ -40,14 +34,7 @@ class PhoneProfile(Config):
     description: str = ""
     accelerometer: str = "mpu6050"
     sample_rate_hz: Annotated[float, Field(gt=0, le=1000)] = 34.0
-    sample_jitter: Annotated[float, Field(ge=0, le=0.3)] = 0.1
-    tremor_deg: NonNegative = 0.25
-    max_tilt_deg: Annotated[float, Field(gt=0, le=80)] = 45.0
-    max_tilt_speed_deg_s: Positive = 200.0
     reference_mps2: Triple = (0.0, 0.0, GRAVITY)
-    reference_error_mps2: NonNegative = 0.08
-    speed_step_mps2: Positive = 0.35
-    turn_step_mps2: Positive = 0.12
     filter: Annotated[str, Key("filter")] = "median"
     filter_options: Annotated[
         dict[str, Any],

@@ -16,7 +16,7 @@ from dva_sim.agents.tilt.given import GivenTilt
 from dva_sim.agents.tilt.measured import MeasuredTilt
 from dva_sim.agents.tilt.profile import PhoneProfile
 
-STICK_HOLDS: Final = 0.3  # after what came from a stick samples do not act for so long [s]
+STICK_HOLDS: Final = 0.3  # design: after input by stick samples do not act for so long [s]
 
 
 class TiltSources:

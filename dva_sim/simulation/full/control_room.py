@@ -16,7 +16,6 @@ from dva_sim.agents.operator.drive import Teleoperation
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.operator.strategies import Truth, load_strategy
 from dva_sim.agents.operator.supervision import Supervision
-from dva_sim.agents.people.guard import IN_SIGHT
 from dva_sim.agents.population import draw_person
 from dva_sim.agents.robot.robot import EXPECTED_READY, EXPECTED_SPEED
 from dva_sim.agents.tilt import Phone
@@ -122,7 +121,8 @@ def at_event_m(scenario: Scenario) -> float:
 
     Guards and cameras see so far; reports nearer than may be merged are of one event.
     """
-    sees = max(IN_SIGHT, scenario.camera.range_m)
+    in_sight = guard_profile(scenario).habits.work.in_sight_m
+    sees = max(in_sight, scenario.camera.range_m)
     return sees + scenario.dispatch.merge_distance_m + MOVED_SINCE
 
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dva_sim.agents.device import AgentDevice
+from dva_sim.agents.habits import OnFootHabits
 from dva_sim.agents.people.bystander import BystanderAgent, draw_places
 from dva_sim.agents.people.evacuation import AirAt, clean_air, refuges_of
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.people.pedestrian_avoidance import RADIUS
 from dva_sim.agents.people.person_guard import PersonGuard
 from dva_sim.agents.people.profiles import Occupant, Walker
 from dva_sim.agents.people.walking import Walking
@@ -173,8 +173,8 @@ class TeamBuilder:
         post = self._start("guard", number)
         device = stage.device("guard", number)
         walker = Walker.draw(guard_profile(stage.scenario), stage.streams[f"{device.label}/walker"])
-        body = self._world.add_person(device.label, post, radius=RADIUS)
-        legs = self._legs(body, walker.speed)
+        body = self._world.add_person(device.label, post, radius=walker.habits.walking.radius_m)
+        legs = self._legs(body, walker.speed, walker.habits)
         if number in stage.scenario.guard.persons:
             return self._played(device, walker, legs)
         guard = GuardAgent(
@@ -215,12 +215,13 @@ class TeamBuilder:
         luck = stage.streams[f"{name}/who"]
         occupant = Occupant.draw(bystander_profile(stage.scenario), luck)
         places = self._places(name)
-        body = self._world.add_person(name, Pose(*places[0], 0.0), radius=RADIUS)
+        habits = occupant.habits
+        body = self._world.add_person(name, Pose(*places[0], 0.0), radius=habits.walking.radius_m)
         bystander = BystanderAgent(
             name,
             stage.clock,
             occupant,
-            self._legs(body, occupant.speed),
+            self._legs(body, occupant.speed, habits),
             planner=stage.planner,
             places=places,
             refuges=self._refuges,
@@ -233,10 +234,16 @@ class TeamBuilder:
         bystander.start()
         return bystander
 
-    def _legs(self, body: PersonBody, speed: float) -> Walking:
+    def _legs(self, body: PersonBody, speed: float, habits: OnFootHabits) -> Walking:
         stage = self._stage
         return Walking(
-            stage.clock, stage.planner, self._world, body, speed=speed, doors=stage.site.doors
+            stage.clock,
+            stage.planner,
+            self._world,
+            body,
+            speed=speed,
+            doors=stage.site.doors,
+            habits=habits,
         )
 
     def _places(self, name: str) -> list[Point]:

@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
+from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
 from dva_sim.agents.population import Population
 from dva_sim.kernel.assumed import Assumption, assumptions_in
+from dva_sim.kernel.config import Config
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.simulation.scenario.scenario import Scenario
 
-_TRAITS = "operator.traits."
+_PROFILES: dict[str, type[Config]] = {
+    "operator": Population,
+    "guard": GuardProfile,
+    "bystander": BystanderProfile,
+}
+"""Profiles by the part of a scenario that changes their medians."""
 _PAGE = """# Assumptions
 
 <!-- Written by `dva-sim assumed --page`; do not edit. -->
@@ -24,11 +31,10 @@ A trait is the median of a distribution over persons.
 
 def all_assumptions() -> list[Assumption]:
     """Traits of operators first, then all habits and parts, in the order of a scenario."""
-    traits = Population().traits
     of_persons = [
         each
-        for each in assumptions_in(Population, _TRAITS)
-        if each.key.removeprefix(_TRAITS) in traits
+        for whose, model in _PROFILES.items()
+        for each in assumptions_in(model, f"{whose}.traits.", depth=1)
     ]
     return of_persons + list(assumptions_in(Scenario))
 

@@ -17,8 +17,11 @@ from dva_sim.kernel.yaml_files import Document, KeyPath, load_yaml
 from dva_sim.simulation.scenario.parts import EventConfig
 from dva_sim.simulation.scenario.scenario import (
     Scenario,
+    bystander_profile,
+    guard_profile,
     pattern_of,
     phone_profile,
+    population,
     robot_profiles,
     site_of,
 )
@@ -67,6 +70,15 @@ def check_names(scenario: Scenario, error: Fail) -> None:
             if not resources.is_there(name, folder) and not resources.is_file(Path(name)):
                 key, known = ".".join(str(p) for p in path), resources.available(folder)
                 raise error(unknown(key, name, sorted(known)), path)
+    if scenario.operator.traits:
+        with _told(error, lambda _: ("operator", "traits")):
+            population(scenario.operator)
+    if scenario.guard.traits:
+        with _told(error, lambda _: ("guard", "traits")):
+            guard_profile(scenario)
+    if scenario.bystander.traits:
+        with _told(error, lambda _: ("bystander", "traits")):
+            bystander_profile(scenario)
     with _told(error, _pattern_key):
         pattern_of(scenario)
     check_strategy(scenario.operator.strategy, scenario.operator.options, error)

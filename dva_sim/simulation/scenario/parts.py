@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dva_sim.agents.control_room.profile import DispatcherProfile, RoleName
-from dva_sim.agents.habits import OperatorHabits
+from dva_sim.agents.habits import BystanderHabits, GuardHabits, OperatorHabits
 from dva_sim.agents.robot.command_queue import ServiceTime
 from dva_sim.agents.robot.sensors import FASTEST, SLOWEST, SensorConfig
 from dva_sim.agents.tilt import PhoneProfile
@@ -21,6 +21,8 @@ from dva_sim.worlds.hazards import KINDS, make_hazard
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
+OwnTraits = dict[str, NonNegative]
+"""Medians of traits by name; whether they are known is judged where the profile is read."""
 CONTROL_ROOM = r"^(control-room-[1-9][0-9]?|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
 SUPERVISOR = r"^(operator-[1-9][0-9]*|[0-9A-F]{2}(:[0-9A-F]{2}){5})$"
 AnyNumber = Annotated[float, Field(allow_inf_nan=True)]  # `make_hazard` says what is wrong with it
@@ -110,11 +112,14 @@ def check_kinds(kinds: Kinds, count: int, what: str) -> None:
         raise ValueError(f"{what}.kind names {what} {max(kinds)}, {what}.count is {count}")
 
 
-class GuardConfig(Config):
+class GuardConfig(OmitsUnset):
     """The guards: how many, and from which profile they are drawn.
 
     Attributes:
         kind: Who plays them: `simulated`, `person`, or some by number, as in `{2: person}`.
+        traits: Medians that take the place of the profile's, such as `{contain_s: 300}`.
+        habits: Assumed numbers that take the place of the profile's, such as
+            `{work: {stands_off_m: 12}}`.
         mobilisation_s: Median from the order to the first step; left out: as the profile says.
         way_m: They wait at places from which the way to the first event is so long, rather than
             at the site's posts.
@@ -122,6 +127,8 @@ class GuardConfig(Config):
 
     profile: str = "guard"
     count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("guards", "n_guards"), Key("guards")] = 0
+    traits: OwnTraits = Field(default_factory=dict)
+    habits: GuardHabits = Field(default_factory=GuardHabits)
     mobilisation_s: Annotated[
         Positive | None, Key("time until the guard sets out", stated=False)
     ] = None
@@ -139,13 +146,20 @@ class GuardConfig(Config):
         return persons_of(self.kind, self.count)
 
 
-class BystanderConfig(Config):
-    """People who are there for other reasons: how many, and from which profile they are drawn."""
+class BystanderConfig(OmitsUnset):
+    """People who are there for other reasons: how many, and from which profile they are drawn.
+
+    Attributes:
+        traits: Medians that take the place of the profile's, such as `{premovement_s: 30}`.
+        habits: Assumed numbers that take the place of the profile's.
+    """
 
     profile: str = "bystanders"
     count: Annotated[
         int, Field(ge=0, le=1000), AlsoCalled("bystanders", "people"), Key("bystanders")
     ] = 0
+    traits: OwnTraits = Field(default_factory=dict)
+    habits: BystanderHabits = Field(default_factory=BystanderHabits)
 
 
 class PhoneConfig(BaseModel):

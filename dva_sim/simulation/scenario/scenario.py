@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from dva_sim.agents.people.profiles import BystanderProfile, GuardProfile
-from dva_sim.agents.population import Population
+from dva_sim.agents.population import Population, with_medians
 from dva_sim.agents.robot.profile import RobotProfile, load_robot
 from dva_sim.agents.tilt import PhoneProfile
 from dva_sim.kernel import resources
@@ -188,18 +188,26 @@ def phone_profile(scenario: Scenario, error: Fail | None = None) -> PhoneProfile
 
 
 def guard_profile(scenario: Scenario) -> GuardProfile:
-    """How the scenario's guards are drawn."""
-    profile = _profile(GuardProfile, scenario.guard.profile, "agents/people")
-    median = scenario.guard.mobilisation_s
-    if median is None:
-        return profile
-    trait = profile.mobilisation_s.model_copy(update={"median": median})
-    return profile.model_copy(update={"mobilisation_s": trait})
+    """How the scenario's guards are drawn.
+
+    Raises:
+        ConfigError: there is no such profile or trait.
+    """
+    guard = scenario.guard
+    profile = _profile(GuardProfile, guard.profile, "agents/people")
+    if guard.mobilisation_s is not None:
+        profile = with_medians(profile, {"mobilisation_s": guard.mobilisation_s}, "guard")
+    return _changed(profile, guard, "guard")
 
 
 def bystander_profile(scenario: Scenario) -> BystanderProfile:
-    """How the scenario's bystanders are drawn."""
-    return _profile(BystanderProfile, scenario.bystander.profile, "agents/people")
+    """How the scenario's bystanders are drawn.
+
+    Raises:
+        ConfigError: there is no such profile or trait.
+    """
+    profile = _profile(BystanderProfile, scenario.bystander.profile, "agents/people")
+    return _changed(profile, scenario.bystander, "bystander")
 
 
 def population(operator: OperatorConfig) -> Population:
@@ -209,9 +217,19 @@ def population(operator: OperatorConfig) -> Population:
         ConfigError: there is no such population or trait.
     """
     people = _profile(Population, operator.population, "agents/people")
-    people = people.with_medians(operator.traits)
-    habits = people.habits.changed_by(operator.habits)
-    return people if habits is people.habits else people.model_copy(update={"habits": habits})
+    return _changed(people, operator, "operator")
+
+
+Drawn = TypeVar("Drawn", Population, GuardProfile, BystanderProfile)
+
+
+def _changed(
+    profile: Drawn, by: OperatorConfig | GuardConfig | BystanderConfig, whose: str
+) -> Drawn:
+    """A profile with the medians and habits that a scenario sets otherwise."""
+    profile = with_medians(profile, by.traits, whose)
+    habits = profile.habits.changed_by(by.habits)
+    return profile if habits is profile.habits else profile.model_copy(update={"habits": habits})
 
 
 def _profile(model: type[M], name: str, folder: str) -> M:

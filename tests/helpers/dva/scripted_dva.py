@@ -10,7 +10,7 @@ from dva_sim.agents.observation import no_smoke
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.people.evacuation import AirAt, clean_air
 from dva_sim.agents.people.guard import GuardAgent
-from dva_sim.agents.people.pedestrian_avoidance import RADIUS
+from dva_sim.agents.people.pedestrian_avoidance import USUAL
 from dva_sim.agents.people.profiles import Walker
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
@@ -97,7 +97,7 @@ class PretendedDva:
     ) -> GuardAgent:
         """A guard who sees what is in `there`, through no more smoke than people do."""
         device, planner, world = self.stage.device("guard", 1), self.stage.planner, self.field.world
-        body = world.add_person("guard-1", Pose(*position, 0.0), radius=RADIUS)
+        body = world.add_person("guard-1", Pose(*position, 0.0), radius=USUAL.radius_m)
         doors = self.stage.site.doors
         walking = Walking(self.network.clock, planner, world, body, speed=walker.speed, doors=doors)
         there, contained = lambda kind, *_: kind in self.there, self._contained

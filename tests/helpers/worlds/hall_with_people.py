@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import shapely
 
-from dva_sim.agents.people.pedestrian_avoidance import RADIUS
+from dva_sim.agents.people.pedestrian_avoidance import USUAL
 from dva_sim.agents.people.walking import Walking
 from dva_sim.kernel.clock import Clock
 from dva_sim.worlds.geo import Pose
@@ -58,7 +58,7 @@ class People:
         """Somebody who stands there, or walks from there to a goal [m, m/s]."""
         number = len(self.walkings)
         pose = Pose(*place, 0.0)
-        body = self.world.add_person(f"person-{number}", pose, radius=RADIUS)
+        body = self.world.add_person(f"person-{number}", pose, radius=USUAL.radius_m)
         walking = Walking(
             self.clock, self.planner, self.world, body, speed=speed, doors=self.site.doors
         )
