@@ -13,12 +13,12 @@ from dva_sim.agents.operator.strategies import (
 from dva_sim.agents.population import Person, draw_person
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.simulation.scenario.scenario import population
-from dva_sim.simulation.task.driving import DriveTrial
+from dva_sim.simulation.task.driving import DriveTrial, HeadingTrial
 from dva_sim.simulation.task.pointing import CursorTrial, Goal
 from dva_sim.simulation.task.recorded_delays import RecordedDelays
 from dva_sim.simulation.task.scenario import TaskScenario
-from dva_sim.simulation.task.target_goals import PointGoal, ReachGoal, TrackGoal
-from dva_sim.simulation.task.tasks import Pointing, ReachTask, Tracking, Tunnel
+from dva_sim.simulation.task.target_goals import PointGoal, ReachGoal, TrackGoal, Wandering
+from dva_sim.simulation.task.tasks import HeadingStep, Pointing, ReachTask, Tracking, Tunnel
 from dva_sim.simulation.task.trial import Seat, Trace
 from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
@@ -105,6 +105,8 @@ def _trial(
     streams: Streams,
 ) -> CursorTrial | DriveTrial:
     task, reaction = scenario.task, seat.person.reaction
+    if isinstance(task, HeadingStep):
+        return HeadingTrial(scenario, seat, condition, streams, reaction, leftwards=number % 2 == 0)
     if scenario.is_driven:
         return DriveTrial(scenario, seat, condition, streams, reaction)
     surprises = isinstance(task, Pointing) and task.cue == "unexpected"
@@ -122,7 +124,8 @@ def _goal(
     task, (first, second) = scenario.task, condition
     if isinstance(task, Pointing):
         angle = 0.0 if task.axes == 1 else number * (math.pi + math.pi / task.targets)
-        return PointGoal(task, first, second, angle, person.hand_lag + scenario.link.up.delay_s)
+        way = Wandering(task, first, angle, streams.fresh("target"))
+        return PointGoal(task, way, second, person.hand_lag + scenario.link.up.delay_s)
     if isinstance(task, Tunnel):
         return TunnelGoal(task, first, second)
     if isinstance(task, Tracking):
@@ -161,6 +164,7 @@ NAMES = {
     "corner": ("length_m", "width_m"),
     "slalom": ("spacing_m", "width_m"),
     "course": ("length_m", "width_m"),
+    "heading_step": ("heading_error_deg", "width_m"),
     "reach": ("length_m", "width_m"),
 }
 """What the two numbers of a condition are, by kind of task."""

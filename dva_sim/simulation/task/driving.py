@@ -25,12 +25,14 @@ from dva_sim.simulation.task.devices import Joystick
 from dva_sim.simulation.task.plants import Pair, Unicycle
 from dva_sim.simulation.task.recorded_delays import RecordedChannel, RecordedDelays
 from dva_sim.simulation.task.scenario import TaskScenario
-from dva_sim.simulation.task.tasks import Corner, Course, Slalom, Task
+from dva_sim.simulation.task.tasks import Corner, Course, HeadingStep, Slalom, Task
 from dva_sim.simulation.task.trial import Seat, Trial, WayKept
 
 RUN_OUT = 5.0  # the way goes on so far beyond the finish, so that nobody stops before it [m]
+ENDLESS = 1000.0  # length of a way that nobody comes to the end of [m]
 MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
 CONE = 0.1  # radius in a picture [m]
+ONSET = 0.1  # share of its first peak at which a correction has begun; assumed
 CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
 Points = list[Pair]
 
@@ -50,6 +52,8 @@ def way_of(task: Task, first: float, width: float) -> Points:
         end = task.cones * first
         steps = np.linspace(0.0, end, max(2, round(end / CONE_STEP)) + 1)
         return [(float(x), task.swing_m * math.sin(math.pi * x / first)) for x in steps]
+    if isinstance(task, HeadingStep):
+        return [(0.0, 0.0), (ENDLESS, 0.0)]
     assert isinstance(task, Course)
     return list(task.points_m)
 
@@ -184,6 +188,58 @@ class DriveTrial(Trial[Observation]):
         if isinstance(task, Slalom):
             spacing = self.points[-1][0] / task.cones
             self.trace.marks += [((n + 0.5) * spacing, 0.0, CONE) for n in range(task.cones)]
+
+
+class HeadingTrial(DriveTrial):
+    """A vehicle at a steady speed whose heading is wrong from the first picture on.
+
+    Args:
+        scenario: Vehicle, links, frames.
+        seat: Who drives.
+        condition: Error [deg] and width [m].
+        streams: The luck of this trial.
+        reaction: See `Trial`.
+        leftwards: Whether the vehicle points to the left of its way.
+    """
+
+    def __init__(
+        self,
+        scenario: TaskScenario,
+        seat: Seat,
+        condition: tuple[float, float],
+        streams: Streams,
+        reaction: float = 0.0,
+        *,
+        leftwards: bool = True,
+    ) -> None:
+        super().__init__(scenario, seat, condition, streams, reaction)
+        task = scenario.task
+        assert isinstance(task, HeadingStep)
+        self._watched, self._side = task.watched_s, 1.0 if leftwards else -1.0
+        self.plant.heading += self._side * math.radians(condition[0])
+        self.plant.speed = self._top[0]
+        self._steered: list[float] = []  # against the error, step by step
+
+    def commanded(self, dt: float) -> Pair:
+        """The machine holds the speed."""
+        _, turn = super().commanded(dt)
+        self._steered.append(-self._side * self.device.reading()[1])
+        return 1.0, turn
+
+    def advance(self, dt: float) -> None:
+        """See `Trial`."""
+        super().advance(dt)
+        self.over = self.now + dt >= self._watched
+
+    def row(self) -> dict[str, Any]:
+        """When the first correction began, and how long it grew [s]."""
+        peak = movement_laws.first_peak(self._steered)
+        begun = movement_laws.first_above(self._steered, ONSET * self._steered[peak])
+        return {
+            **super().row(),
+            "reaction_s": begun * self.STEP,
+            "pulse_s": (peak - begun) * self.STEP,
+        }
 
 
 def beside(points: Points, aside: float) -> Points:

@@ -135,3 +135,28 @@ def crossover(frequencies: Sequence[float], loop: NDArray[np.complex128]) -> Cro
     at = log_w[i] + share * (log_w[i + 1] - log_w[i])
     angle = float(np.angle(loop[i]) + share * np.angle(loop[i + 1] / loop[i]))
     return Crossover(float(np.exp(at)), math.pi - (-angle) % (2.0 * math.pi))
+
+
+def first_peak(values: Sequence[float], falls: float = 0.1) -> int:
+    """Where the first rise of a signal ends: before it falls by a share of its height.
+
+    Args:
+        values: Of the signal.
+        falls: Share; a shorter fall is noise.
+    """
+    best, height = 0, 0.0
+    largest = max(values)
+    for place, value in enumerate(values):
+        if value > height:
+            best, height = place, value
+        elif height > SMALL * largest and value < (1.0 - falls) * height:
+            break
+    return best
+
+
+SMALL = 0.2  # what stays below this share of the largest is no peak
+
+
+def first_above(values: Sequence[float], level: float) -> int:
+    """Where a signal first exceeds a level; its length if it never does."""
+    return next((n for n, value in enumerate(values) if value > level), len(values))

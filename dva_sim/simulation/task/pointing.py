@@ -126,6 +126,10 @@ class Goal(ABC):
     def notice(self, now: float, seen: Sighting, delay: float) -> None:  # noqa: B027
         """The person has seen a frame; some goals are reached by what it then does."""
 
+    def pushed(self, now: float, wanted: Velocity) -> Velocity:
+        """The command with what disturbs the cursor [m/s]."""
+        return wanted
+
     def holds(self, now: float) -> bool:
         """Whether something else is being done now, during which the cursor stays."""
         return False
@@ -215,6 +219,7 @@ class CursorTrial(Trial[Sighting]):
         now, plant, goal, wanted = self.now, self.plant, self.goal, self.commanded(dt)
         if self.scenario.automation:
             wanted = goal.corrected(self.scenario.automation, now, plant, wanted)
+        wanted = goal.pushed(now, wanted)
         if goal.holds(now):
             wanted = 0.0, 0.0
         plant.step(wanted[0], 0.0 if goal.flat else wanted[1], dt)

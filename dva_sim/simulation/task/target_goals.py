@@ -33,46 +33,96 @@ class ToTarget(Goal):
         )
 
 
+class Wandering:
+    """Where the target of a pointing trial is: it stands, or goes straight on until it turns.
+
+    Args:
+        task: Its speed and how often it turns.
+        amplitude: Way to where it appears [m].
+        angle: Direction of that place [rad].
+        rng: Luck of its ways.
+    """
+
+    LIMIT = 1.5  # amplitudes from the start at which it turns back
+
+    def __init__(
+        self, task: Pointing, amplitude: float, angle: float, rng: np.random.Generator
+    ) -> None:
+        self.amplitude, self.axis = amplitude, (math.cos(angle), math.sin(angle))
+        self._task, self._rng, self._angle = task, rng, angle
+        self._time, self._place = 0.0, (amplitude * self.axis[0], amplitude * self.axis[1])
+        self._velocity, self._turns_at = (0.0, 0.0), math.inf
+        if task.target_mps:
+            self._turn()
+
+    def at(self, now: float) -> Pair:
+        """Where it is [m]; time only goes on."""
+        if not self._task.target_mps:
+            return self._place
+        while self._turns_at <= now:
+            self._go_on(self._turns_at)
+            self._turn()
+        self._go_on(now)
+        return self._place
+
+    def _go_on(self, now: float) -> None:
+        """Go straight on until `now` [s], and back from the limit."""
+        passed, limit = now - self._time, self.LIMIT * self.amplitude
+        (x, y), (vx, vy) = self._place, self._velocity
+        x, y = x + vx * passed, y + vy * passed
+        vx = -abs(vx) if x > limit else abs(vx) if x < -limit else vx
+        vy = -abs(vy) if y > limit else abs(vy) if y < -limit else vy
+        self._time, self._place, self._velocity = now, (x, y), (vx, vy)
+
+    def _turn(self) -> None:
+        task, rng = self._task, self._rng
+        angle = float(rng.uniform(0.0, 2.0 * math.pi))
+        if task.axes == 1:
+            angle = math.pi * (angle < math.pi)
+        self._velocity = task.target_mps * math.cos(angle), task.target_mps * math.sin(angle)
+        every = task.turns_every_s
+        self._turns_at = self._time + float(rng.exponential(every)) if every else math.inf
+
+
 class PointGoal(ToTarget):
     """Select a target.
 
     Args:
         task: How it is selected.
-        amplitude: To its centre [m].
+        way: Of the target.
         width: Of the target [m].
-        angle: Direction of the target [rad].
         press: From the decision to press a button to the press at the machine [s].
     """
 
-    def __init__(
-        self, task: Pointing, amplitude: float, width: float, angle: float, press: float
-    ) -> None:
-        self._task, self.amplitude, self.width = task, amplitude, width
-        self.flat = task.axes == 1
+    def __init__(self, task: Pointing, way: Wandering, width: float, press: float) -> None:
+        self._task, self._way, self.width = task, way, width
+        self.amplitude = way.amplitude
+        self.flat, self.stands = task.axes == 1, not task.target_mps
         self.tolerance = 0.5 * (width - task.cursor_m)
-        self._axis = math.cos(angle), math.sin(angle)
-        self._at = amplitude * self._axis[0], amplitude * self._axis[1]
-        self._press, self._pressed_at = press, math.inf
+        self._press, self._pressed_at, self._presses = press, math.inf, 0
         self._inside_since: float | None = None
         self._selected = False
-        self._end, self._left = 0.0, 0
+        self._end, self._off, self._left = 0.0, 0.0, 0
         self._touched: list[Pair] = []
 
     def target(self, now: float) -> Pair:
         """See `Goal`."""
-        return self._at
+        return self._way.at(now)
 
     def notice(self, now: float, seen: Sighting, delay: float) -> None:
         """Who sees the cursor inside, so slow that it stays inside, presses."""
         if self._task.selection != "click" or self._pressed_at < math.inf:
             return
         off = math.hypot(seen.x - seen.target_x, seen.y - seen.target_y)
-        if off + math.hypot(seen.vx, seen.vy) * delay <= self.tolerance:
+        drift = math.hypot(seen.vx - seen.target_vx, seen.vy - seen.target_vy)
+        if off + drift * delay <= self.tolerance:
             self._pressed_at = now + self._press
+            self._presses += 1
 
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
         """See `Goal`."""
-        dx, dy = x - self._at[0], y - self._at[1]
+        (tx, ty), axis = self.target(now), self._way.axis
+        dx, dy = x - tx, y - ty
         inside = dx * dx + dy * dy <= self.tolerance * self.tolerance
         if inside and self._inside_since is None:
             self._inside_since = now
@@ -80,11 +130,14 @@ class PointGoal(ToTarget):
             self._inside_since = None
             self._left += 1
             self._touched.append((x, y))
-        if self._is_selected(now, inside):
-            self._selected = inside
-            self._end = dx * self._axis[0] + dy * self._axis[1]
-            return True
-        return False
+        if not self._is_selected(now, inside):
+            return False
+        if not inside and self._task.misses == "again":
+            self._pressed_at = math.inf
+            return False
+        self._selected = inside
+        self._end, self._off = dx * axis[0] + dy * axis[1], math.hypot(dx, dy)
+        return True
 
     def _is_selected(self, now: float, inside: bool) -> bool:
         if self._task.selection == "click":
@@ -102,12 +155,14 @@ class PointGoal(ToTarget):
             "completed": float(trial.over),
             "error": float(trial.over and not self._selected),
             "end_m": self._end if trial.over else math.nan,
+            "presses": self._presses,
+            "miss_m": self._off if trial.over else math.nan,
             "overshoots": self._left,
         }
 
     def draw(self, trace: Trace) -> None:
         """See `Goal`."""
-        trace.marks.append((*self._at, 0.5 * self.width))
+        trace.marks.append((*self._way.at(0.0), 0.5 * self.width))
         trace.touched += self._touched
 
 
@@ -119,28 +174,41 @@ class TrackGoal(ToTarget):
         phases: Of them, `(k,)` [rad].
     """
 
-    flat, stands = True, False
+    flat = True
 
     def __init__(self, task: Tracking, phases: list[float]) -> None:
+        self.stands = task.moves == "cursor"
         self._task, self.tolerance = task, 0.0
         self._waves = list(zip(task.amplitudes_m, task.frequencies, phases, strict=True))
         self._targets: list[float] = []
         self._cursors: list[float] = []
-        self._steps, self._dt = 0, 0.0
+        self._steps, self._dt, self._told = 0, 0.0, 0.0
 
     def target(self, now: float) -> Pair:
         """See `Goal`."""
-        return sum(a * math.sin(w * now + p) for a, w, p in self._waves), 0.0
+        return (0.0 if self.stands else self._sum(now)), 0.0
+
+    def pushed(self, now: float, wanted: Velocity) -> Velocity:
+        """See `Goal`; what was told is kept, as the answer to the push."""
+        self._told = wanted[0]
+        return (wanted[0] + self._sum(now), wanted[1]) if self.stands else wanted
+
+    def _sum(self, now: float) -> float:
+        return sum(a * math.sin(w * now + p) for a, w, p in self._waves)
 
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
-        """See `Goal`."""
+        """See `Goal`.
+
+        A push P and an answer U of the person make an open loop of -H/(1+H) with H = U/P, which is
+        that of a target P and a cursor -U.
+        """
         task = self._task
         if now < task.warm_up_s + 0.5 * dt:
             return False
         self._steps, self._dt = self._steps + 1, SAMPLE_STEPS * dt
         if self._steps % SAMPLE_STEPS == 1:
-            self._targets.append(self.target(now)[0])
-            self._cursors.append(x)
+            self._targets.append(self._sum(now - dt if self.stands else now))
+            self._cursors.append(-self._told if self.stands else x)
         return self._steps * dt >= task.record_s - 0.5 * dt
 
     def row(self, trial: CursorTrial) -> dict[str, Any]:
@@ -162,7 +230,7 @@ class TrackGoal(ToTarget):
 
     def draw(self, trace: Trace) -> None:
         """The target beside the cursor, over time."""
-        trace.walls.append([(t, self.target(t)[0]) for t in trace.times])
+        trace.walls.append([(t, self._sum(t)) for t in trace.times])
 
 
 class ReachGoal(ToTarget):

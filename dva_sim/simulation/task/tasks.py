@@ -39,6 +39,11 @@ class Pointing(Config):
         selection: `first_entry`: inside once. `dwell`: inside for `dwell_s`. `click`: when the
             person presses a button; a press outside the target is an error.
         dwell_s: How long it must stay inside.
+        misses: A press outside ends the trial (`over`), or another one is made (`again`).
+        errors: A press outside is a failure for the person (`count`), or costs nothing (`free`),
+            so that it is in a hurry.
+        target_mps: Speed of the target, which turns back one amplitude and a half from the start.
+        turns_every_s: Mean time after which a moving target takes another way; 0: never.
         cue: `known`: where the next target will be is known, so one sets off as soon as one
             sees it. `unexpected`: one acts a reaction time after the first frame is on the screen.
             Who drives a vehicle always does.
@@ -53,6 +58,10 @@ class Pointing(Config):
     cursor_m: NonNegative = 0.0
     selection: Literal["first_entry", "dwell", "click"] = "first_entry"
     dwell_s: NonNegative = 0.5
+    misses: Literal["over", "again"] = "over"
+    errors: Literal["count", "free"] = "count"
+    target_mps: NonNegative = 0.0
+    turns_every_s: NonNegative = 0.0
     cue: Literal["known", "unexpected"] = "known"
     timed_from: Literal["target", "movement"] = "target"
 
@@ -103,13 +112,15 @@ class Tunnel(Config):
 
 
 class Tracking(Config):
-    """Follow a target that moves as a sum of sines, on a line.
+    """Follow a target that moves as a sum of sines, on a line, or resist a push of that form.
 
     Attributes:
         record_s: What is measured; sines are rounded to whole periods in it.
         warm_up_s: Before that, not measured.
         frequencies_rad_s: Of the sines.
         amplitudes_m: Of the sines.
+        moves: The `target`, or the `cursor`: then the sines are added to what it is told, in
+            seconds of its motion, and the target stands.
     """
 
     kind: Literal["tracking"] = "tracking"
@@ -117,6 +128,7 @@ class Tracking(Config):
     warm_up_s: NonNegative = 10.0
     frequencies_rad_s: Several = (0.2, 0.5, 1.0, 2.0, 4.0)
     amplitudes_m: Several = (0.02, 0.02, 0.02, 0.002, 0.002)
+    moves: Literal["target", "cursor"] = "target"
 
     def conditions(self) -> Iterator[tuple[float, float]]:
         """One: the largest excursion and the highest frequency."""
@@ -215,6 +227,28 @@ class Course(Config):
         return self
 
 
+class HeadingStep(Config):
+    """Keep a vehicle on a straight way whose heading is wrong when the picture appears.
+
+    The machine holds the top speed; only the steering is the person's.
+
+    Attributes:
+        error_deg: Of the heading, to the left and to the right by turns.
+        width_m: Of the way.
+        watched_s: Time for which the steering is watched.
+    """
+
+    kind: Literal["heading_step"] = "heading_step"
+    error_deg: Values = 1.0
+    width_m: Length = 3.0
+    watched_s: Annotated[float, Field(gt=0, le=60)] = 2.5
+
+    def conditions(self) -> Iterator[tuple[float, float]]:
+        """Error [deg] and width [m] of each condition."""
+        for error in values_of(self.error_deg):
+            yield error, self.width_m
+
+
 class Stop(Config):
     """Where the tip of the arm has to come to, and the work there.
 
@@ -252,6 +286,7 @@ class ReachTask(Config):
 
 
 Task = Annotated[
-    Pointing | Tunnel | Tracking | Corner | Slalom | Course | ReachTask, Field(discriminator="kind")
+    Pointing | Tunnel | Tracking | Corner | Slalom | Course | HeadingStep | ReachTask,
+    Field(discriminator="kind"),
 ]
-VEHICLES = (Corner, Slalom, Course)
+VEHICLES = (Corner, Slalom, Course, HeadingStep)

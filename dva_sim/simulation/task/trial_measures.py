@@ -14,7 +14,7 @@ from dva_sim.simulation.task.scenario import TaskScenario
 
 Row = dict[str, Any]
 
-_DRIVEN = ("tunnel", "corner", "slalom", "course")
+_DRIVEN = ("tunnel", "corner", "slalom", "course", "heading_step")
 _AIMED = ("pointing", *_DRIVEN)
 DRIVEN_COLUMNS = (
     Measure(
@@ -37,6 +37,10 @@ DRIVEN_COLUMNS = (
 _AVERAGED = (
     *DRIVEN_COLUMNS,
     Measure("error", "1 if a selection missed or a wall was crossed, else 0", low=0, high=1),
+    Measure("presses", "presses of the button until the target was hit or the trial over"),
+    Measure("miss_m", "distance of the last press, or of the end, from the centre of the target"),
+    Measure("reaction_s", "time from the first picture until the person began to steer"),
+    Measure("pulse_s", "time in which the first correction grew"),
     Measure("overshoots", "times that the target was left again"),
     Measure("stops", "places reached, of those to go to", better="large"),
     Measure("tracking_error_rms_m", "distance from the moving target, root mean square"),
@@ -63,6 +67,7 @@ TRIAL_COLUMNS = (
     Measure("width_m", "of the target, tunnel or way"),
     Measure("length_m", "of the tunnel or way"),
     Measure("spacing_m", "between the gates of a slalom"),
+    Measure("heading_error_deg", "of the heading when the picture appears"),
     Measure("excursion_m", "greatest excursion of the target"),
     Measure("bandwidth_rad_s", "highest frequency of the target"),
     Measure("id_bits", "index of difficulty, Shannon form"),
@@ -122,6 +127,8 @@ _OF_KINDS = {
     "error_share": _AIMED,
     "overshoots": ("pointing", "reach"),
     "wall_crossings": _DRIVEN,
+    **dict.fromkeys(("presses", "miss_m"), ("pointing",)),
+    **dict.fromkeys(("reaction_s", "pulse_s"), ("heading_step",)),
     "stops": ("reach",),
     "path_error_rms_m": _DRIVEN,
     "steering_slope_s": _DRIVEN,

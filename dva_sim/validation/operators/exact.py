@@ -70,7 +70,7 @@ def helpers(seed: int) -> Values:
     )
     turnout, travel = departed - assigned, arrived - departed
     stream = np.asarray(names)[row["stream"][came].astype(int)]
-    rng, guard = Streams(seed).fresh("guards"), _guard()
+    rng, guard = Streams(seed).fresh("guards"), guard_profile()
     guards = np.array([Walker.draw(guard, rng).mobilisation for _ in range(PERSONS)])
     return {
         "turnout-fire": _nine_in_ten(guards),
@@ -86,7 +86,7 @@ def alarms() -> Values:
 
 def walkers(seed: int) -> Values:
     """Mean and standard deviation of the free walking speed of guards [m/s]."""
-    rng, guard = Streams(seed).fresh("walkers"), _guard()
+    rng, guard = Streams(seed).fresh("walkers"), guard_profile()
     speeds = [Walker.draw(guard, rng).speed for _ in range(PERSONS)]
     return {"mean": float(np.mean(speeds)), "sd": float(np.std(speeds, ddof=1))}
 
@@ -96,7 +96,8 @@ def plumes() -> Values:
     return {stability: sigma_y(stability, 1000.0) for stability in "ABCDEF"}
 
 
-def _guard() -> GuardProfile:
+def guard_profile() -> GuardProfile:
+    """The guards of the validation."""
     document = load_yaml(resources.find("guard", "agents/people"))
     return validate(GuardProfile, document.data, document.error)
 

@@ -14,15 +14,19 @@ from typing import Any, cast
 
 import numpy as np
 
+from dva_sim.agents.population import Person, draw_person
 from dva_sim.experiments.study.cell_grid import StudyJob
 from dva_sim.kernel import resources
 from dva_sim.kernel.streams import Streams, derive_seed
 from dva_sim.kernel.yaml_files import load_yaml
 from dva_sim.simulation.models import Tables
+from dva_sim.simulation.scenario.parts import OperatorConfig
+from dva_sim.simulation.scenario.scenario import population
 from dva_sim.simulation.task import TaskScenario, build, play
 from dva_sim.simulation.task.movement_laws import fit_line
 from dva_sim.validation.frame import Progress, job_of, play_jobs
 from dva_sim.validation.operators.exact import EXACT
+from dva_sim.validation.operators.looking import PARTS
 from dva_sim.validation.operators.trials import (
     Cells,
     Floats,
@@ -33,6 +37,8 @@ from dva_sim.validation.operators.trials import (
     collect,
     mean,
     person_means,
+    person_means_of,
+    person_medians,
     with_intervals,
 )
 
@@ -63,14 +69,14 @@ class Experiment:
 
     Attributes:
         name: Of the experiment.
-        scenario: The task, by name.
+        scenario: The task, by name; None: a part of the operator, see `looking`.
         cells: What is changed in each cell that the task itself does not cross.
         measure: From the trials to the value of each line.
         quick: What is changed besides for a quick look.
     """
 
     name: str
-    scenario: str
+    scenario: str | None
     cells: Mapping[str, Mapping[str, Any]]
     measure: Callable[[Cells], Values]
     quick: Mapping[str, Any] = field(default_factory=dict)
@@ -209,6 +215,186 @@ def _parabola(x: Floats, y: Floats) -> float:
     return 1.0 - float(rest.var() / y.var())
 
 
+# --- moving targets under late clicks: Claypool, Eg & Raaen 2017 -------------------------------
+ADDED_S = (0.0, 0.1, 0.2, 0.3, 0.4)  # on top of the local lag
+LOCAL_S = 0.1
+SPEEDS_MPS = (0.0375, 0.075, 0.1125)
+
+
+def moving_cell(added: float, speed: float) -> str:
+    """Name of a cell."""
+    return f"{added:g}/{speed:g}"
+
+
+def log_times(trials: Trials) -> Floats:
+    """Logarithm of the time of each trial `(n,)`."""
+    return np.log(trials["movement_time_s"])
+
+
+def moving_ratios(cells: Cells, added: float) -> Floats:
+    """Of each person, time at a lag over that at none, geometric mean over speeds `(persons,)`."""
+    logs = [
+        person_means_of(cells[moving_cell(added, v)], log_times)
+        - person_means_of(cells[moving_cell(0.0, v)], log_times)
+        for v in SPEEDS_MPS
+    ]
+    return np.asarray(np.exp(np.mean(logs, axis=0)))
+
+
+def moving_values(cells: Cells) -> Values:
+    """What lag costs, how convex that is, how persons differ and learn, and how often they miss."""
+    logs = {added: np.log(moving_ratios(cells, added)) for added in ADDED_S}
+    ratio = {added: float(np.exp(log.mean())) for added, log in logs.items()}
+    slow = [cells[moving_cell(a, SPEEDS_MPS[0])] for a in (0.2, 0.0)]
+    late, prompt = (person_means(trials, "movement_time_s") for trials in slow)
+    presses = {
+        a: np.mean([mean(cells[moving_cell(a, v)], "presses") for v in SPEEDS_MPS])
+        for a in (0.0, 0.4)
+    }
+    return {
+        "A1/ratio": ratio[0.1],
+        "A2/ratio": ratio[0.2],
+        "A3/ratio": ratio[0.4],
+        "A4/slope": float(np.mean(late - prompt)) / 0.2,
+        "A5/convexity": math.log(ratio[0.4]) / math.log(ratio[0.2]),
+        **_individuals(cells),
+        "A10/presses": float(presses[0.4] / presses[0.0]),
+    }
+
+
+def _individuals(cells: Cells) -> Values:
+    """Variances within and between persons of log times, slopes on lag, and practice."""
+    rest, slopes, errors, practice = [], [], [], []
+    every = {cell: log_times(trials) for cell, trials in cells.items()}
+    persons = np.unique(next(iter(cells.values())).person)
+    within = []
+    for person in persons:
+        own = {cell: logs[cells[cell].person == person] for cell, logs in every.items()}
+        within += [logs - logs.mean() for logs in own.values()]
+        rest.append(np.concatenate([logs - every[cell].mean() for cell, logs in own.items()]))
+        x = np.concatenate([np.full(len(own[c]), float(c.split("/")[0])) for c in own])
+        y = np.concatenate(
+            [own[c] - every[moving_cell(0.0, float(c.split("/")[1]))].mean() for c in own]
+        )
+        slope, cut = np.polyfit(x, y, 1)
+        slopes.append(slope)
+        left = float(np.var(y - cut - slope * x, ddof=2))
+        errors.append(left / float(((x - x.mean()) ** 2).sum()))
+        numbers = np.log1p(np.concatenate([np.arange(len(logs)) for logs in own.values()]))
+        practice.append(np.polyfit(numbers, rest[-1] - rest[-1].mean(), 1)[0])
+    freedom = sum(len(w) - 1 for w in within)
+    inside = float((np.concatenate(within) ** 2).sum()) / freedom
+    between = float(np.var([r.mean() for r in rest], ddof=1)) - inside / len(rest[0])
+    spread = max(float(np.var(slopes, ddof=1)) - float(np.mean(errors)), 0.0)
+    return {
+        "A6/between": math.sqrt(max(between, 0.0)),
+        "A7/within": math.sqrt(math.expm1(inside)),
+        "A8/slopes": math.sqrt(spread) / float(np.mean(slopes)),
+        "A9/practice": float(np.mean(practice)),
+    }
+
+
+# --- one click that may miss: Claypool, Cockburn & Gutwin 2020 ---------------------------------
+CLICK_S = {"0": 0.05, "0.25": 0.3}
+
+
+def click_values(cells: Cells) -> Values:
+    """How far off the one click is under lag, and what lag costs in time."""
+    off = {c: person_medians(trials, "miss_m") for c, trials in cells.items()}
+    times = {c: person_medians(trials, "movement_time_s") for c, trials in cells.items()}
+    return {
+        "A11/off": float(np.exp(np.mean(np.log(off["0.25"] / off["0"])))),
+        "A12/slope": float(np.mean(times["0.25"] - times["0"])) / 0.25,
+    }
+
+
+# --- resisting a push: Yamagami et al. 2019 ----------------------------------------------------
+def pushed_values(cells: Cells) -> Values:
+    """What is read off the open loops, and how persons differ."""
+    trials = cells["pushed"]
+    frequency = person_means(trials, "crossover_rad_s")
+    margins = person_means(trials, "phase_margin_deg")
+    if not len(frequency):
+        return dict.fromkeys(("B1/crossover", "B2/margin", "B3/delay", "B4/spread"), math.nan)
+    late = (0.5 * math.pi - np.radians(margins)) / frequency
+    spread = frequency.std(ddof=1) / frequency.mean() if len(frequency) > 1 else math.nan
+    return {
+        "B1/crossover": float(frequency.mean()),
+        "B2/margin": float(margins.mean()),
+        "B3/delay": float(late.mean()),
+        "B4/spread": float(spread),
+    }
+
+
+# --- the first steering: Goodridge et al. 2022 -------------------------------------------------
+def heading_values(cells: Cells) -> Values:
+    """Reaction times by error, their spread, and how long the first correction grows."""
+    errors = {int(error): own for (error,), own in cells["heading"].by("heading_error_deg")}
+    medians = {error: person_medians(own, "reaction_s") for error, own in errors.items()}
+    pulses = np.concatenate([own["pulse_s"] for own in errors.values()])
+    logs = {error: np.log(own["reaction_s"]) for error, own in errors.items()}
+    means = np.array(
+        [person_means_of(own, lambda t: np.log(t["reaction_s"])) for own in errors.values()]
+    )
+    left = np.concatenate(
+        [
+            logs[e] - person_means_of(own, lambda t: np.log(t["reaction_s"]))[own.person]
+            for e, own in errors.items()
+        ]
+    )
+    cellwise = means.size
+    return {
+        "C1/reaction": float(np.mean(list(medians.values()))),
+        "C2/ratio": float(np.mean(medians[1] / medians[2])),
+        "C3/pulse": float(np.median(pulses)),
+        "C4/within": math.sqrt(float((left**2).sum()) / (len(left) - cellwise)),
+        "C4/between": float(means.mean(axis=0).std(ddof=1)),
+    }
+
+
+# --- looking: Wagenmakers et al. 2008, Colley et al. 2025, searchers, walkers ------------------
+def choice_values(cells: Cells) -> Values:
+    """Accuracy against speed: times of each person, errors of all."""
+    times = {c: person_medians(trials, "time_s") for c, trials in cells.items()}
+    errors = {c: mean(trials, "error") for c, trials in cells.items()}
+    share = errors["accuracy"] / errors["speed"] if errors["speed"] else math.nan
+    return {"D1/time": float(np.mean(times["accuracy"] / times["speed"])), "D2/errors": share}
+
+
+def vehicle_values(cells: Cells) -> Values:
+    """What a second vehicle costs the first, by persons."""
+    logs = [person_means_of(cells[n], lambda t: np.log(t["finish_s"])) for n in ("2", "1")]
+    return {"E1/ratio": float(np.exp(np.mean(logs[0] - logs[1])))}
+
+
+def look_values(cells: Cells) -> Values:
+    """Quartiles of the looks of all, and the spread of their logarithm."""
+    looks = cells["two"]["look_s"]
+    looks = looks[looks > SHORTEST_LOOK_S]
+    first, median, third = np.quantile(looks, [0.25, 0.5, 0.75])
+    spread = float(np.log(looks).std(ddof=1))
+    return {"E2/median": median, "E2/first": first, "E2/third": third, "E3/spread": spread}
+
+
+SHORTEST_LOOK_S = 0.3  # what is shorter was not counted
+
+
+def alarm_values(cells: Cells) -> Values:
+    """Mean of the medians of persons."""
+    return {"E4/opened": float(person_medians(cells["one"], "opened_s").mean())}
+
+
+def item_values(cells: Cells) -> Values:
+    """Share found, mean over persons."""
+    return {"F1/found": mean(cells["open"], "found")}
+
+
+def walker_values(cells: Cells) -> Values:
+    """Of all walkers together."""
+    speeds = cells["street"]["speed_mps"]
+    return {"G1/mean": float(speeds.mean()), "G1/sd": float(speeds.std(ddof=1))}
+
+
 # --- all of them -----------------------------------------------------------------------------
 LATE = "link.down.delay_s"
 
@@ -233,6 +419,18 @@ def _both_ways(delay: float) -> dict[str, Any]:
     return {"link.up.delay_s": 0.5 * delay, LATE: 0.5 * delay}
 
 
+def _moving_cells() -> dict[str, dict[str, Any]]:
+    return {
+        moving_cell(added, speed): {
+            "link.up.delay_s": LOCAL_S + added,
+            "task.target_mps": speed,
+        }
+        for added in ADDED_S
+        for speed in SPEEDS_MPS
+    }
+
+
+_QUICK = {"trials": 4, "practice": 1}
 _ONE = {"trials": 1, "practice": 1}  # of each of many conditions
 _TWO = {"trials": 2, "practice": 1}
 _FEW = {"trials": 3, "practice": 1}
@@ -264,6 +462,22 @@ EXPERIMENTS: tuple[Experiment, ...] = (
     ),
     Experiment("tracking", "tracking", {"tracking": {}}, tracking_values),
     Experiment("frames", "frame-rate", _frame_cells(), frame_values, _ONE),
+    Experiment("moving", "moving-target", _moving_cells(), moving_values, _QUICK),
+    Experiment(
+        "click",
+        "one-click",
+        {c: {"link.up.delay_s": s} for c, s in CLICK_S.items()},
+        click_values,
+        _QUICK,
+    ),
+    Experiment("pushed", "tracking-pushed", {"pushed": {}}, pushed_values, {"trials": 1}),
+    Experiment("heading", "heading-step", {"heading": {}}, heading_values, _QUICK),
+    Experiment("choices", None, {"accuracy": {}, "speed": {}}, choice_values),
+    Experiment("vehicles", None, {"1": {}, "2": {}}, vehicle_values),
+    Experiment("looks", None, {"two": {}}, look_values),
+    Experiment("alarms", None, {"one": {}}, alarm_values),
+    Experiment("items", None, {"open": {}}, item_values),
+    Experiment("walkers", None, {"street": {}}, walker_values),
 )
 """Every experiment; which of them may be fitted to, the split file says."""
 
@@ -356,13 +570,24 @@ def perform_exact(job: StudyJob) -> Tables:
 
 def perform(job: StudyJob) -> Tables:
     """All trials of one person in one cell."""
+    if isinstance(job.scenario, Person):
+        part, cell = job.config.split("/")
+        return {"rows": PARTS[part](job.scenario, cell, job.seed)}
     return {"rows": play(cast(TaskScenario, job.scenario), job.seed)}
 
 
 def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
     """Those of each cell; a person meets the same luck in all of them."""
-    document = load_yaml(resources.find(experiment.scenario, FOLDER))
     jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
+    if experiment.scenario is None:
+        everybody = population(OperatorConfig()).with_medians(setting.traits or {})
+        for person in range(setting.persons):
+            who = draw_person(everybody, setting.seed, person)
+            for cell in experiment.cells:
+                seed = derive_seed("operators", experiment.name, setting.seed, person)
+                jobs[cell].append(job_of(f"{experiment.name}/{cell}", seed, who, person=person))
+        return jobs
+    document = load_yaml(resources.find(experiment.scenario, FOLDER))
     for cell, changes in experiment.cells.items():
         every = {**changes, **(experiment.quick if setting.quick else {})}
         every |= {"operator.strategy": setting.strategy, "operator.population_seed": setting.seed}

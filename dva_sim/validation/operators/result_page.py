@@ -40,6 +40,8 @@ BY = {
     "waiting": "delay [s]",
     "excavator": "delay [s]",
     "frames": "frame rate [1/s], delay [s]",
+    "moving": "added lag [s], speed of the target [m/s]",
+    "click": "added lag [s]",
 }
 """What the names of the cells of an experiment mean, where they do not say it."""
 
@@ -99,7 +101,7 @@ def grouped(verdicts: Sequence[LineVerdict]) -> Iterator[tuple[str, list[LineVer
 def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
     """Of each experiment and its cells, in which share of the time they moved and waited."""
     found = []
-    for name, cells in played.items():
+    for name, cells in by_strategy(played).items():
         shares = [
             f"{100 * mean(trials, STEERED):.0f}\N{NO-BREAK SPACE}%" for trials in cells.values()
         ]
@@ -107,6 +109,15 @@ def steered(played: Mapping[str, Cells]) -> list[tuple[str, str]]:
         told = f"{name}, by {BY[name]}" if name in BY else name
         found.append((told, f"{shares[0]} everywhere" if len(set(shares)) == 1 else each))
     return found
+
+
+def by_strategy(played: Mapping[str, Cells]) -> dict[str, Cells]:
+    """The experiments in which something is steered."""
+    return {
+        name: cells
+        for name, cells in played.items()
+        if all(STEERED in trials.columns for trials in cells.values())
+    }
 
 
 def headline(outcome: Tally) -> str:
@@ -196,7 +207,7 @@ def _with_sources(verdicts: Sequence[LineVerdict]) -> list[Sequence[str]]:
 def _shares(played: Mapping[str, Cells]) -> list[Row]:
     return [
         {"experiment": name, "cell": cell, STEERED: mean(trials, STEERED)}
-        for name, cells in played.items()
+        for name, cells in by_strategy(played).items()
         for cell, trials in cells.items()
     ]
 

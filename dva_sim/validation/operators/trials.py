@@ -139,6 +139,18 @@ def person_means(trials: Trials, name: str) -> Floats:
     return np.asarray(total[count > 0] / count[count > 0])
 
 
+def person_means_of(trials: Trials, get: Callable[[Trials], Floats]) -> Floats:
+    """The mean of each person of something made of its trials `(persons,)`."""
+    values = get(trials)
+    return np.asarray(np.bincount(trials.person, values) / np.bincount(trials.person))
+
+
+def person_medians(trials: Trials, name: str) -> Floats:
+    """The median of each person `(persons,)`."""
+    values = trials[name]
+    return np.array([np.nanmedian(values[trials.person == p]) for p in np.unique(trials.person)])
+
+
 def mean(trials: Trials, name: str) -> float:
     """The mean over persons of their means."""
     means = person_means(trials, name)

@@ -2,12 +2,15 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task import block, build, play, trace_of
 from dva_sim.simulation.task.block import seat_of
 from dva_sim.simulation.task.movement_laws import fit_line
+from dva_sim.simulation.task.target_goals import Wandering
+from dva_sim.simulation.task.tasks import Pointing
 from dva_sim.simulation.task.trial_measures import run_row
 from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
@@ -299,3 +302,19 @@ def test_a_trace_is_that_of_the_row_and_begins_where_the_cursor_rests():
     assert trace.places[0] == (0.0, 0.0)
     assert trace.times[-1] == pytest.approx(row["trial_time_s"])
     assert trace.marks == [(0.2, 0.0, 0.01)]
+
+
+def test_a_click_beside_the_target_is_made_again_until_it_hits():
+    target = {"selection": "click", "misses": "again", "axes": 2, "target_mps": 0.1}
+    persons = {"traits": {}, "strategy": "pursuit"}
+    scenario = pointing(task=target, operator=persons, link={"up": {"delay_s": 0.4}}, trials=6)
+    rows = play(build(scenario), seed=3)
+    assert max(row["presses"] for row in rows) > 1
+    assert all(row["completed"] and not row["error"] for row in rows)
+
+
+def test_a_target_that_moves_keeps_within_its_limit_at_its_speed():
+    way = Wandering(Pointing(axes=2, target_mps=0.1), 0.1, 0.0, np.random.default_rng(1))
+    places = np.array([way.at(0.01 * n) for n in range(1000)])
+    assert np.abs(places).max() < 0.152
+    assert np.median(np.hypot(*np.diff(places, axis=0).T)) == pytest.approx(1e-3)

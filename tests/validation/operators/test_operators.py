@@ -33,7 +33,11 @@ def test_an_operator_on_whom_delay_has_no_effect_fails_whatever_else_it_does():
     verdicts, found = played("oracle", "lag", "latency", "waiting", "excavator")
     assert found["S7/75"].value == pytest.approx(1.0)
     assert found["S17/increase"].value == pytest.approx(0.0)
-    held_out = {v.line.id: v.word for v in verdicts.values() if v.line.kind == "held-out"}
+    held_out = {
+        v.line.id: v.word
+        for v in verdicts.values()
+        if v.line.kind == "held-out" and v.line.check[0] == "S"
+    }
     without_delay = {"S11/mean", "S11/variance"}  # the steering law, not played here
     assert len(held_out) == 10
     assert {held_out[line] for line in held_out.keys() - without_delay} == {"misses"}

@@ -35,11 +35,13 @@ def test_the_shipped_split_assigns_every_check_once():
     kinds = load_split().kinds()
     assert kinds.keys() == load_targets().checks.keys()
     counts = {kind: list(kinds.values()).count(kind) for kind in set(kinds.values())}
-    assert counts == {"exact": 11, "held-out": 6, "fitted": 2, "remembered": 2}
+    assert counts == {"exact": 11, "held-out": 14, "fitted": 23, "remembered": 2}
 
 
-def test_only_one_publication_may_be_fitted_to():
-    assert load_split().fit == {"mackenzie-teather-2012": ("S9", "S10")}
+def test_no_publication_is_both_fitted_to_and_held_out():
+    split = load_split()
+    assert split.fit.keys().isdisjoint(split.held_out)
+    assert len(split.fit) == 5
 
 
 def test_a_check_assigned_twice_is_refused():
@@ -75,8 +77,9 @@ def test_a_tag_without_a_meaning_is_refused():
 def test_what_each_comparison_found_is_kept_line_by_line():
     path = resources.find("operators", "experiments/validation").with_name("operators-history.csv")
     rows = {r["line"]: r for r in csv.DictReader(path.read_text(encoding="utf-8").splitlines())}
-    assert rows.keys() == {line.id for line in LINES.values() if line.kind != "beside"}
-    held_out = [line for line in LINES.values() if line.kind == "held-out"]
+    early = [line for line in LINES.values() if line.kind != "beside" and line.check[0] == "S"]
+    assert rows.keys() >= {line.id for line in early}
+    held_out = [line for line in early if line.kind == "held-out"]
     passed = [sum(line.holds(float(rows[line.id][n])) for line in held_out) for n in _COMPARISONS]
     assert passed == [7, 9, 8]
 
