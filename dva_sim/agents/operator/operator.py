@@ -243,13 +243,19 @@ class OperatorAgent:
             elif drive.log.refusal in ASK_AGAIN and self._may_ask_again(drive):
                 self._waiting.insert(0, (device.clock.now, order))
             else:
-                # The DVA takes the robot back with the order, unless it has ended that before.
+                # The DVA takes the robot back with the order, unless it has ended that before,
+                # or has meanwhile given the order for another robot.
                 body = m.OrderProgress(order.event_id, "done" if found else "failed")
                 device.ask(device.dva, body, ended, unheard)
             self._be_free(drive)
 
+        also = any(
+            other.event_id == order.event_id and other.device != order.device
+            for other in self._orders
+        )
+
         def ended(reply: m.Reply) -> None:
-            if reply.code != m.OK:
+            if reply.code != m.OK or also:
                 unheard()
 
         def unheard() -> None:
@@ -270,7 +276,9 @@ class OperatorAgent:
             steps.give_back(self.device, robot, session)
 
     def _wants(self, robot: str) -> bool:
-        return robot in {order.device for order in self._orders}
+        work = self.works.get(robot)
+        goes_on = work is not None and not work.over
+        return goes_on or any(order.device == robot for _, order in self._waiting)
 
     def _be_free(self, drive: Work) -> None:
         """The robot was told to stop: what is next?"""

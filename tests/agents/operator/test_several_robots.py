@@ -162,3 +162,14 @@ def test_who_drives_through_thin_smoke_looks_from_nearer_and_can_refute():
     dva.run_until(lambda: "done" in dva.progress(1))
     assert dva.progress(1) == ["departed", "arrived", "refuted", "done"]
     assert math.dist(dva.field.robots[ROBOT].body.pose()[:2], EAST) < 1.07
+
+
+def test_a_robot_is_given_back_whose_order_went_to_another_robot():
+    """The DVA, after a restart, may give the same event to another robot: it takes that one back
+    with the order, and knows nothing of the first."""
+    dva, _ = office("direct")
+    dva.start(1, EAST)
+    assert dva.order(1, EAST, robot=OTHER_ROBOT) == m.OK
+    dva.run_until(lambda: "done" in dva.progress(1))
+    dva.run_for(3.0)
+    assert ROBOT not in dva.sessions
