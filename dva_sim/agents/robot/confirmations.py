@@ -92,6 +92,9 @@ class Confirmations:
         return [one for one in self._waiting if one.reader == reader]
 
     def _answered(self, reply: m.Reply) -> None:
+        if self._device.silent:  # its computer hangs, or has no power: it has not heard that
+            self._failed()
+            return
         asked = self._inquiry.asked
         of = self._waiting_for(asked) if asked is not None else []
         settled = [one for one in of if one.asked]
