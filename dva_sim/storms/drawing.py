@@ -9,13 +9,11 @@ from dva_sim.core.dispatch import POLICIES
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.suggestions import unknown
 from dva_sim.network.patterns import PATTERNS
-from dva_sim.storms.faults import FAULTS, FaultKind
+from dva_sim.storms.faults import DEADLINES, FAULTS, FaultKind
 from dva_sim.storms.plan import Fault, StormPlan
 
 FIRST, STORM = 15.0, 600.0  # faults begin and have ended [s]
-DEADLINES: Final = (3.0, 6.0, 9.0, 10.0, 27.0, 30.0)
-"""Watchdog, age limit, time-out, silence, three time-outs, lease [s]: a fault often lasts about
-as long as one of them."""
+_SOURCES: Final = "", "operator", "driver", "dva", "robot"
 PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "all": tuple(FAULTS),
     "messages": tuple(
@@ -29,6 +27,7 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "people": (
         *("revocation", "take-over", "emergency", "asks-twice", "old-session", "held-tilt"),
         *("second-driver", "flood", "taken-by-hand", "vanishes", "replay-by-another"),
+        *("guard-idle", "app-restarts"),
     ),
     "none": (),
 }
@@ -49,12 +48,12 @@ def draw(seed: int, profile: str = "all") -> StormPlan:
         raise ConfigError(unknown("profile", profile, PROFILES))
     chance = random.Random(f"storm {seed}")
     scenario = _scenario(chance)
+    counts = {kind: scenario[kind]["count"] for kind in ("robot", "guard", "operator")}
+    counts["driver"] = drivers = chance.randint(1, min(3, counts["robot"]))
     kinds = PROFILES[profile]
     count = round(chance.uniform(10, 60)) if kinds else 0
-    faults = sorted(
-        (_fault(chance, kinds, scenario) for _ in range(count)), key=lambda each: each.at_s
-    )
-    return StormPlan(seed, scenario, tuple(faults), STORM)
+    faults = sorted((_fault(chance, kinds, counts) for _ in range(count)), key=lambda f: f.at_s)
+    return StormPlan(seed, scenario, tuple(faults), STORM, drivers)
 
 
 def _scenario(chance: random.Random) -> dict[str, Any]:
@@ -85,7 +84,7 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
             "mode": chance.choice(("automatic", "automatic", "ask_first")),
             "decide_within_s": 10.0,
         },
-        "events": [_event(chance, number) for number in range(chance.randint(4, 12))],
+        "events": [_event(chance, number) for number in range(chance.randint(5, 16))],
     }
 
 
@@ -118,11 +117,12 @@ def _event(chance: random.Random, number: int) -> dict[str, Any]:
     }
 
 
-def _fault(chance: random.Random, kinds: tuple[str, ...], scenario: dict[str, Any]) -> Fault:
-    (name,) = chance.choices(kinds, [FAULTS[kind].weight for kind in kinds])
+def _fault(chance: random.Random, kinds: tuple[str, ...], counts: dict[str, int]) -> Fault:
+    there = [name for name in kinds if any(counts.get(each, 1) for each in FAULTS[name].strikes)]
+    (name,) = chance.choices(there, [FAULTS[name].weight for name in there])
     kind = FAULTS[name]
-    target = _device(chance, kind.strikes, scenario)
-    source = _device(chance, ("", "operator", "dva", "robot"), scenario) if _passes(name) else ""
+    target = _device(chance, kind.strikes, counts)
+    source = _device(chance, _SOURCES, counts) if _passes(name) else ""
     lasts = _duration(chance, kind)
     at = round(chance.uniform(FIRST, STORM - lasts - 45.0), 3)
     on = chance.choice(kind.on) if kind.on and chance.random() < 0.6 else ""
@@ -151,9 +151,9 @@ def _duration(chance: random.Random, kind: FaultKind) -> float:
     return round(chance.uniform(low, high), 3)
 
 
-def _device(chance: random.Random, kinds: tuple[str, ...], scenario: dict[str, Any]) -> str:
+def _device(chance: random.Random, kinds: tuple[str, ...], counts: dict[str, int]) -> str:
     """Draw a device of some kinds, by label."""
-    kind = chance.choice([k for k in kinds if k != "guard" or scenario["guard"]["count"]])
+    kind = chance.choice([kind for kind in kinds if counts.get(kind, 1)])
     if kind in ("", "dva"):
         return kind
-    return f"{kind}-{chance.randint(1, scenario[kind]['count'])}"
+    return f"{kind}-{chance.randint(1, counts[kind])}"

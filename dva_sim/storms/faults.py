@@ -7,24 +7,29 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from dva_sim.agents.device import AgentDevice, do_nothing
 from dva_sim.agents.robot.faults import SLOWEST
 from dva_sim.agents.robot.manual_control import ManualControl
+from dva_sim.network.virtual_network import VirtualNetwork
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import encode
 from dva_sim.protocol.messages import Position
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.storms import interference as i
+from dva_sim.storms.intruder import give_back
 from dva_sim.storms.plan import Fault
 from dva_sim.storms.scene import StormRobot, StormScene
 
 End = Callable[[], object]
 Begin = Callable[[StormScene, Fault, random.Random], End | None]
-ANY: Final = ("robot", "operator", "guard", "dva")
+ANY: Final = ("robot", "operator", "driver", "guard", "dva")
+DRIVERS: Final = ("operator", "driver")
 ON_DRIVING: Final = ("StartTeleOp", "SetTeleOp", "PermissionGrant", "PermissionRevocation", "Reply")
 DRIFT: Final = 200e-6  # of a robot's clock; a quartz is off by less, one that is slewed by more
 GIVEN_BACK: Final = 5.0  # after it was granted, what was asked for too much [s]
 HAND: Final = "somebody at the robot"
+DEADLINES: Final = (3.0, 6.0, 9.0, 10.0, 27.0, 30.0)
+"""Watchdog, age limit, time-out, silence, three time-outs, lease [s]: a fault often lasts about
+as long as one of them."""
 
 
 @dataclass(frozen=True)
@@ -219,14 +224,28 @@ def _drift(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
-    """Somebody takes the robot at the robot itself, if it lets them, and drives about."""
+    """Somebody takes the robot at the robot itself, as soon as it lets them, and drives about.
+
+    Whether it may is tried again and again, also while others drive it. Now and then the hand
+    rests, or lets go and takes it again at once.
+    """
     hand, goes = ManualControl(storm.robot(fault.target).agent), [True]
-    hand.take(HAND)
+    rests = storm.now
 
     def drive() -> bool:
-        if goes[0]:
-            hand.drive(HAND, chance.uniform(0.0, 0.6), chance.uniform(-0.6, 0.6))
-        return goes[0]
+        nonlocal rests
+        if not goes[0]:
+            return False
+        if storm.now < rests:
+            return True
+        if chance.random() < 0.01:
+            rests = storm.now + chance.choice(DEADLINES) + 5.0
+        elif chance.random() < 0.02:
+            hand.let_go(HAND)
+        taken = hand.drive(HAND, chance.uniform(0.0, 0.6), chance.uniform(-0.6, 0.6))
+        if taken.code == m.WRONG_MODE:
+            hand.take(HAND)
+        return True
 
     def ends() -> None:
         goes[0] = False
@@ -272,6 +291,20 @@ def _vanish(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     return lambda: setattr(device, "silent", False)
 
 
+def _idle(storm: StormScene, fault: Fault, chance: random.Random) -> End:
+    """A guard answers every order with OK, and does nothing."""
+    node, network = storm.id_of(fault.target), storm.device(fault.target).network
+    assert isinstance(network, VirtualNetwork)
+    heeds = network.service(node)
+    assert heeds is not None
+    storm.device(fault.target).serve(lambda message: m.Reply(message.message_id, m.OK, ""))
+    return lambda: network.serve(node, heeds)
+
+
+def _restart_app(storm: StormScene, fault: Fault, chance: random.Random) -> None:
+    storm.drivers[fault.target].restart()
+
+
 def _emergency(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     storm.intruder.ask(storm.id_of(fault.target), m.Emergency())
 
@@ -281,24 +314,23 @@ def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Somebody else is given the robot, unasked, and gives it back a little later."""
+    """Somebody else is given the robot, unasked, starts at once, and gives it back later."""
     robot, dva = storm.id_of(fault.target), storm.run.dva
-    others = [device for device in storm.labelled if device.startswith("operator")]
+    others = [device for device in storm.labelled if device.startswith(DRIVERS)]
     taker = storm.device(chance.choice(sorted(others)))
     dva.revoke(robot, taker.id_tag, chance.random() < 0.5)
     grant = dva.desk.sessions.permissions.grants.get(robot)
-    if grant is not None and grant.holder == taker.id_tag:
-        _give_back(storm, taker, m.PermissionRevocation(robot, taker.id_tag, grant.session))
+    if grant is None or grant.holder != taker.id_tag:
+        return
+    session, until = grant.session, storm.now + GIVEN_BACK
 
+    def begin() -> bool:
+        taker.ask(robot, m.StartTeleOp(), session=session)
+        return storm.now < until
 
-def _give_back(storm: StormScene, device: AgentDevice, held: m.PermissionRevocation) -> None:
-    """Give a permission back a little later, until the DVA has heard it."""
-    clock = storm.run.clock
-
-    def again() -> None:
-        clock.call_after(GIVEN_BACK, device.ask, DVA, held, do_nothing, again)
-
-    again()
+    if chance.random() < 0.7:
+        storm.run.clock.every(0.3, begin)
+    give_back(taker, m.PermissionRevocation(robot, taker.id_tag, session), GIVEN_BACK)
 
 
 def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
@@ -311,7 +343,8 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     def answered(reply: m.Reply) -> None:
         if isinstance(reply.content, m.Permission):
             session = reply.content.session
-            _give_back(storm, device, m.PermissionRevocation(robot.id, device.id_tag, session))
+            held = m.PermissionRevocation(robot.id, device.id_tag, session)
+            give_back(device, held, GIVEN_BACK)
 
     for _ in range(max(1, round(fault.value))):
         device.ask(DVA, m.PermissionRequest(robot.id, "teleoperation"), answered)
@@ -320,7 +353,10 @@ def _ask_twice(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 def _old_session(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """An operator acts by sessions of before, or that never were."""
     device, robot = storm.device(fault.target), chance.choice(storm.robots)
-    for body in (m.StartTeleOp(), m.SetTeleOp(0.4, 0.1), m.StopTeleOp(), m.CancelMission()):
+    bodies: list[m.Body] = [m.StartTeleOp(), m.SetTeleOp(0.4, 0.1), m.StopTeleOp()]
+    bodies += [m.GoTo((storm.free_place(chance),)), m.CancelMission()]
+    bodies += [m.DevSub(name, 2.0) for name in robot.agent.sensors]
+    for body in bodies:
         session = chance.choice([1, chance.randrange(2**40), *storm.sessions_seen(robot.id)])
         device.ask(robot.id, body, session=session)
 
@@ -478,7 +514,7 @@ FAULTS: Final[dict[str, FaultKind]] = {
     "clock-drifts": FaultKind("a robot's clock runs fast or slow", ("robot",), _drift, lasts=_LONG),
     "clock-jumps": FaultKind(
         "a device's clock is set, by so many seconds",
-        ("robot", "operator", "guard"),
+        ("robot", "operator", "driver", "guard"),
         _set_clock,
         value=(-4000.0, 4000.0),
     ),
@@ -509,11 +545,24 @@ FAULTS: Final[dict[str, FaultKind]] = {
     ),
     "vanishes": FaultKind(
         "somebody is silent, and comes back",
-        ("operator", "guard"),
+        ("operator", "driver", "guard"),
         _vanish,
         lasts=_LONG,
         on=("PermissionGrant", "Order"),
         weight=2.0,
+    ),
+    "guard-idle": FaultKind(
+        "a guard says OK to every order, and does nothing",
+        ("guard",),
+        _idle,
+        lasts=(20.0, 120.0),
+        on=("Order",),
+    ),
+    "app-restarts": FaultKind(
+        "the app of a driver restarts, and counts from 1 again",
+        ("driver",),
+        _restart_app,
+        on=("Reply",),
     ),
     "emergency": FaultKind(
         "somebody stops a robot", ("robot",), _emergency, on=ON_DRIVING, weight=3.0
@@ -525,10 +574,10 @@ FAULTS: Final[dict[str, FaultKind]] = {
         "the DVA gives a robot to somebody else", ("robot",), _take_over, on=ON_DRIVING, weight=2.0
     ),
     "asks-twice": FaultKind(
-        "an operator asks so many times for a robot", ("operator",), _ask_twice, value=(1.0, 5.0)
+        "an operator asks so many times for a robot", DRIVERS, _ask_twice, value=(1.0, 5.0)
     ),
     "old-session": FaultKind(
-        "an operator acts by an old session", ("operator",), _old_session, weight=2.0
+        "an operator acts by an old session", DRIVERS, _old_session, weight=2.0
     ),
     "held-tilt": FaultKind(
         "all commands say the same speed",

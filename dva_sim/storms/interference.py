@@ -14,7 +14,8 @@ from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode, encode
 from dva_sim.protocol.errors import ProtocolError
 
-REMEMBERED = 64  # messages to a node that may be replayed
+REMEMBERED = 64  # messages to a node that may be replayed: of those by the dozen, and of others
+BY_THE_DOZEN = b"<SetTeleOp", b"<HBMsg>", b"<RobotStatus>"
 
 
 class PassingMessage(NamedTuple):
@@ -54,13 +55,14 @@ class Interference:
         self.clock, self.rules, self.counts = clock, list[Rule](), Counter[str]()
         self._watch, self.delivered = watch, 0
         self._awaited: list[tuple[bytes, str, Callable[[str], object]]] = []
-        self._past: dict[str, deque[PassingMessage]] = {}
+        self._past: dict[tuple[str, bool], deque[PassingMessage]] = {}
 
     def __call__(self, source: str, to: str, payload: Any, take: Take) -> None:
         """See `VirtualNetwork.interference`."""
         passing = PassingMessage(source, to, payload, take)
         if isinstance(payload, bytes):
-            self._past.setdefault(to, deque(maxlen=REMEMBERED)).append(passing)
+            kind = to, any(often in payload for often in BY_THE_DOZEN)
+            self._past.setdefault(kind, deque(maxlen=REMEMBERED)).append(passing)
             if self._awaited:
                 self._look_out(passing)
         for rule in tuple(self.rules):
@@ -78,8 +80,8 @@ class Interference:
         self.clock.call_after(delay, self.deliver, passing)
 
     def past(self, to: str) -> list[PassingMessage]:
-        """Return the newest messages to a node."""
-        return list(self._past.get(to, ()))
+        """Return the newest messages to a node, and older ones of the rarer kinds."""
+        return [each for often in (False, True) for each in self._past.get((to, often), ())]
 
     def await_message(self, kind: str, to: str, then: Callable[[str], object]) -> None:
         """Call `then` once, just before the next message of a kind reaches a node.

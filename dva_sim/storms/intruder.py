@@ -20,11 +20,12 @@ class Intruder:
     Args:
         stage: Where.
         number: Tells it from other intruders.
+        label: Its name.
     """
 
-    def __init__(self, stage: Stage, number: int = NUMBER) -> None:
+    def __init__(self, stage: Stage, number: int = NUMBER, label: str = "intruder-1") -> None:
         self.device: AgentDevice = stage.device("operator", number)
-        self.device.label = stage.labels[self.device.id_tag] = f"intruder-{number - NUMBER + 1}"
+        self.device.label = stage.labels[self.device.id_tag] = label
         self.device.serve(lambda message: m.Reply(message.message_id, m.OK, ""))
         self._network, self._tags = stage.network, count(1)
         self._wires: dict[str, Wire] = {}
@@ -78,3 +79,12 @@ class Intruder:
         self.device.clock.every(2.0, act)
         self.device.clock.every(1.0 / rate, command)
         return ends
+
+
+def give_back(device: AgentDevice, held: m.PermissionRevocation, after: float = 0.0) -> None:
+    """Let a device give a permission back after some time [s], until the DVA has heard it."""
+
+    def again() -> None:
+        device.clock.call_after(after, device.ask, DVA, held, do_nothing, again)
+
+    again()

@@ -68,12 +68,14 @@ class StormPlan:
         scenario: Keys of a scenario, as in its file.
         faults: In order of time.
         calm_s: When the last fault has ended [s]; from then on everything has to recover.
+        drivers: Number of drivers who are never idle, beside the operators of the scenario.
     """
 
     seed: int
     scenario: Mapping[str, Any]
     faults: tuple[Fault, ...]
     calm_s: float
+    drivers: int = 0
 
     @property
     def horizon_s(self) -> float:
@@ -99,6 +101,7 @@ class StormPlan:
         return {
             "seed": self.seed,
             "calm_s": self.calm_s,
+            "drivers": self.drivers,
             "scenario": dict(self.scenario),
             "faults": [fault.as_plain() for fault in self.faults],
         }
@@ -119,7 +122,8 @@ def load_plan(path: Path) -> StormPlan:
     data = load_yaml(path).data
     try:
         faults = tuple(Fault(**fault) for fault in data["faults"])
-        plan = StormPlan(int(data["seed"]), data["scenario"], faults, float(data["calm_s"]))
+        calm, drivers = float(data["calm_s"]), int(data.get("drivers", 0))
+        plan = StormPlan(int(data["seed"]), data["scenario"], faults, calm, drivers)
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(f"is not the plan of a storm: {error}", path) from None
     plan.built()

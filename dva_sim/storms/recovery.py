@@ -42,8 +42,7 @@ class RecoveryProbes:
     ) -> None:
         self._stage, self._recorder, self._motion_of = stage, recorder, motion_of
         self._calm, self._clock = calm, stage.clock
-        self._probe = Intruder(stage, BYSTANDER)
-        self._probe.device.label = stage.labels[self._probe.device.id_tag] = "probe"
+        self._probe = Intruder(stage, BYSTANDER, "probe")
         self._open: dict[str, str] = {}
         self._used: dict[str, float] = {}
         self._session: dict[str, int] = {}

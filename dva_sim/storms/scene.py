@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
+from functools import cached_property, partial
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dva_sim.agents.device import AgentDevice
 from dva_sim.agents.robot.faults import RobotFaults
@@ -17,10 +22,13 @@ from dva_sim.protocol.exchange import NOON
 from dva_sim.protocol.messages import PermissionGrant, Position
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA
+from dva_sim.storms.drivers import BusyDriver
 from dva_sim.storms.dva_lives import DvaLives
 from dva_sim.storms.interference import Interference, PassingMessage
 from dva_sim.storms.intruder import Intruder
 from dva_sim.storms.plan import StormPlan
+
+FITS = 0.8  # around a place to which robots are sent [m]
 
 
 class StormRobot(NamedTuple):
@@ -45,6 +53,7 @@ class StormScene:
         intruder: Does what no honest device does.
         dva: Kills and restarts the DVA.
         robots: All robots.
+        drivers: Those who always drive, by label.
         labelled: Ids by label.
     """
 
@@ -57,15 +66,25 @@ class StormScene:
         )
         self.run = run = Run(plan.built(), plan.seed, watched=watched)
         self.dva.begin(run)
-        self.labelled = {label: id_tag for id_tag, label in run.stage.labels.items()}
         self.robots = [
             StormRobot(i, r, RobotFaults(r, self._lost)) for i, r in run.field.robots.items()
         ]
+        self.drivers = {each.device.label: each for each in self._make_drivers()}
+        self.labelled = {label: id_tag for id_tag, label in run.stage.labels.items()}
         self.interference = Interference(clock, self.arrives)
         assert isinstance(run.network, VirtualNetwork)
         run.network.interference = self.interference
         self.intruder = Intruder(run.stage)
         self._sessions: dict[str, list[int]] = {}
+
+    def _make_drivers(self) -> Iterator[BusyDriver]:
+        stage, robots = self.run.stage, [robot.id for robot in self.robots]
+        for number in range(1, self.plan.drivers + 1):
+            chance = random.Random(f"{self.plan.seed} driver {number}")
+            place = partial(self.free_place, chance)
+            driver = BusyDriver(stage, number, robots, chance=chance, place=place)
+            driver.start(self.plan.calm_s)
+            yield driver
 
     def arrives(self, passing: PassingMessage) -> None:
         """Let a message reach its receiver."""
@@ -105,6 +124,17 @@ class StormScene:
         low_x, low_y, high_x, high_y = site.extent
         x, y = chance.uniform(low_x, high_x), chance.uniform(low_y, high_y)
         return Position(*site.frame.to_latlon(x, y))
+
+    @cached_property
+    def _free(self) -> tuple[NDArray[np.int_], ...]:
+        return self.run.stage.site.grid.reachable(FITS).nonzero()
+
+    def free_place(self, chance: random.Random) -> Position:
+        """Draw a place where a robot fits."""
+        site, (rows, columns) = self.run.stage.site, self._free
+        number = chance.randrange(len(rows))
+        x, y = site.grid.to_xy(rows[number] + 0.5, columns[number] + 0.5)
+        return Position(*site.frame.to_latlon(float(x), float(y)))
 
     def sessions_seen(self, robot: str) -> list[int]:
         """Return the newest sessions in which a robot was granted to somebody."""

@@ -95,6 +95,9 @@ class Shrinker:
                 yield self._with(kind, {**self.plan.scenario[kind], "count": count})
                 if self.plan is not before:
                     break
+        for count in range(self.plan.drivers):
+            if count < self.plan.drivers:
+                yield replace(self.plan, drivers=count)
         for key, plain in _PLAINER:
             yield self._with(key, plain)
 

@@ -65,6 +65,19 @@ def test_what_is_no_plan_is_refused(tmp_path, text):
         load_plan(file)
 
 
+def test_a_driver_keeps_a_robot_moving_and_gives_it_back():
+    """It drives by the rules, most of the time, and leaves nothing behind."""
+    moving = []
+    plan = StormPlan(4, SMALL, (), 60.0, drivers=1)
+
+    def watch(storm):
+        storm.run.clock.every(1.0, lambda: moving.append(storm.robots[0].agent.is_moving))
+
+    outcome = play(plan, watch)
+    assert sum(moving[:60]) > 15
+    assert (outcome.breaches, outcome.error) == ([], "")
+
+
 @pytest.mark.system
 def test_the_same_storm_is_the_same_in_two_processes(tmp_path):
     plan = replace(draw(8), calm_s=90.0)
@@ -85,17 +98,17 @@ def test_the_same_storm_is_the_same_in_two_processes(tmp_path):
 def test_each_fault_alone_is_survived(kind):
     """It strikes while the robot is driven, at its lowest strength."""
     what = FAULTS[kind]
-    target = {"robot": "robot-1", "operator": "operator-1", "guard": "guard-1"}
-    strikes = target.get(what.strikes[0], what.strikes[0])
+    strikes = what.strikes[0] and what.strikes[0] + "-1" * (what.strikes[0] != "dva")
     fault = Fault(kind, 20.0, what.lasts[0], strikes, value=what.value[0])
-    outcome = play(replace(small(fault), calm_s=40.0))
+    plan = StormPlan(1, {**SMALL, "guard": {"count": 1}}, (fault,), 40.0, drivers=1)
+    outcome = play(plan)
     assert outcome.faults[kind] == 1
     assert (outcome.breaches, outcome.error) == ([], "")
 
 
 @pytest.mark.soak
 @pytest.mark.invariant("S1", "S2", "S3", "S4", "S5", "S6", "S7", "S8", "S10", "S11")
-@pytest.mark.parametrize("seed", range(1, 13))
+@pytest.mark.parametrize("seed", range(1, 9))
 def test_no_rule_breaks_in_a_storm(seed):
     outcome = play(draw(seed))
     assert (outcome.breaches, outcome.error) == ([], "")

@@ -124,7 +124,7 @@ class Witness:
         looked: When it was last looked at.
         heard: When something of its driver, or of a hand, was last obeyed.
         confirmed: Sessions that the DVA has confirmed to it, when it asked.
-        question: Its newest question to the DVA.
+        question: Number of its newest question to the DVA: only the answer to that counts.
         asked: When it sent that first.
         hand: Who has taken it by hand, and has not let it go since.
     """
@@ -146,7 +146,7 @@ class Witness:
     looked: float = 0.0
     heard: float = 0.0
     confirmed: set[int] = field(default_factory=set)
-    question: bytes = b""
+    question: int = 0
     asked: float = 0.0
     hand: str | None = None
 
@@ -279,7 +279,7 @@ class SafetyAudit:
         if message is None or isinstance(message.body, m.Heartbeat):
             return
         if isinstance(message.body, m.Reply):
-            if source == self._dva:
+            if source == self._dva and message.body.answers == witness.question:
                 self._confirms(witness, message.body.content, now)
             return
         key = message.source, message.message_id
@@ -305,8 +305,8 @@ class SafetyAudit:
         if not isinstance(payload, bytes):
             witness.offset = offset_of(payload) or witness.offset
             return
-        if b"<GetGrant" in payload and payload != witness.question:
-            witness.question, witness.asked = payload, now
+        if b"<GetGrant" in payload:
+            _note_question(witness, _read(payload), now)
         if b"<RobotStatus>" in payload:
             _learn_offset(witness, _read(payload), now)
         if not witness.unanswered:
@@ -517,6 +517,12 @@ def offset_of(picture: Any) -> float | None:
         return picture.captured - picture.observation.tick / 1000
     tick = picture.get("tick_ms")  # as a recording has it
     return None if tick is None else float(picture["captured_s"]) - float(tick) / 1000
+
+
+def _note_question(witness: Witness, question: m.Message | None, now: float) -> None:
+    """Note a question to the DVA, unless it is the newest one sent again."""
+    if question is not None and question.message_id != witness.question:
+        witness.question, witness.asked = question.message_id, now
 
 
 def _learn_offset(witness: Witness, status: m.Message | None, now: float) -> None:

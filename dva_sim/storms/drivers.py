@@ -1,0 +1,256 @@
+"""Drivers who are never idle: they keep robots moving, so that faults meet robots in motion.
+
+A driver keeps to the protocol, and is careless as people are: it falls silent at the wheel, stops
+late or not at all, gives a robot back while it moves, keeps one without driving it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from dva_sim.agents.device import command_topic
+from dva_sim.agents.observation import FRAME, CameraFrame
+from dva_sim.network.messaging import Subscription
+from dva_sim.protocol import messages as m
+from dva_sim.protocol.codec import encode
+from dva_sim.simulation.full.stage import DVA, Stage
+from dva_sim.storms.intruder import Intruder, give_back
+
+FIRST_NUMBER: Final = 1000  # beyond all operators of a scenario, and all intruders
+RATES: Final = 2.0, 5.0, 8.0  # commands in a second
+LONGEST_WAIT = 20.0  # for a robot that was granted, and does not start [s]
+KEPT = 40.0  # a robot that is held and not driven: longer than a lease lasts [s]
+LOST: Final = m.NOT_PERMITTED, m.BAD_SESSION
+
+
+class BusyDriver:
+    """One driver: takes a robot, drives it or sends it somewhere, gives it back, takes another.
+
+    Args:
+        stage: Where.
+        number: From 1.
+        robots: Ids of the robots.
+        chance: Everything that it decides.
+        place: Draws a place to send a robot to.
+
+    Attributes:
+        device: Its device, called `driver-1` and so on.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        number: int,
+        robots: Sequence[str],
+        *,
+        chance: random.Random,
+        place: Callable[[], m.Position],
+    ) -> None:
+        self._hand = Intruder(stage, FIRST_NUMBER + number, f"driver-{number}")
+        self.device = self._hand.device
+        self._robots, self._chance, self._place = robots, chance, place
+        self._publishes, self._clock = stage.pattern().published, stage.clock
+        self._robot, self._session, self._level = "", 0, ""
+        self._does: Callable[[], object] = self._look_for_robot
+        self._until = self._hushed = 0.0
+        self._wish = m.SetTeleOp(0.0, 0.0)
+        self._tick: int | None = None
+        self._frames: Subscription | None = None
+        self._life = 0
+        self.device.serve(self._on_request)
+
+    def start(self, until: float) -> None:
+        """Begin to work, and finish at a time [s]."""
+        self.device.register()
+        rate = self._chance.choice(RATES)
+        self._until = self._clock.now + self._chance.uniform(1.0, 10.0)
+        self._clock.every(1.0, lambda: self._act(until))
+        self._clock.every(1.0 / rate, lambda: self._command(until))
+
+    def restart(self) -> None:
+        """Restart the app: it numbers its messages from 1, and knows of no robot."""
+        self.device.restart()
+        self.device.register()
+        self._forget()
+
+    # --- what it does, once a second ---------------------------------------------------------
+
+    def _act(self, until: float) -> bool:
+        now = self._clock.now
+        if now >= until:
+            self._give_back()
+        elif not self.device.silent:
+            self._does()
+        return now < until
+
+    def _look_for_robot(self) -> None:
+        if self._clock.now < self._until:
+            return
+        robot = self._chance.choice(self._robots)
+        level = self._chance.choice(("teleoperation", "teleoperation", "both"))
+        self._until = self._clock.now + 3.0
+        life = self._life
+
+        def answered(reply: m.Reply) -> None:
+            if not isinstance(reply.content, m.Permission):
+                return
+            session = reply.content.session
+            if life == self._life and not self._robot:
+                self._take(robot, level, session)
+            elif session != self._session:  # it comes too late
+                give_back(self.device, m.PermissionRevocation(robot, self.device.id_tag, session))
+
+        self._hand.ask(DVA, m.PermissionRequest(robot, level), answered)
+
+    def _take(self, robot: str, level: str, session: int) -> None:
+        """Begin with a robot that was granted."""
+        self._robot, self._session, self._level = robot, session, level
+        self._until = self._clock.now + LONGEST_WAIT
+        if level == "both" and self._chance.random() < 0.6:
+            self._send_out()
+            return
+        network, me = self.device.network, self.device.id_tag
+        self._frames = network.subscribe(me, robot, FRAME, self._see)
+        self._does = self._start
+        self._start()
+
+    def _see(self, frame: object) -> None:
+        if isinstance(frame, CameraFrame):
+            self._tick = frame.observation.tick
+
+    def _start(self) -> None:
+        """Start to drive, until that is accepted."""
+
+        def begin() -> None:
+            self._does = self._drive
+            self._until = self._clock.now + self._chance.uniform(5.0, 45.0)
+
+        self._order(m.StartTeleOp(), begin)
+        if self._clock.now >= self._until:
+            self._give_back()
+
+    def _drive(self) -> None:
+        """Drive about, look at this and that meanwhile, and stop in one way or another."""
+        chance, now = self._chance, self._clock.now
+        if now >= self._until:
+            chance.choice(_ENDS)(self)
+            return
+        if chance.random() < 0.5:
+            self._wish = m.SetTeleOp(chance.uniform(0.1, 0.5), chance.uniform(-0.4, 0.4))
+        if now >= self._hushed and chance.random() < 0.1:
+            self._hushed = now + chance.choice((1.0, 4.0, 8.0, KEPT))
+        if chance.random() < 0.5:
+            body = chance.choice((m.GetMissionStatus(), m.GetSensorInfo(), m.StartTeleOp()))
+            self._order(body)
+
+    def _send_out(self) -> None:
+        """Send it on a mission."""
+        places = tuple(self._place() for _ in range(2))
+        body = self._chance.choice((m.GoTo(places), m.Patrol(places, 0), m.ReturnToBase()))
+
+        def begin() -> None:
+            self._does = self._watch
+            self._until = self._clock.now + self._chance.uniform(5.0, 45.0)
+
+        def send() -> None:
+            self._order(body, begin)
+            if self._clock.now >= self._until:
+                self._give_back()
+
+        self._does = send
+        send()
+
+    def _watch(self) -> None:
+        """Watch how a mission goes, and call it off in the end, or just forget it."""
+        if self._clock.now < self._until:
+            if self._chance.random() < 0.5:
+                self._order(m.GetMissionStatus())
+            return
+        if self._chance.random() < 0.8:
+            self._order(m.CancelMission())
+        self._finish()
+
+    def _wait(self) -> None:
+        if self._clock.now >= self._until:
+            self._give_back()
+
+    # --- how a drive ends --------------------------------------------------------------------
+
+    def _stop(self) -> None:
+        self._order(m.StopTeleOp())
+        self._finish()
+
+    def _stop_and_go_on(self) -> None:
+        self._order(m.StopTeleOp())
+        self._until = self._clock.now + LONGEST_WAIT
+        self._does = self._start
+
+    def _keep(self) -> None:
+        """Hold the robot without driving it, for longer than a lease lasts."""
+        self._finish(KEPT)
+
+    def _finish(self, after: float = 2.0) -> None:
+        self._does, self._until = self._wait, self._clock.now + after
+
+    def _give_back(self) -> None:
+        if self._robot:
+            held = m.PermissionRevocation(self._robot, self.device.id_tag, self._session)
+            give_back(self.device, held)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Have no robot, and look for another one a little later."""
+        if self._frames is not None:
+            self._frames.close()
+        self._frames, self._tick, self._robot = None, None, ""
+        self._life += 1
+        self._does = self._look_for_robot
+        self._until = self._clock.now + self._chance.uniform(1.0, 20.0)
+
+    # --- messages ----------------------------------------------------------------------------
+
+    def _order(self, body: m.Body, begin: Callable[[], object] = lambda: None) -> None:
+        """Ask the robot for something; one that refuses its driver is given up."""
+        life = self._life
+
+        def answered(reply: m.Reply) -> None:
+            if life != self._life:
+                return
+            if reply.code == m.OK:
+                begin()
+            elif reply.code in LOST and self._does in (self._drive, self._watch):
+                self._give_back()
+
+        self._hand.ask(self._robot, body, answered, session=self._session)
+
+    def _command(self, until: float) -> bool:
+        now = self._clock.now
+        if self._does == self._drive and now >= self._hushed and not self.device.silent:
+            body = self._wish._replace(seen_tick=self._tick)
+            if self._publishes:
+                message = self.device.outbox.message(self._robot, body, now, self._session)
+                data, topic = encode(message), command_topic(self._robot)
+                self.device.network.publish(self.device.id_tag, topic, data, len(data))
+            else:
+                self._hand.send_message(self._robot, body, self._session)
+        return now < until
+
+    def _on_request(self, message: m.Message) -> m.Reply:
+        """Heed, mostly, that a session is over."""
+        body = message.body
+        is_over = isinstance(body, m.PermissionRevocation) and body.session == self._session
+        if is_over and self._robot and self._chance.random() < 0.7:
+            self._forget()
+        return m.Reply(message.message_id, m.OK, "")
+
+
+_ENDS: Final = (
+    *(BusyDriver._stop,) * 4,
+    BusyDriver._stop_and_go_on,
+    BusyDriver._stop_and_go_on,
+    BusyDriver._give_back,
+    BusyDriver._give_back,
+    BusyDriver._keep,
+)
