@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, GetCoreSchemaHandler, model_serializer
 from pydantic_core import CoreSchema
@@ -89,12 +89,18 @@ def assumptions_in(model: type[BaseModel], above: str = "", depth: int = 4) -> I
 
 
 class OmitsUnset(Config):
-    """A configuration that leaves out parts of it in which nothing was set."""
+    """A configuration that is written without the parts of it in which nothing was set.
+
+    Attributes:
+        omitted: Keys that are left out as well while they are empty.
+    """
+
+    omitted: ClassVar[tuple[str, ...]] = ()
 
     @model_serializer(mode="wrap")
     def _with_set(self, handler: Any) -> dict[str, Any]:
-        parts = (name for name, value in self if isinstance(value, Sparse))
-        unset = {name for name in parts if not getattr(self, name).model_fields_set}
+        unset = {n for n, part in self if isinstance(part, Sparse) and not part.model_fields_set}
+        unset.update(name for name in self.omitted if not getattr(self, name))
         return {key: value for key, value in handler(self).items() if key not in unset}
 
 

@@ -9,7 +9,7 @@ DVA_ADDRESS = "127.0.0.1:5600"
 OFFER = {
     "pipelines": {"default": {"filter": "median5"}, "dissertation": {"filter": "median20-copy"}},
     "filters": ["median5", "median20-copy", "one-pole"],
-    "mappings": ["absolute", "differential", "leaky"],
+    "mappings": ["absolute", "differential", "leaky", "slew"],
     "speed_step_mps2": 0.35,
     "turn_step_mps2": 0.12,
     "max_delay_s": 0.5,

@@ -78,7 +78,8 @@ class CommandSender:
         self._on_refused, self._heeds = on_refused, heeds
         self.refusals = Refusals(device.id_tag, drive.refused)
         self._holder: Subscription | None = None
-        self._on = False
+        self._on = self._is_held = False
+        self._looked_at = 0.0
         self.failures, self.first_failure = 0, ""
 
     def start(self) -> None:
@@ -103,11 +104,27 @@ class CommandSender:
     def _look(self) -> None:
         if not self._on:
             return
-        now = self.clock.now
+        now = self._looked_at = self.clock.now
         made = self._make()
         if made is not None:
             self._let(self._pattern.offer, made)
+            if self._phone.waits and self._pattern.in_step and self._is_asking:
+                self._phone.hold()  # until the reply: nothing is looked at meanwhile
+                self._is_held = True
+                return
         self.clock.call_at(self._phone.next_look(now, self.rate_hz), self._look)
+
+    def _go_on(self) -> None:
+        """A reply has come, or none will: an app that waited for it looks again."""
+        if not (self._is_held and self._on) or self._is_asking:
+            return
+        self._is_held, now = False, self.clock.now
+        self._phone.release(now)
+        due = self._looked_at + 1.0 / self.rate_hz
+        if self._phone.keeps_alive and due > now:
+            self.clock.call_at(due, self._look)
+        else:
+            self._look()
 
     def _make(self) -> Made | None:
         """What the phone says now, if it is worth a message.
@@ -202,8 +219,17 @@ class CommandSender:
             self._answered(message, reply)
             if self._on:
                 self._let(then, reply)
+                self._go_on()
 
-        requester.request(encode(message), answered, lambda: self._let(failed))
+        def unanswered() -> None:
+            self._let(failed)
+            self._go_on()
+
+        requester.request(encode(message), answered, unanswered)
+
+    @property
+    def _is_asking(self) -> bool:
+        return self._requester is not None and self._requester.busy
 
     def _asking(self) -> Requester:
         if self._requester is None:

@@ -8,6 +8,7 @@ tells what its own part measures.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from typing import Final, NamedTuple
@@ -15,7 +16,7 @@ from typing import Final, NamedTuple
 from dva_sim.agents.tilt.accelerometer import Triple
 from dva_sim.agents.tilt.calibration import SPEED_PER_LEVEL, Calibration, Reading
 from dva_sim.agents.tilt.filters import BATCH, Filter, load_guarded_filter
-from dva_sim.agents.tilt.mappings import load_guarded_mapping
+from dva_sim.agents.tilt.mappings import limited, load_guarded_mapping
 from dva_sim.agents.tilt.profile import PhoneProfile
 from dva_sim.kernel.makers import maker
 
@@ -81,6 +82,15 @@ class Trail:
         """From now on the hand follows what a picture captured at that time [s] led to."""
         self._asked = captured - self._begun
 
+    def move(self, decay: float) -> float:
+        """The hand moves by a sample that the filter does not take; what it would take of it."""
+        self._hand = self._asked + (self._hand - self._asked) * decay
+        return self._hand
+
+    def take(self, hand: float) -> None:
+        """The filter takes such a sample after all."""
+        self._filter.add((hand, hand))
+
     def sample(self, count: int, decay: float) -> None:
         """So many samples; from each to the next the hand keeps the share `decay`."""
         asked, hand, add = self._asked, self._hand, self._filter.add
@@ -116,6 +126,8 @@ class TiltApp:
 
     Attributes:
         keeps_alive: Whether the newest value is sent at every chance, changed or not.
+        waits: Whether it sends from within the call that takes a sample, and so does nothing else
+            until a request is answered; see `hold`.
         shown: The command on the display: level, turn [deg/s].
         samples: How many were in the batches of this drive.
         values: How many batches there were.
@@ -129,7 +141,12 @@ class TiltApp:
     ) -> None:
         self._profile, self._period, self._decay = profile, period, decay
         self._ideal, self.keeps_alive = profile.ideal, profile.send == "keep_alive"
+        self.waits = profile.while_open != "take"
+        self._queues, self._on_sample = profile.while_open == "queue", profile.values_at == "sample"
         self._app = calibrated(profile, reference)
+        reading = self._app.reading
+        before = profile.limits == "before_filter"
+        self._read = (lambda x, y, z: limited(*reading(x, y, z))) if before else reading
         filters = load_guarded_filter(profile.filter, profile.filter_options)
         self._make_filter: Callable[[], Filter] = partial(filters, period)
         self._batch = self._make_filter().batch
@@ -145,26 +162,43 @@ class TiltApp:
         self.shown: Reading = (0.0, 0.0)
         self.samples = self.values = 0
         self._last_key: tuple[int, int] | None = None
-        self._fresh = 0
+        self._fresh, self._held = 0, False
+        self._queue: deque[tuple[float, Reading, float]] = deque()
+        self._heard_at = now
         self._taken_at = self._stems_from = self._sampled_at = self._captured = now
         self._due = math.inf if self._batch is None else now + self._app.max_delay
 
     def sample(self, at: float, acceleration: Triple) -> None:
         """What the part measured at a time [s], never before an earlier one: x, y, z [m/s^2]."""
         self.take_values(at - 2 * TIE)
-        self._filter.add(self._app.reading(*acceleration))
+        self._heard_at, reading = at, self._read(*acceleration)
+        if self._held:
+            self._miss(at, reading)
+            return
         self._trail.sample(1, self._decay)
-        self._fresh += 1
-        passed, self._sampled_at = at - self._sampled_at, at
-        if self._watches:
-            self._watch(passed)
-        if self._fresh == self._batch:
+        self._take_sample(at, reading)
+        if self._fresh == self._batch or (self._on_sample and at >= self._due - TIE):
             self._take_value(at)
 
     def take_values(self, now: float) -> None:
         """Values that were due although no batch was complete."""
-        while self._due <= now + TIE:
+        while self._due <= now + TIE and not (self._on_sample or self._held):
             self._take_value(self._due)
+
+    def hold(self) -> None:
+        """A request is open from now on: until `release`, no sample is looked at.
+
+        The founding document sends from within the call that takes a sample (figure 5.8). What
+        becomes of the samples meanwhile it does not say: they are dropped, or they queue and are
+        worked off in their order.
+        """
+        self._held = True
+
+    def release(self, now: float) -> None:
+        """The request was answered: the time to the next value counts from here."""
+        self._advance(now)
+        self._held = False
+        self._due = math.inf if self._batch is None else now + self._app.max_delay
 
     def followed(self, captured: float) -> None:
         """From now on the samples are by a picture that was captured at that time [s]."""
@@ -177,12 +211,24 @@ class TiltApp:
         if self._batch is None or self._ideal:
             return now + min(self._app.max_delay, BATCH * self._period)
         self._advance(now)
-        complete = self._next_sample + (self._batch - self._fresh - 1) * self._period
-        return min(math.ceil((self._due - TIE / 2) / _TICK) * _TICK, complete + _TICK)
+        coming, due = self._next_sample, self._due
+        if self._on_sample and math.isfinite(due):
+            due = coming + max(0, math.ceil((due - TIE - coming) / self._period)) * self._period
+        complete = coming + (self._batch - self._fresh - 1) * self._period
+        return min(math.ceil((due - TIE / 2) / _TICK) * _TICK, complete + _TICK)
 
     def look(self, now: float) -> TiltCommand | None:
         """The command to send at `now`, or None if there is nothing new to say."""
         self._advance(now)
+        command = self._command(now)
+        while command is None and self._queue and not self._held:
+            self._work_off(now)
+            command = self._command(now)
+        return command
+
+    def _command(self, now: float) -> TiltCommand | None:
+        if self._on_sample and self._batch is not None and not self.values:
+            return None  # as printed, nothing is sent before there is a value
         if not self._ideal and self._batch is None:
             if not self._watches:
                 level, turn = self._filter.value()
@@ -212,11 +258,37 @@ class TiltApp:
     @property
     def _next_sample(self) -> float:
         """When the next sample is to be expected [s]."""
-        return self._sampled_at + self._period
+        return self._heard_at + self._period
 
     def _advance(self, now: float) -> None:
         """All that was due by now."""
+        if self._queue and not self._held:
+            self._work_off(now)
         self.take_values(now)
+
+    def _take_sample(self, at: float, reading: Reading) -> None:
+        """Put a sample of that time [s] into the filter."""
+        self._filter.add(reading)
+        self._fresh += 1
+        passed, self._sampled_at = at - self._sampled_at, at
+        if self._watches:
+            self._watch(passed)
+
+    def _miss(self, at: float, reading: Reading) -> None:
+        """A sample comes while a request is open."""
+        hand = self._trail.move(self._decay)
+        if self._queues:
+            self._queue.append((at, reading, hand))
+
+    def _work_off(self, now: float) -> None:
+        """Take samples that have queued, at once and in their order, up to the next value."""
+        while self._queue:
+            at, reading, hand = self._queue.popleft()
+            self._trail.take(hand)
+            self._take_sample(at, reading)
+            if self._fresh == self._batch or now >= self._due - TIE:
+                self._take_value(now)
+                return
 
     def _watch(self, dt: float) -> None:
         """What the display shows after a sample."""

@@ -12,6 +12,8 @@ from collections.abc import Mapping as Options
 from pathlib import Path
 from typing import Any, Final
 
+from typing_extensions import override
+
 from dva_sim.agents.tilt.calibration import LEVELS, MAX_TURN_DEG, NEUTRAL, Reading
 from dva_sim.kernel import options
 from dva_sim.kernel.plugins import FAILURES, Guard, Plugins, said
@@ -156,6 +158,43 @@ class LeakyMapping(DifferentialMapping):
         return super().tilt_for((wanted[0], wanted[1] + held), shown, within)
 
 
+class SlewMapping(AbsoluteMapping):
+    """The turn rate goes towards what the tilt means, but no faster than a limit.
+
+    A phone held level lets it go back to zero as fast. The speed is absolute.
+
+    Args:
+        gain: Of the turn rate that a tilt means.
+        speed_gain: Of the speed.
+        dead_zone: Share of the full reading around the reference that means nothing.
+        slew_deg_s2: Fastest growth of the turn rate [deg/s^2].
+    """
+
+    integrates = True
+
+    def __init__(
+        self,
+        gain: float = 1.0,
+        speed_gain: float = 1.0,
+        dead_zone: float = 0.0,
+        slew_deg_s2: float = 30.0,
+    ) -> None:
+        super().__init__(gain, speed_gain, dead_zone)
+        self._slew = options.number("slew_deg_s2", slew_deg_s2, above=0)
+        self._turn = 0.0
+
+    @override
+    def begin(self) -> None:
+        self._turn = 0.0
+
+    @override
+    def command(self, level: float, turn: float, dt: float) -> Reading:
+        level, meant = super().command(level, turn, dt)
+        most = self._slew * dt
+        self._turn += min(max(meant - self._turn, -most), most)
+        return level, self._turn
+
+
 # --- parts of mappings -----------------------------------------------------------------
 def outside(value: float, zone: float) -> float:
     """By how much a value is outside a zone around zero."""
@@ -181,6 +220,7 @@ MAPPINGS: Final[dict[str, Callable[..., Mapping]]] = {
     "absolute": AbsoluteMapping,
     "differential": DifferentialMapping,
     "leaky": LeakyMapping,
+    "slew": SlewMapping,
 }
 
 PLUGINS: Final = Plugins(

@@ -156,20 +156,30 @@ class Phone(TiltApp):
         end = now + TIE
         if (self._sample_at > end and self._due > end) or self._ideal:
             return
+        if self._held:
+            self._miss_until(end)
+            return
+        if self._queue:
+            self._work_off(now)
+            if self._queue:  # what came later has to wait for its turn
+                return
         while True:
             due = self._due + TIE
             self._sample_until(due if due < end else end)
             if self._fresh == self._batch:
                 self._take_value(self._sampled_at)
-            elif self._due <= end:
-                self._take_value(self._due)
-            else:
+            elif self._due > end or (self._on_sample and self._sample_at > end):
                 return
+            elif self._on_sample:
+                self._sample_until(self._sample_at)
+                self._take_value(self._sampled_at)
+            else:
+                self._take_value(self._due)
 
     def _sample_until(self, end: float) -> None:
         """Samples that are due, or until a batch is complete: hand, part, calibration, filter."""
         step, sample, interval = self._hand.step, self._accelerometer.sample, self._interval
-        read, add, watches, batch = self._app.reading, self._filter.add, self._watches, self._batch
+        read, add, watches, batch = self._read, self._filter.add, self._watches, self._batch
         (rest_pitch, rest_roll), (pitch, roll) = self._rest, self._aim
         at, dt, fresh = self._sample_at, self._step, self._fresh
         while at <= end and fresh != batch:
@@ -186,6 +196,19 @@ class Phone(TiltApp):
         if fresh != self._fresh:
             self._trail.sample(fresh - self._fresh, self._decay)
         self._sample_at, self._step, self._fresh = at, dt, fresh
+
+    def _miss_until(self, end: float) -> None:
+        """Samples that come while a request is open: the hand moves on, and the app is busy."""
+        rest_pitch, rest_roll = self._rest
+        while self._sample_at <= end:
+            if self._watches:
+                self._aim = self._aim_at(self._perceived[0])
+                self._perceived.append(self.shown)
+            tilt, lean = self._hand.step(*self._aim, self._step)
+            acceleration = self._accelerometer.sample(rest_pitch + tilt, rest_roll + lean)
+            self._miss(self._sample_at, self._read(*acceleration))
+            self._step = self._interval()
+            self._sample_at += self._step
 
     def _watch(self, dt: float) -> None:
         """The person sees the display, too."""

@@ -28,6 +28,13 @@ class PhoneProfile(PhoneHabits):
             `max_delay_s` has passed; `keep_alive` sends at the wanted rate always.
         max_delay_s: Longest time between two looks at the filter (`on_change`), and between two
             values of a filter that works in batches.
+        limits: Where level and turn are limited: in the reading of each sample (`before_filter`,
+            as figure 5.7 of the document has it), or in the command alone (`after_mapping`).
+        values_at: When a value is taken whose batch is not complete: at the first `sample` after
+            `max_delay_s` (as figure 5.8 has it), or at the `delay` itself.
+        while_open: What becomes of samples while a request is open: the app goes on to `take`
+            them; or it sends from within the call that takes a sample (figure 5.8), so that the
+            system has to `drop` or to `queue` them until the reply has come.
         ideal: What the person wants becomes the command at once: a reference, not a phone.
     """
 
@@ -48,6 +55,13 @@ class PhoneProfile(PhoneHabits):
     max_delay_s: Annotated[
         float, Field(gt=0, le=10), Key("longest time between two values of the phone", stated=False)
     ] = 0.5
+    limits: Annotated[
+        Literal["before_filter", "after_mapping"], Key("limits of the reading", stated=False)
+    ] = "after_mapping"
+    values_at: Annotated[Literal["sample", "delay"], Key("time of values", stated=False)] = "delay"
+    while_open: Annotated[
+        Literal["take", "drop", "queue"], Key("samples during a request", stated=False)
+    ] = "take"
     ideal: bool = False
 
     @model_validator(mode="after")

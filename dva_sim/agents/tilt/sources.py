@@ -78,6 +78,21 @@ class TiltSources:
         return self._measured.reading(acceleration)
 
     @property
+    def waits(self) -> bool:
+        """See `TiltApp`."""
+        return self._acting.waits
+
+    def hold(self) -> None:
+        """See `TiltApp`."""
+        self._measured.hold()
+        self._given.hold()
+
+    def release(self, now: float) -> None:
+        """See `TiltApp`."""
+        self._measured.release(now)
+        self._given.release(now)
+
+    @property
     def is_tilted(self) -> bool:
         """Whether the phone itself is what acts."""
         return self._acting is self._measured

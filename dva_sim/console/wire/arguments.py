@@ -174,7 +174,7 @@ class CalibrationAsked(TypedDict):
     max_delay_s: Annotated[float, Number(*DELAYS)]
     pipeline: Literal["dissertation", "default"]
     filter: Name | None
-    mapping: Literal["absolute", "differential", "leaky"]
+    mapping: Literal["absolute", "differential", "leaky", "slew"]
     ios: NotRequired[bool]
     keep: NotRequired[bool]
 

@@ -125,6 +125,7 @@ class GuardConfig(OmitsUnset):
             at the site's posts.
     """
 
+    omitted = ("traits",)
     profile: str = "guard"
     count: Annotated[int, Field(ge=0, le=1000), AlsoCalled("guards", "n_guards"), Key("guards")] = 0
     traits: OwnTraits = Field(default_factory=dict)
@@ -154,6 +155,7 @@ class BystanderConfig(OmitsUnset):
         habits: Assumed numbers that take the place of the profile's.
     """
 
+    omitted = ("traits",)
     profile: str = "bystanders"
     count: Annotated[
         int, Field(ge=0, le=1000), AlsoCalled("bystanders", "people"), Key("bystanders")

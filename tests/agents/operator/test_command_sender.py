@@ -1,5 +1,7 @@
 """How the phone's app sends commands."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from dva_sim.agents.operator.command_sender import CommandSender
 from dva_sim.agents.population import Population, draw_person
 from dva_sim.agents.tilt import Phone, PhoneProfile
 from dva_sim.kernel.clock import Clock
+from dva_sim.kernel.config import validate
 from dva_sim.kernel.recorder import DriveLog, Recorder
 from dva_sim.kernel.streams import Streams
 from dva_sim.network.link import ConstantRate, Link, LinkConfig
@@ -27,11 +30,17 @@ def small_network() -> VirtualNetwork:
     return VirtualNetwork(Clock(), lambda a, b: (line, line))
 
 
+def small_phone(profile: PhoneProfile) -> Phone:
+    return Phone(profile, draw_person(Population(), 1, 0), np.random.default_rng(1))
+
+
 def small_sender(
     network: VirtualNetwork,
     pattern: Pattern,
     seen: list[int | None],
     told: list[str] | None = None,
+    phone: Phone | None = None,
+    recorder: Recorder | None = None,
 ) -> CommandSender:
     device = AgentDevice(
         id_tag=PHONE,
@@ -40,7 +49,7 @@ def small_sender(
         address="",
         dva="",
         network=network,
-        recorder=Recorder(),
+        recorder=recorder or Recorder(),
         frame=GeoFrame(38.66, -9.2),
         timeout=9.0,
         attempts=3,
@@ -50,7 +59,7 @@ def small_sender(
         pattern=pattern,
         drive=DriveLog(ROBOT, PHONE, 1, ordered=0.0),
         session=7,
-        phone=Phone(PhoneProfile(), draw_person(Population(), 1, 0), np.random.default_rng(1)),
+        phone=phone or small_phone(PhoneProfile()),
         rate_hz=10.0,
         timeout=9.0,
         attempts=3,
@@ -137,3 +146,57 @@ def test_a_reply_counts_only_if_it_answers_the_command(off):
     network.clock.run(1.0)
     assert sender.drive.refused[BAD_MESSAGE] == off * sender.drive.sent
     assert ["no answer" in line for line in told[:1]] == [True] * off
+
+
+class Ages(Recorder):
+    """Keeps the ages of the samples behind each command [s]."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ages: list[float] = []
+
+    def command_issued(self, source, message_id, issued) -> None:  # type: ignore[no-untyped-def]
+        self.ages.append(issued.sample_age)
+        super().command_issued(source, message_id, issued)
+
+
+def sent_while(pattern: Pattern, **settings: object) -> tuple[list[float], list[float]]:
+    """When an app as printed sends in 20 s to a robot that answers after 1 s, and how old [s]."""
+    data = {"filter": "median20-copy", "send": "on_change", "values_at": "sample", **settings}
+    network, says, recorder = small_network(), Outbox(ROBOT), Ages()
+    phone = small_phone(validate(PhoneProfile, data))
+
+    def answer(request: Request) -> None:
+        reply = Reply(decode(request.data).message_id, OK, "")
+        data = says.encode(PHONE, reply, network.clock.now, 7)
+        network.clock.call_after(1.0, request.answer, data)
+
+    network.serve(ROBOT, answer)
+    sender = small_sender(network, pattern, [1], phone=phone, recorder=recorder)
+    sender.start()
+
+    def ask() -> None:
+        phone.ask(network.clock.now, 0.25 + 0.2 * math.sin(network.clock.now), 0.0)
+
+    network.clock.every(0.2, ask)
+    network.clock.run(20.0)
+    return [time for time, *_ in sender.drive.commands], recorder.ages
+
+
+@pytest.mark.parametrize(
+    ("while_open", "period"),
+    [("take", 1.0), ("drop", 1.0 + 17.5 / 34.0), ("queue", 1.0)],
+)
+def test_an_app_that_sends_within_its_callback_sends_after_the_reply(while_open, period):
+    """Dropped, samples begin anew after the reply; queued, the next 20 have come already."""
+    times, ages = sent_while(ReqRep(), while_open=while_open)
+    assert np.median(np.diff(times)) == pytest.approx(period, abs=0.06)
+    assert (max(ages) > 4.0) == (while_open == "queue")
+
+
+@pytest.mark.parametrize("while_open", ["drop", "queue"])
+def test_published_commands_hold_up_no_sample(while_open):
+    times, _ = sent_while(PubSub(), while_open=while_open)
+    usual, _ = sent_while(PubSub(), while_open="take")
+    assert times == usual
+    assert len(times) > 20

@@ -18,7 +18,7 @@ def settled(app, start=0.0):
     return made
 
 
-@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
+@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky", "slew"])
 @pytest.mark.parametrize(("speed", "turn"), [(0.5, 0.0), (0.2, TURN / 2), (0.0, -TURN), (0.0, 0.0)])
 def test_what_is_asked_comes_out_of_every_mapping(mapping, speed, turn):
     app = GivenTilt(PhoneProfile(mapping=mapping, sample_rate_hz=100))

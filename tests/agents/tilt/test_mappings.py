@@ -50,7 +50,17 @@ def test_leaky_goes_back_to_zero_in_its_time_constant():
     assert held(mapping, 0.0, 2.0, 7) == pytest.approx(20.0 / math.e)
 
 
-@pytest.mark.parametrize("name", ["differential", "leaky"])
+def test_slew_goes_towards_what_the_tilt_means_by_so_much_a_second_and_stops_there():
+    """A large tilt takes the turn rate farther, not faster; level, it goes back as fast."""
+    mapping = made("slew", slew_deg_s2=20.0)
+    assert held(mapping, 25.0, 0.5, 5) == pytest.approx(10.0)
+    assert held(mapping, 25.0, 5.0, 50) == pytest.approx(25.0)
+    assert held(mapping, 0.0, 1.0, 10) == pytest.approx(5.0)
+    assert held(mapping, -25.0, 0.5, 10) == pytest.approx(-5.0)
+    assert held(mapping, 0.0, 1.0, 10) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("name", ["differential", "leaky", "slew"])
 def test_integration_does_not_depend_on_the_length_of_its_steps(name):
     coarse, fine = held(made(name), 12.0, 1.5, 3), held(made(name), 12.0, 1.5, 51)
     assert coarse == pytest.approx(fine)
@@ -84,7 +94,7 @@ def test_who_watches_the_display_closes_the_gap_as_fast_as_meant(name, options):
 
 
 def test_a_new_drive_forgets_what_was_integrated():
-    for name in ("differential", "leaky"):
+    for name in ("differential", "leaky", "slew"):
         mapping = made(name)
         held(mapping, 20.0, 1.0, 10)
         mapping.begin()
@@ -94,9 +104,10 @@ def test_a_new_drive_forgets_what_was_integrated():
 @pytest.mark.parametrize(
     ("name", "options", "names"),
     [
-        ("relative", {}, "'relative' absolute differential leaky mine.py:Mine"),
+        ("relative", {}, "'relative' absolute differential leaky slew mine.py:Mine"),
         ("absolute", {"leak_s": 1}, "'absolute' 'leak_s' gain speed_gain dead_zone"),
         ("leaky", {"leak_s": 0}, "'leaky' 'leak_s' 0; above"),
+        ("slew", {"slew_deg_s2": 0}, "'slew' 'slew_deg_s2' 0; above"),
         ("absolute", {"gain": -1}, "'absolute' 'gain' -1; above 0"),
         ("absolute", {"dead_zone": 1}, "'absolute' 'dead_zone' 1; 0, below"),
     ],

@@ -50,7 +50,7 @@ def commands(app, feed, ask):
 
 
 @pytest.mark.parametrize("pipeline", ["default", "one_pole", "dissertation"])
-@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
+@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky", "slew"])
 def test_a_recorded_stream_gives_the_commands_of_the_simulated_phone(pipeline, mapping):
     more = {"filter": "median20-copy", "send": "on_change"} if pipeline == "dissertation" else {}
     more = {"filter": "one_pole"} if pipeline == "one_pole" else more

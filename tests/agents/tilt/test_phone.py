@@ -177,7 +177,7 @@ def test_a_hand_closes_63_percent_of_a_step_in_its_time_constant():
 
 
 def test_whoever_steers_by_the_display_gets_there_and_does_not_swing():
-    for mapping in ("differential", "leaky"):
+    for mapping in ("differential", "leaky", "slew"):
         app = phone(hand_lag=0.15, mapping=mapping)
         app.ask(0.0, 0.3, 0.4)
         rates = [command(app, tick / 10).turn_rate for tick in range(1, 60)]

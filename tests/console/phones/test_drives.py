@@ -166,7 +166,7 @@ def test_readings_are_live_before_anybody_registers_or_calibrates(page):
 
 
 @pytest.mark.parametrize("pipeline", ["default", "dissertation"])
-@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
+@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky", "slew"])
 def test_every_pipeline_and_mapping_drives(page, pipeline, mapping):
     # The document's app says nothing while nothing changes: the watchdog takes 3 s.
     page.drives_by_tilt(pipeline=pipeline, mapping=mapping, then=2.5)
@@ -239,7 +239,7 @@ def test_the_scene_offers_what_a_phone_may_choose(page):
     assert set(scene["phone"]["pipelines"]) == {"default", "dissertation"}
     assert scene["phone"]["pipelines"]["dissertation"]["filter"] == "median20-copy"
     assert {"median", "one_pole"} <= set(scene["phone"]["filters"])
-    assert scene["phone"]["mappings"] == ["absolute", "differential", "leaky"]
+    assert scene["phone"]["mappings"] == ["absolute", "differential", "leaky", "slew"]
     assert CALIBRATION["mapping"] in scene["phone"]["mappings"]
 
 

@@ -43,7 +43,7 @@ def _drive(monkeypatch, pages, folder, agreed=True, **calibration):
 
 
 @pytest.mark.parametrize("pipeline", ["default", "dissertation"])
-@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky"])
+@pytest.mark.parametrize("mapping", ["absolute", "differential", "leaky", "slew"])
 def test_what_was_kept_replays_to_the_commands_that_were_sent_byte_for_byte(
     drive, tmp_path, pipeline, mapping
 ):
