@@ -17,6 +17,7 @@ from dva_sim.kernel.makers import maker
 
 QUEUE_LIMIT = 1000  # requests waiting at one requester
 ROUND_TRIPS_KEPT = 100_000
+MOST_ANSWERED = 64  # deadlines of requests that were answered meanwhile
 
 Answer = Callable[[bytes], object]
 
@@ -223,6 +224,8 @@ class Requester:
     def _attempt(self, asked: _Asked) -> None:
         """Send a request, over a new connection if there is none."""
         asked.attempts += 1
+        if len(self._deadlines) > MOST_ANSWERED + 2 * len(self._open):
+            self._forget_answered()
         self._deadlines.append((self._clock.now + self.timeout, asked.tag, asked.attempts))
         if len(self._deadlines) == 1:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
@@ -255,6 +258,11 @@ class Requester:
             self._deadlines.popleft()
         if self._deadlines:
             self._clock.call_at(self._deadlines[0][0], self._look_at_deadlines)
+
+    def _forget_answered(self) -> None:
+        """Drop deadlines of what was answered; the first stays, as its event is on its way."""
+        first, *others = self._deadlines
+        self._deadlines = deque([first, *(each for each in others if each[1] in self._open)])
 
     def _expire(self, tag: int, attempt: int) -> None:
         asked = self._open.get(tag)

@@ -20,6 +20,8 @@ BOUNDS: Final[dict[str, int]] = {
     "Requester.round_trips": 100_000,
     "DvaAgent._told": 20_000,
     "ReplyCache._replies": 64 * 1024,
+    "_Kept.keys": 64,
+    "FairQueue._lines[]": 1_000,
     "Trail._facts": 10_000,
     "Store._events": 10_000,
 }

@@ -78,8 +78,8 @@ def _scenario(chance: random.Random) -> dict[str, Any]:
         "dispatch": {
             "policy": chance.choice(sorted(POLICIES.keys() - {"oracle"})),
             "containment": guards > 0 and chance.random() < 0.5,
-            "escalate_after_s": chance.choice((30.0, 120.0)),
-            "order_limit_s": 300.0,
+            "escalate_after_s": chance.choice((10.0, 30.0, 120.0)),
+            "order_limit_s": chance.choice((60.0, 300.0)),
             "depart_within_s": 60.0,
             "mode": chance.choice(("automatic", "automatic", "ask_first")),
             "decide_within_s": 10.0,
@@ -108,9 +108,10 @@ def _link(chance: random.Random) -> dict[str, Any]:
 
 def _event(chance: random.Random, number: int) -> dict[str, Any]:
     kind = chance.choice(("fire", "gas_leak", "flood"))
+    last = chance.choice((60.0, STORM - 100.0))  # some come all at once
     return {
         "kind": kind,
-        "at_s": round(chance.uniform(5.0, STORM - 100.0), 1),
+        "at_s": round(chance.uniform(5.0, last), 1),
         "reported": True,
         "false_alarm": chance.random() < 0.2,
         "reports": chance.choice((1, 1, 3)),

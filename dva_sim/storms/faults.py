@@ -259,7 +259,9 @@ def _by_hand(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _kill_dva(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    storm.dva.kill(fault.value)
+    """Kill it before it hears what it waited for, or shortly after that."""
+    after = chance.choice((0.0, 0.001, chance.uniform(0.0, 3.0)))
+    storm.run.clock.call_after(after, storm.dva.kill, fault.value)
 
 
 def _kill_dva_writing(storm: StormScene, fault: Fault, chance: random.Random) -> None:

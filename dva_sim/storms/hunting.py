@@ -46,7 +46,7 @@ def hunt(mutant: str, seeds: Iterable[int], profile: str) -> Hunt:
     acts, first, count = 0, "", 0
     for count, seed in enumerate(seeds, 1):
         with planted(mutant) as bug:
-            outcome = play(draw(seed, profile))
+            outcome = play(draw(seed, profile), enough=lambda bug=bug: bug.acts > 0)  # type: ignore[misc]
         acts, first = acts + bug.acts, first or bug.first
         if bug.acts and not outcome.is_clean:
             return Hunt(mutant, count, tuple(sorted(outcome.signature)), acts, first)

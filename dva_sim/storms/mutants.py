@@ -157,7 +157,7 @@ def _skipped(when: Callable[..., bool] = lambda *_, **__: True) -> Make:
 
 
 def _with(**changed: Any) -> Make:
-    """A function that is called with other arguments than it was given, by name."""
+    """A pure function that is called with other arguments than it was given, by name."""
 
     def make(original: Original, bug: Bug) -> Original:
         code = getattr(original, "__code__")  # noqa: B009 - a name that types do not know
@@ -165,10 +165,10 @@ def _with(**changed: Any) -> Make:
 
         def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
             given = dict(zip(names, args, strict=False)) | named_args
-            other = {key: value for key, value in changed.items() if given.get(key) != value}
-            if other:
-                bug.act(f"{type(self).__name__}: {other} for {[given.get(key) for key in other]}")
-            return original(self, **(given | other))
+            right, other = original(self, **given), original(self, **(given | changed))
+            if other != right:
+                bug.act(f"{getattr(self, 'id_tag', '')}: {other} instead of {right}")
+            return other
 
         return wrong
 
@@ -176,7 +176,10 @@ def _with(**changed: Any) -> Make:
 
 
 _ROBOT = "dva_sim.agents.robot.controller:RobotController"
-_SET_OUT: Final = Mode.TELEOPERATION, Mode.MISSION
+
+
+def _is_driven(controller: Any) -> bool:
+    return controller.mode is Mode.TELEOPERATION or controller.by_hand is not None
 
 
 def _longer(self: Any, decision: Decision, *_: Any) -> Decision | None:
@@ -209,6 +212,16 @@ def _ignores_order(original: Original, bug: Bug) -> Original:
             bug.act(f"{self.id_tag} obeys command {message.message_id} after {known}")
         self.last_set_id = max(known, self.last_set_id)
         return decision
+
+    return wrong
+
+
+def _acts_again(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message) -> Any:
+        refusal = original(self, message)
+        begins = isinstance(message.body, m.StartTeleOp | m.GoTo | m.Patrol | m.ReturnToBase)
+        if refusal is not None and begins and self.mode is Mode.IDLE:
+            bug.act(f"{self.id_tag} begins by order {message.message_id} once more")
 
     return wrong
 
@@ -379,8 +392,7 @@ def _miscounts(original: Original, bug: Bug) -> Original:
 def _resets_timer(original: Original, bug: Bug) -> Original:
     def wrong(self: Any, event: Any, severity: float) -> Any:
         original(self, event, severity)
-        latest = max(event.times.values())
-        if event.waiting_since < latest + 1e9:
+        if event.waits_for is not None:
             bug.act(f"event {event.number} waits from the beginning again")
             event.waiting_since = 1e9
 
@@ -402,12 +414,13 @@ def _says_before_keeping(original: Original, bug: Bug) -> Original:
         for event in changed:
             self.desk.book.touch(event)
         self._memory = memory
-        bug.act("the DVA says what it has not kept yet")
         self._late = True
 
         def later() -> None:
             if not self.is_gone:
                 original(self)
+            elif changed:
+                bug.act(f"the DVA was killed before it had kept event {changed[0].number}")
             self._late = False
 
         clock.call_after(5.0, later)
@@ -416,13 +429,15 @@ def _says_before_keeping(original: Original, bug: Bug) -> Original:
     return wrong
 
 
-def _writes_half(original: Original, bug: Bug) -> Original:
-    """Grants are not written down."""
+def _loses_grants(original: Original, bug: Bug) -> Original:
+    """A restarted DVA has forgotten who holds what."""
 
-    def wrong(self: Any, dva: Any, sessions: Any, lasting: Any, now: float) -> Any:
-        if sessions["grants"]:
-            bug.act(f"{len(sessions['grants'])} permissions are not kept")
-        return original(self, dva, {**sessions, "grants": {}}, lasting, now)
+    def wrong(self: Any, dva: Any) -> Any:
+        original(self, dva)
+        grants = dva.sessions.permissions.grants
+        for grant in grants.values():
+            bug.act(f"the next life of the DVA does not know that {grant.holder} holds a robot")
+        grants.clear()
 
     return wrong
 
@@ -442,13 +457,22 @@ def _loses_open(original: Original, bug: Bug) -> Original:
 
 
 def _two_holders(original: Original, bug: Bug) -> Original:
-    def wrong(self: Any, robot: str, holder: str, level: str, *args: Any, **named: Any) -> Any:
-        held = self.grants.get(robot)
-        if level == "sensors" or held is None or held.holder in (holder, self.own):
-            return original(self, robot, holder, level, *args, **named)
-        bug.act(f"{robot} is given to {holder} while {held.holder} holds it")
-        del self.grants[robot]
-        return original(self, robot, holder, level, *args, **named)
+    def wrong(self: Any, message: m.Message, asker: Any, body: Any, now: float) -> Any:
+        grants = self.sessions.permissions.grants
+        held = grants.get(body.device)
+        others = held is not None and held.holder not in (
+            message.source,
+            self.sessions.permissions.own,
+        )
+        if not others or body.level == "sensors":
+            return original(self, message, asker, body, now)
+        del grants[body.device]
+        reply, sends = original(self, message, asker, body, now)
+        if reply.code == m.OK:
+            bug.act(f"{body.device} is given to {message.source} while {held.holder} holds it")
+        else:
+            grants.setdefault(body.device, held)
+        return reply, sends
 
     return wrong
 
@@ -466,10 +490,24 @@ def _anybody_confirms(original: Original, bug: Bug) -> Original:
 
 
 def _unbounded(original: Original, bug: Bug) -> Original:
-    def wrong(self: Any, *args: Any, **named: Any) -> Any:
-        original(self, *args, **named)
-        bug.act("a reply cache keeps a hundred thousand replies to each")
+    def wrong(self: Any, key: Any, source: str, reply: bytes) -> Any:
         self._each, self._room = 100_000, 10**9
+        original(self, key, source, reply)
+        if len(self._kept[source].keys) > 64:
+            bug.act(f"{len(self._kept[source].keys)} replies to {source} are kept")
+        return reply
+
+    return wrong
+
+
+def _endless_queue(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, letter: Any, standing: Any) -> Any:
+        waits = len(self._lines.get((letter.peer, letter.moves), ()))
+        gone = original(self, letter, standing)
+        if gone is not letter:
+            return gone
+        bug.act(f"one more waits behind {waits} of the same sender")
+        return None
 
     return wrong
 
@@ -496,7 +534,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S1",
         "an old order acts again",
         f"{_ROBOT}._order",
-        _instead(lambda self, message: None if message.message_id <= self.last_order_id else RIGHT),
+        _acts_again,
     ),
     "stop-ignored": Mutant(
         "S1",
@@ -525,9 +563,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "a silent driver keeps the robot",
         f"{_ROBOT}.expire",
         _instead(
-            lambda self, now: (
-                False if self.mode in _SET_OUT and now - self.last_valid > 30.0 else RIGHT
-            )
+            lambda self, now: False if _is_driven(self) and now - self.last_valid > 30.0 else RIGHT
         ),
     ),
     "changes-hands-moving": Mutant(
@@ -549,7 +585,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "two-holders": Mutant(
         "S2",
         "the DVA gives a robot to a second holder",
-        "dva_sim.core.sessions:Permissions.request",
+        "dva_sim.core.dva:Dva._permitted",
         _two_holders,
     ),
     "silent-holder-keeps": Mutant(
@@ -664,7 +700,10 @@ MUTANTS: Final[dict[str, Mutant]] = {
         _loses_open,
     ),
     "grants-not-kept": Mutant(
-        "S2", "permissions do not survive the DVA", "dva_sim.core.store:Store._write", _writes_half
+        "S2",
+        "permissions do not survive the DVA",
+        "dva_sim.core.store:Store._recall_sessions",
+        _loses_grants,
     ),
     "said-before-kept": Mutant(
         "S6",
@@ -699,14 +738,14 @@ MUTANTS: Final[dict[str, Mutant]] = {
     "replies-without-bound": Mutant(
         "S10",
         "replies are kept for ever",
-        "dva_sim.protocol.exchange:ReplyCache.__init__",
+        "dva_sim.protocol.exchange:ReplyCache.put",
         _unbounded,
     ),
     "strangers-fill-the-queue": Mutant(
         "S10",
         "any number of messages may wait",
         "dva_sim.agents.robot.command_queue:FairQueue._make_room",
-        _instead(lambda self, letter, standing: None if self.length >= 20 else RIGHT),
+        _endless_queue,
     ),
     "reply-cache-without-source": Mutant(
         "S6",

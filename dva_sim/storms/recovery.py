@@ -131,12 +131,17 @@ class RecoveryProbes:
         self._probe.ask(robot, m.StartTeleOp(), answered, again, session)
 
     def _drive(self, robot: str, session: int) -> None:
-        """Command by whatever the pattern takes: over both channels until one is obeyed."""
+        """Command until it obeys; a drive that ended before its start was answered begins again."""
         waits, self._session[robot] = "obeys no command of its driver", session
         if self._open.get(robot) != waits:
             return
-        body = m.SetTeleOp(0.05, 0.1)
-        self._probe.ask(robot, body, session=session)
+
+        def answered(reply: m.Reply) -> None:
+            if reply.code == m.WRONG_MODE and self._open.get(robot) == waits:
+                self._open[robot] = "does not start for who holds it"
+                self._start(robot, session)
+
+        self._probe.ask(robot, m.SetTeleOp(0.05, 0.1), answered, session=session)
         self._clock.call_after(AGAIN, self._drive, robot, session)
 
     def _stop(self, robot: str) -> None:

@@ -101,11 +101,18 @@ class Storm(StormScene):
             clock.call_at(fault.at_s, self._await, fault)
         self._recovery.begin([robot.id for robot in self.robots], self.anywhere(_chance(plan)))
 
-    def play(self) -> StormOutcome:
-        """Let the storm pass, and judge it."""
-        began = time.process_time()
-        self.dva.survive(self.plan.horizon_s)
-        self._recovery.end()
+    def play(self, enough: Callable[[], bool] = lambda: False) -> StormOutcome:
+        """Let the storm pass, and judge it.
+
+        Args:
+            enough: Returns True once a broken rule need not be waited for any longer.
+        """
+        began, now = time.process_time(), 0.0
+        while now < self.plan.horizon_s and not (self.recorder.broken and enough()):
+            now = min(now + 1.0, self.plan.horizon_s)
+            self.dva.survive(now)
+        if now == self.plan.horizon_s:
+            self._recovery.end()
         self._look_at_bounds()
         return StormOutcome(
             seed=self.plan.seed,
@@ -146,6 +153,7 @@ class Storm(StormScene):
             self._excuse(node, True)
         ends = FAULTS[fault.kind].begin(self, fault, _chance(self.plan, fault))
         if ends is not None:
+            self.run.clock.call_after(fault.for_s, self._look_at_bounds)
             self.run.clock.call_after(fault.for_s, ends)
         if is_silenced:
             self.run.clock.call_after(fault.for_s + 1.0, self._excuse, node, False)
@@ -208,18 +216,23 @@ def _chance(plan: StormPlan, fault: Fault | None = None) -> random.Random:
     return random.Random(f"{plan.seed} {fault!r}")
 
 
-def play(plan: StormPlan, before: Callable[[Storm], object] = lambda _: None) -> StormOutcome:
+def play(
+    plan: StormPlan,
+    before: Callable[[Storm], object] = lambda _: None,
+    enough: Callable[[], bool] = lambda: False,
+) -> StormOutcome:
     """Play a storm to its end, whatever happens.
 
     Args:
         plan: The storm.
         before: Called with the storm before it begins.
+        enough: See `Storm.play`.
     """
     with tempfile.TemporaryDirectory(prefix="dva-storm-") as folder:
         storm = Storm(plan, Path(folder))
         before(storm)
         try:
-            return storm.play()
+            return storm.play(enough)
         except Exception:
             return StormOutcome(
                 plan.seed,

@@ -214,3 +214,15 @@ def test_a_late_reply_to_a_closed_connection_is_dropped():
     held[1].answer(b"of the second")
     net.clock.run(5.0)
     assert replies == [b"of the second"]
+
+
+def test_a_requester_forgets_the_deadlines_of_what_was_answered():
+    """A thousand answered requests in a second leave no thousand deadlines for nine more."""
+    net, answered = network("message", delay_s=0.0001), list[bytes]()
+    Robot(net, 0.0)
+    requester = Requester(net, "phone", "robot", timeout=9.0)
+    for _ in range(1000):
+        requester.request(b"go", answered.append)
+    net.clock.run(5.0)
+    assert len(answered) > 900
+    assert len(requester._deadlines) < 100

@@ -2,12 +2,13 @@
 
 It notes who was sent where, who took that up, since when an event waits or is in the same hands,
 and what those who were sent have found; the fields of the DVA's events are not asked for that.
-It also notes who was heard: a permission whose holder is silent should be in no book.
+It also notes who was heard: a permission whose holder is silent should be in no book; and which
+sessions are over: of each one the robot has to be told.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -18,12 +19,17 @@ from dva_sim.simulation.full.observations import Page, Right
 
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
 SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
+TOLD_WITHIN = (
+    90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
+)
+MOVED = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
 UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
 IN_HAND: Final = State.ASSIGNED, State.ON_SCENE
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
-_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>"  # of what the DVA sends
+_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>", b"<PermissionRevocation>"
+"""What of the DVA's messages is looked at, beside answers that are waited for."""
 OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # the most of what reaches the DVA
 Broken = tuple[str, str]
 
@@ -92,6 +98,8 @@ class EventLedger:
         self.knows_places, self._is_new = True, True
         self._heard: dict[str, float] = {}
         self._held_since: dict[Right, float] = {}
+        self._told: dict[int, None] = {}
+        self._untold: dict[Right, float] = {}
         self._asked: dict[tuple[str, int], m.EventReport] = {}
         self._taken: list[m.EventReport] = []
         self._orders: dict[tuple[str, int], int] = {}
@@ -99,7 +107,7 @@ class EventLedger:
         self._words: dict[int, Word] = {}
         self._felt: dict[str, float] = {}
         self._seen: dict[int, Seen] = {}
-        self._open: set[int] = set()
+        self._open: dict[int, tuple[str, m.Position]] = {}
         self._now = 0.0
 
     # --- what is said --------------------------------------------------------------------
@@ -155,6 +163,10 @@ class EventLedger:
                 self._sends(message, number, message.destination)
             case m.OrderProgress(event_id=number):
                 self._word(number).loose.add(message.destination)
+            case m.PermissionRevocation(device=robot, session=session):
+                if message.destination == robot:
+                    self._told[session] = None
+                    _keep_newest(self._told)
             case m.Reply() as reply:
                 self._answers(message.destination, reply)
 
@@ -231,9 +243,13 @@ class EventLedger:
                 yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
         for number in book.open.keys() & book.closed.keys():
             yield "S6", f"event {number} is open and closed"
-        for number in self._open.difference(book.open, book.closed):
+        for number in self._open.keys() - book.open.keys() - book.closed.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
-        self._open = set(book.open)
+        known, self._open = self._open, {n: (e.kind, e.position) for n, e in book.open.items()}
+        for number in known.keys() & self._open.keys():
+            (kind, place), (was, before) = self._open[number], known[number]
+            if kind != was or (place != before and apart(place, before) > MOVED):
+                yield "S6", f"event {number} was a {was} elsewhere before"
         every = (*book.open.values(), *book.closed.values())
         seen, self._seen = self._seen, {}
         for event in every:
@@ -267,6 +283,7 @@ class EventLedger:
     def _unheard(self, rights: Sequence[Right], now: float, works: bool) -> Iterator[Broken]:
         """Yield permissions whose holders have been silent for longer than the DVA may wait."""
         before, self._held_since = self._held_since, {}
+        yield from self._not_told(before, rights, now, works)
         for right in rights:
             since = now if not works else before.get(right, now)
             self._held_since[right] = since
@@ -277,6 +294,29 @@ class EventLedger:
                     "S2",
                     f"lets {held}, of whom nothing is heard for {silent:.0f} s",
                 )
+
+    def _not_told(
+        self, before: Iterable[Right], rights: Sequence[Right], now: float, works: bool
+    ) -> Iterator[Broken]:
+        """Yield sessions that are over in the book, and whose end the robot is not told of.
+
+        Time in which the robot is not heard does not count, nor does that of a silenced DVA. Who
+        is given the same robot again, in another session, is told so by that.
+        """
+        held = {(right.robot, right.holder) for right in rights}
+        for right in before:
+            if right.holder != self._dva and (right.robot, right.holder) not in held:
+                self._untold.setdefault(right, now)
+        for right, since in list(self._untold.items()):
+            is_there = now - self._heard.get(right.robot, now) < SILENT_AFTER / 2
+            if right.session in self._told or (right.robot, right.holder) in held:
+                del self._untold[right]
+            elif not works or not is_there:
+                self._untold[right] = now
+            elif now - since > TOLD_WITHIN:
+                del self._untold[right]
+                robot, holder = self._name(right.robot), self._name(right.holder)
+                yield "S2", f"has not told {robot} that it is {holder}'s no longer"
 
     def _of_event(self, event: Event, old: Seen | None, now: float) -> Iterator[Broken]:
         new, rules = self._look(event, old, now), self._rules

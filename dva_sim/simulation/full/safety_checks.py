@@ -112,7 +112,7 @@ class Witness:
         over: By session: from when on nobody may act by it.
         unanswered: By sender and number: what it has not answered yet.
         done: By sender, session and number: what it has said OK to; it may say so again.
-        arrivals: By sender and number: when the newest commands arrived.
+        arrivals: By sender, number and session: when the newest commands arrived.
         stopped: When the newest emergency was obeyed, or should have been.
         ordered: When the newest order that was accepted had arrived.
         does: What that was, by sender and session; nothing once that was ended.
@@ -134,7 +134,7 @@ class Witness:
     over: dict[int, float] = field(default_factory=dict)
     unanswered: dict[tuple[str, int], Unanswered] = field(default_factory=dict)
     done: OrderedDict[tuple[str, int | None, int], None] = field(default_factory=OrderedDict)
-    arrivals: OrderedDict[tuple[str, int], float] = field(default_factory=OrderedDict)
+    arrivals: OrderedDict[tuple[str, int, int | None], float] = field(default_factory=OrderedDict)
     stopped: float = -1.0
     ordered: float = -1.0
     does: Doing | None = None
@@ -284,7 +284,8 @@ class SafetyAudit:
             return
         key = message.source, message.message_id
         if isinstance(message.body, m.SetTeleOp):
-            witness.arrivals.setdefault(key, now)
+            # Whoever has started anew numbers from 1 again, and has other sessions.
+            witness.arrivals.setdefault((*key, message.session), now)
             if len(witness.arrivals) > MOST_KEPT:
                 witness.arrivals.popitem(last=False)
             return
@@ -426,7 +427,7 @@ class SafetyAudit:
         if speaker == (source, session) and number <= known:
             found.append(("S1", "obeys a command again, or after a newer one"))
         witness.newest, witness.heard = ((source, session), number), command.time
-        arrived = witness.arrivals.pop((source, number), command.arrived)
+        arrived = witness.arrivals.pop((source, number, session), command.arrived)
         witness.allowed = arrived + self._watchdog
         if command.seen_tick is not None and witness.offset is None:
             found.append(("S1", "obeys a command behind a picture that it has sent nobody"))
