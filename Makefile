@@ -6,11 +6,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 RUNTIME := $(VENV)/.runtime
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
-MIDDLEWARE := $(VENV)/.middleware
+EXTRAS := $(VENV)/.extras
 DEMO := results/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-middleware test-long test-soak storms tools check same-bytes bench goals clean
+.PHONY: help setup demo console published test test-all test-contract test-system test-browser test-extras test-long test-soak storms tools check same-bytes bench goals clean
 
 # Compiled files are kept whatever a shell says: without them each program that a test starts
 # compiles all modules again.
@@ -51,11 +51,11 @@ test-browser: $(DEV)  ## the console's pages in the system's Chromium
 	@echo "Running the tests in a browser ..."
 	@$(PYTEST) tests/console/browser
 
-test-middleware: $(MIDDLEWARE)  ## every transport over its real middleware, mosquitto among it
+test-extras: $(EXTRAS)  ## what needs extras: every transport over its real middleware, environments for learners
 	@$(BIN)/python -c 'import shutil, sys; sys.exit(shutil.which("mosquitto") is None)' \
 	  || echo "MQTT is left out: the program mosquitto is missing; try: apt-get install mosquitto"
 	@$(PYTEST) -m "system or not system" tests/testing/test_transports.py tests/network/middleware tests/simulation/middleware \
-	  tests/network/test_mqtt.py tests/live/test_over_mqtt.py tests/live/test_taking_over.py tests/contracts
+	  tests/network/test_mqtt.py tests/live/test_over_mqtt.py tests/live/test_taking_over.py tests/contracts tests/envs
 
 test-long: $(DEV)  ## long searches and whole studies, the same cases each time
 	@echo "Running the long tests ..."
@@ -106,9 +106,9 @@ $(DEV): pyproject.toml constraints.txt | $(VENV)
 	@$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $@ $(RUNTIME)
 
-$(MIDDLEWARE): $(DEV)
-	@echo "Installing the middleware that transports are tried over ..."
-	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds]'
+$(EXTRAS): $(DEV)
+	@echo "Installing the extras: middleware for transports, Gymnasium ..."
+	@$(PIP) install -c constraints.txt -e '.[dev,mqtt,zenoh,webrtc,dds,rl]'
 	@touch $@ $(DEV) $(RUNTIME)
 
 $(BENCH): $(DEV)

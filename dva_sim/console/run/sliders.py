@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from dva_sim.agents.operator.attention import OperatorSetup
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.agents.robot.controller import Mode
 from dva_sim.console.run.link import changed, with_link
@@ -14,8 +13,7 @@ from dva_sim.console.wire.arguments import LINK_LIMITS
 from dva_sim.console.wire.scenes import LinkShown
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.run import Run
-from dva_sim.simulation.full.stage import Stage
-from dva_sim.simulation.scenario import Scenario, command_timeout_s, mean_processing_s
+from dva_sim.simulation.scenario import Scenario, mean_processing_s
 
 
 class LinkSliders:
@@ -88,21 +86,6 @@ class LinkSliders:
         for robot in self._run.field.robots:
             self._set_usual(robot, seconds)
         self._run.slowed(seconds)
-
-
-def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
-    """How people's commands are made and sent, by a scenario that says how the link is now."""
-    command = scenario.command
-    return OperatorSetup(
-        pattern=stage.pattern_for,
-        window=command.window,
-        heeds=command.heeds,
-        rate_hz=command.rate_hz,
-        timeout=command_timeout_s(scenario),
-        attempts=command.attempts,
-        guarded=scenario.control == "coordinated",
-        topic=stage.cameras.topic,
-    )
 
 
 def change_pattern(

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from dva_sim.agents.observation import Cameras
-from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.held_robot import HeldRobot
 from dva_sim.agents.operator.person_at_console import PersonAgent
 from dva_sim.cameras.lines import FrameLine, Show, contained_line, scene_line
@@ -28,7 +26,7 @@ from dva_sim.console.robots.robot_windows import RobotWindows
 from dva_sim.console.run.lag import LagRule
 from dva_sim.console.run.real_links import MakeSockets
 from dva_sim.console.run.recorder import ConsoleRecorder
-from dva_sim.console.run.sliders import LinkSliders, setup_of
+from dva_sim.console.run.sliders import LinkSliders
 from dva_sim.console.views.feed import Feed
 from dva_sim.console.views.fields import HazardFeed
 from dva_sim.console.views.logs import Logs
@@ -39,9 +37,10 @@ from dva_sim.console.world.telling import ToldWorld
 from dva_sim.kernel.errors import DvaSimError
 from dva_sim.network.realtime import PacedClock
 from dva_sim.recordings.audit_log import AuditRow, plain_row
+from dva_sim.simulation.full.control_room import console_of
 from dva_sim.simulation.full.run import Run, Watched
 from dva_sim.simulation.full.stage import DVA, id_of
-from dva_sim.simulation.scenario import Scenario, phone_profile
+from dva_sim.simulation.scenario import Scenario
 
 PEOPLE = 1  # operators of the scenario whose places people take
 SCREEN = 0xFFFF  # number of the console's own screen among consoles
@@ -103,11 +102,7 @@ class ConsoleWorld(ToldWorld):
         emulated = self.sockets is not None and self.sockets.crossing is not None
         self.sliders = LinkSliders(self.run, self.windows.set_usual, emulated)
         self.dropped: Callable[[], int] = lambda: 0
-        self._console = Console(
-            setup=setup_of(self.run.stage, scenario),
-            phone=phone_profile(scenario),
-            reach=self.run.stage.reach,
-        )
+        self._console = console_of(self.run.stage, scenario)
         self._persons: dict[int, PersonAgent] = {}
         real = self.sockets.dva if self.sockets is not None else None
         self.phones = Phones(self.run, self.clock, lambda: self._console, real)
@@ -296,7 +291,7 @@ class ConsoleWorld(ToldWorld):
             ConfigError: what cannot be.
         """
         told, scenario = self.sliders.change(given)
-        self._console = replace(self._console, setup=setup_of(self.run.stage, scenario))
+        self._console = console_of(self.run.stage, scenario)
         for person in self.persons:
             person.console = self._console
         return told

@@ -13,6 +13,7 @@ from dva_sim.agents.control_room.dispatcher import ScriptedDispatcher
 from dva_sim.agents.observation import Observation
 from dva_sim.agents.operator.attention import DriverSeat, OperatorSetup
 from dva_sim.agents.operator.drive import Teleoperation
+from dva_sim.agents.operator.handheld import Console
 from dva_sim.agents.operator.operator import OperatorAgent
 from dva_sim.agents.operator.strategies import Truth, load_strategy
 from dva_sim.agents.operator.supervision import Supervision
@@ -222,6 +223,28 @@ def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
     return person
 
 
+def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
+    """How operators' commands are made and sent, by a scenario that says how the link is now."""
+    command = scenario.command
+    return OperatorSetup(
+        pattern=stage.pattern_for,
+        window=command.window,
+        heeds=command.heeds,
+        rate_hz=command.rate_hz,
+        timeout=command_timeout_s(scenario),
+        attempts=command.attempts,
+        guarded=scenario.control == "coordinated",
+        topic=stage.cameras.topic,
+    )
+
+
+def console_of(stage: Stage, scenario: Scenario) -> Console:
+    """What a person works with who is no simulated one."""
+    return Console(
+        setup=setup_of(stage, scenario), phone=phone_profile(scenario), reach=stage.reach
+    )
+
+
 def add_operator(
     stage: Stage, number: int, truth: Callable[[str], Truth[Observation]] | None = None
 ) -> OperatorAgent:
@@ -242,18 +265,7 @@ def add_operator(
     needs_truth = config.strategy == "oracle"
     if needs_truth and truth is None:
         raise ConfigError("operator.strategy 'oracle' knows the truth: only in virtual time")
-    command = scenario.command
-    setup = OperatorSetup(
-        pattern=stage.pattern_for,
-        window=command.window,
-        heeds=command.heeds,
-        rate_hz=command.rate_hz,
-        timeout=command_timeout_s(scenario),
-        attempts=command.attempts,
-        truth=truth if needs_truth else None,
-        guarded=scenario.control == "coordinated",
-        topic=stage.cameras.topic,
-    )
+    setup = replace(setup_of(stage, scenario), truth=truth if needs_truth else None)
     seat = DriverSeat(
         device,
         person,

@@ -1,0 +1,32 @@
+"""Gymnasium environments: who goes where, and driving a robot whose pictures come late.
+
+Importing this makes them known to Gymnasium, which is the extra `rl` (`pip install 'dva-sim[rl]'`):
+
+```
+import dva_sim.envs
+import gymnasium
+
+env = gymnasium.make("dva_sim/Dispatch-v0", scenario="small-shift")
+```
+"""
+
+from importlib.util import find_spec
+
+from dva_sim.kernel.errors import ConfigError
+
+if find_spec("gymnasium") is None:
+    raise ConfigError("environments need Gymnasium: pip install 'dva-sim[rl]'")
+
+import gymnasium
+
+from dva_sim.envs.dispatch import DispatchEnv, play
+from dva_sim.envs.drive import DriveEnv
+
+for _name, _entry_point in (
+    ("dva_sim/Dispatch-v0", "dva_sim.envs.dispatch:DispatchEnv"),
+    ("dva_sim/Drive-v0", "dva_sim.envs.drive:DriveEnv"),
+):
+    if _name not in gymnasium.registry:  # it may be imported again
+        gymnasium.register(id=_name, entry_point=_entry_point)
+
+__all__ = ["DispatchEnv", "DriveEnv", "play"]

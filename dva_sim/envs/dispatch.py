@@ -1,0 +1,386 @@
+"""`dva_sim/Dispatch-v0`: decide who goes where, one order at a time.
+
+A shift of the timed model goes on until the DVA has something to decide. Each action adds one piece
+of advice to that decision, or ends it; then time passes until the next one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from typing_extensions import override
+
+from dva_sim.core.dispatch import (
+    Advice,
+    Announcement,
+    Assignment,
+    Policy,
+    Relocation,
+    Situation,
+)
+from dva_sim.core.events import Event
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.protocol.event_kinds import EVENT_KINDS
+from dva_sim.simulation.models import model_for, model_of
+from dva_sim.simulation.scenario import load
+from dva_sim.simulation.timed.scenario import TimedScenario
+from dva_sim.simulation.timed.stepping import SteppedShift
+
+Observations = dict[str, NDArray[Any]]
+Info = dict[str, Any]
+
+DONE: Final = 0  # the action that ends a decision
+TASK_COLUMNS: Final = (
+    *EVENT_KINDS,  # 1 for the kind of the event
+    "contain",  # 1 if it is to be contained, 0 if it is to be confirmed
+    "due",
+    "severity",
+    "confidence",
+    "age_s",  # since it was first reported
+    "waiting_s",
+    "engaged",  # 1 if somebody is under way to it
+)
+UNIT_COLUMNS: Final = ("free", "robot", "engaged")  # may be sent; is a robot; is under way
+MINUTE: Final = 60.0
+NEVER: Final = -1.0  # stands for a way or time that has no end
+MOST: Final = 1e7  # bound of all observations
+
+
+class DispatchEnv(gymnasium.Env[Observations, int]):
+    """Who goes where.
+
+    Decisions in which nothing can be done but wait end by themselves. Actions are numbers: 0 ends
+    the decision, `1 + task * units + unit` sends a unit to a task, and where they are asked for,
+    numbers after those announce tasks and let guards wait at stations. `info["action_mask"]`, also
+    an observation, says which are allowed; one that is not ends the decision, and
+    `info["refused"]` is true.
+
+    Observations (float32 but for the mask; rows of what is not there are 0):
+        tasks: `(tasks, columns)` as in `TASK_COLUMNS`, longest reported first.
+        units: `(units, columns)` as in `UNIT_COLUMNS`, guards and robots as the scenario has them.
+        eta_s: `(tasks, units)`, expected time to arrival [s]; -1 for whoever cannot go.
+        distance_m: The same as a way [m].
+        bids_s: With `auctions`: what each unit has offered [s]; -1 without a bid.
+        cover_s: With `relocates`: `(units, stations)`, way to each station [s]; -1 if it cannot.
+        bound_for: With `relocates`: `(units, stations)`, 1 for the station a guard is bound for.
+        operators: `(1,)`, how many robots can still be sent.
+        time_s: `(1,)`, since the shift began.
+        action_mask: int8, 1 for each action that is allowed.
+
+    The reward of a step is minus the minutes that events have waited during it, from the report
+    until somebody arrived or they were closed: the return of an episode is the sum of all response
+    times. At the end `info["measures"]` has the measures that a study would have of this shift.
+
+    Args:
+        scenario: A scenario of the timed model by name or path.
+        changes: New values by dotted key, such as `{"intensity": 6.9}`.
+        tasks: The most tasks that are seen at a time; newer ones wait until there is room.
+        preempts: Units under way may be sent elsewhere.
+        auctions: Tasks may be announced, and bids are seen.
+        relocates: Guards may be sent to wait at stations.
+
+    Raises:
+        ConfigError: there is no such scenario, it is of another model, or not valid.
+    """
+
+    def __init__(
+        self,
+        scenario: str = "busy-shift",
+        *,
+        changes: Mapping[str, Any] | None = None,
+        tasks: int = 32,
+        preempts: bool = False,
+        auctions: bool = False,
+        relocates: bool = False,
+    ) -> None:
+        document = load(scenario)
+        built = model_of(document).build(document, changes or {})
+        if not isinstance(built, TimedScenario):
+            raise ConfigError(f"{scenario!r} is not of the timed model, which dispatch is about")
+        if tasks < 1:
+            raise ConfigError(f"tasks is {tasks}; should be a whole number from 1")
+        self.scenario = built
+        self._flags = {"preempts": preempts, "auctions": auctions, "relocates": relocates}
+        self._tasks = tasks
+        self._units = sum(group.count for group in built.responders)
+        self._stations = len(built.dispatch.stations) if relocates else 0
+        self._auctions = auctions
+        self._announcements = 1 + tasks * self._units
+        self._moves = self._announcements + (tasks if auctions else 0)
+        self.action_space = cast(
+            "spaces.Space[int]", spaces.Discrete(self._moves + self._units * self._stations)
+        )
+        self.observation_space = cast("spaces.Space[Observations]", self._space())
+        self._shift: SteppedShift | None = None
+        self._pieces: list[Advice] = []
+        self._waiting: list[Event] = []
+        self._since = 0.0
+
+    @property
+    def situation(self) -> Situation | None:
+        """What the DVA asks about, as policies see it; None between shifts."""
+        return None if self._shift is None else self._shift.situation
+
+    @property
+    def policy_rng(self) -> np.random.Generator:
+        """The random numbers of the shift for policies that use them."""
+        return self._running().rng
+
+    # --- the interface of Gymnasium ------------------------------------------------------
+
+    @override
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, Info]:
+        """Begin a shift: with a seed, the one that `dva-sim run` has with that seed."""
+        super().reset(seed=seed)
+        self.close()
+        drawn = int(self.np_random.integers(2**31)) if seed is None else seed
+        self._shift = SteppedShift(self.scenario, drawn, **self._flags)
+        self._waiting, self._since = [], 0.0
+        self._begin_decision()
+        self._reward()
+        return self._seen()
+
+    @override
+    def step(self, action: int) -> tuple[Observations, float, bool, bool, Info]:
+        shift, number = self._running(), int(action)
+        piece = self._piece(number) if self._mask[number] else None
+        if piece is not None:
+            self._take(piece)
+        if piece is None or not self._mask[1:].any():
+            shift.advise(self._pieces)
+            self._begin_decision()
+        observations, info = self._seen()
+        info["refused"] = piece is None and number != DONE
+        over = shift.situation is None
+        if over and shift.recording is not None:
+            tables = model_for(self.scenario).rows(shift.recording)
+            info["measures"] = tables["runs"][0]
+        return observations, self._reward(), over, False, info
+
+    @override
+    def close(self) -> None:
+        if self._shift is not None:
+            self._shift.close()
+            self._shift = None
+
+    # --- actions -------------------------------------------------------------------------
+
+    def actions_of(self, advice: Sequence[Advice]) -> list[int]:
+        """The actions that give a piece of advice after the other, and end the decision.
+
+        Raises:
+            ValueError: a piece cannot be said here, such as a task beyond the last one seen.
+        """
+        return [*map(self._action, advice), DONE]
+
+    def _action(self, piece: Advice) -> int:
+        if not isinstance(piece, Relocation) and piece.task >= self._tasks:
+            raise ValueError(f"task {piece.task} is beyond the {self._tasks} that are seen")
+        if isinstance(piece, Announcement):
+            if not self._auctions:
+                raise ValueError("tasks cannot be announced without auctions=True")
+            return self._announcements + piece.task
+        unit = self._places[piece.responder]
+        if isinstance(piece, Relocation):
+            if not self._stations:
+                raise ValueError("guards cannot be sent to stations without relocates=True")
+            return self._moves + unit * self._stations + piece.station
+        return 1 + piece.task * self._units + unit
+
+    def _piece(self, action: int) -> Advice | None:
+        """The advice that an action means; None ends the decision."""
+        if action == DONE:
+            return None
+        if action < self._announcements:
+            task, unit = divmod(action - 1, self._units)
+            return Assignment(task, self._places.index(unit))
+        if action < self._moves:
+            return Announcement(action - self._announcements)
+        unit, station = divmod(action - self._moves, self._stations)
+        return Relocation(self._places.index(unit), station)
+
+    def _take(self, piece: Advice) -> None:
+        """Add a piece to the decision: nobody is sent twice, nothing is given twice."""
+        self._pieces.append(piece)
+        situation = self.situation
+        assert situation is not None
+        if isinstance(piece, Announcement):
+            self._mask[self._announcements + piece.task] = 0
+            return
+        who, unit = situation.responders[piece.responder], self._places[piece.responder]
+        self._bar(unit)
+        if isinstance(piece, Assignment):
+            self._mask[1 + piece.task * self._units :][: self._units] = 0
+            if who.kind == "robot" and who.engaged is None:
+                self._operators -= 1
+                if self._operators <= 0:
+                    self._bar_idle_robots(situation)
+
+    def _bar(self, unit: int) -> None:
+        self._mask[1 + unit : self._announcements : self._units] = 0
+        first = self._moves + unit * self._stations
+        self._mask[first : first + self._stations] = 0
+
+    def _bar_idle_robots(self, situation: Situation) -> None:
+        for place, who in zip(self._places, situation.responders, strict=True):
+            if who.kind == "robot" and who.engaged is None:
+                self._mask[1 + place : self._announcements : self._units] = 0
+
+    # --- a decision ----------------------------------------------------------------------
+
+    def _begin_decision(self) -> None:
+        """Begin the next decision in which there is a choice."""
+        self._look()
+        while self.situation is not None and not self._mask[1:].any():
+            self._running().advise([])
+            self._look()
+
+    def _look(self) -> None:
+        """Find the responders of the situation among the units, and the actions that there are."""
+        self._pieces, situation = [], self.situation
+        self._mask = np.zeros(self._moves + self._units * self._stations, dtype=np.int8)
+        self._mask[DONE] = 1
+        self._places: list[int] = []
+        self._operators = 0
+        if situation is None:
+            return
+        numbers = {device: n for n, device in enumerate(self._running().units)}
+        self._places = [numbers[who.device] for who in situation.responders]
+        self._operators = situation.operators
+        pairs = self._mask[1 : self._announcements].reshape(self._tasks, self._units)
+        for row, task in enumerate(situation.tasks[: self._tasks]):
+            if task.engaged is None:
+                pairs[row, self._places] = np.isfinite(situation.eta[row])
+        if self._operators <= 0:
+            self._bar_idle_robots(situation)
+        if self._auctions:
+            for row, task in enumerate(situation.tasks[: self._tasks]):
+                free = task.stage == "confirm" and task.engaged is None and task.auction is None
+                self._mask[self._announcements + row] = free
+        if self._stations and situation.cover is not None:
+            moves = self._mask[self._moves :].reshape(self._units, self._stations)
+            moves[self._places] = np.isfinite(situation.cover.eta)
+            for place, bound in zip(self._places, situation.cover.bound_for, strict=True):
+                if bound is not None:
+                    moves[place, bound] = 0
+
+    def _running(self) -> SteppedShift:
+        if self._shift is None:
+            raise RuntimeError("no shift has begun: call reset first")
+        return self._shift
+
+    # --- what is seen, and what it is worth ----------------------------------------------
+
+    def _space(self) -> spaces.Dict:
+        size = self._moves + self._units * self._stations
+        shapes: dict[str, tuple[int, ...]] = {
+            "tasks": (self._tasks, len(TASK_COLUMNS)),
+            "units": (self._units, len(UNIT_COLUMNS)),
+            "eta_s": (self._tasks, self._units),
+            "distance_m": (self._tasks, self._units),
+            "operators": (1,),
+            "time_s": (1,),
+        }
+        if self._auctions:
+            shapes["bids_s"] = shapes["eta_s"]
+        if self._stations:
+            shapes["cover_s"] = shapes["bound_for"] = (self._units, self._stations)
+        boxes: dict[str, spaces.Space[Any]] = {
+            name: spaces.Box(NEVER, MOST, shape, np.float32) for name, shape in shapes.items()
+        }
+        return spaces.Dict({**boxes, "action_mask": spaces.MultiBinary(size)})
+
+    def _seen(self) -> tuple[Observations, Info]:
+        situation = self.situation
+        seen: Observations = {
+            name: np.zeros(box.shape or (), dtype=np.float32)
+            for name, box in cast("spaces.Dict", self.observation_space).items()
+            if name != "action_mask"
+        }
+        seen["action_mask"] = self._mask.copy()
+        seen["time_s"][0] = self._running().now
+        if situation is not None:
+            self._show(seen, situation)
+        return seen, {"action_mask": seen["action_mask"]}
+
+    def _show(self, seen: Observations, situation: Situation) -> None:
+        now, tasks = situation.now, situation.tasks[: self._tasks]
+        for row, task in enumerate(tasks):
+            seen["tasks"][row] = (
+                *(task.kind == kind for kind in EVENT_KINDS),
+                task.stage == "contain",
+                task.due,
+                task.severity,
+                task.confidence,
+                now - task.detected,
+                max(0.0, now - task.waiting_since),
+                task.engaged is not None,
+            )
+        for place, who in zip(self._places, situation.responders, strict=True):
+            seen["units"][place] = 1.0, who.kind == "robot", who.engaged is not None
+        seen["operators"][0] = self._operators
+        rows = slice(len(tasks))
+        for name, ways in (("eta_s", situation.eta), ("distance_m", situation.distance)):
+            seen[name][:] = NEVER
+            seen[name][rows, self._places] = _bounded(ways[rows])
+        if self._auctions:
+            seen["bids_s"][:] = NEVER
+            seen["bids_s"][rows, self._places] = _bounded(situation.bids[rows])
+        if self._stations and situation.cover is not None:
+            seen["cover_s"][:] = NEVER
+            seen["cover_s"][self._places] = _bounded(situation.cover.eta)
+            for place, bound in zip(self._places, situation.cover.bound_for, strict=True):
+                if bound is not None:
+                    seen["bound_for"][place, bound] = 1.0
+
+    def _reward(self) -> float:
+        """Minus the minutes that events have waited since this was asked last."""
+        shift, since, waited = self._running(), self._since, 0.0
+        now = self._since = shift.now
+        going_on = []
+        for event in [*self._waiting, *shift.new_events()]:
+            end = min(event.times.get(step, math.inf) for step in ("arrived", "closed"))
+            waited += max(0.0, min(end, now) - max(since, event.times["detected"]))
+            if end > now:
+                going_on.append(event)
+        self._waiting = going_on
+        return -waited / MINUTE
+
+
+def _bounded(ways: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The same without infinity and nan."""
+    return np.where(np.isfinite(ways), np.minimum(ways, MOST), NEVER).astype(np.float32)
+
+
+def play(env: gymnasium.Env[Observations, int], policy: Policy, seed: int) -> Info:
+    """Let a policy decide a whole shift through an environment.
+
+    Args:
+        env: Made as the policy wants it (`preempts`, `auctions`, `relocates`).
+        policy: A shipped one, or your own.
+        seed: Of the shift.
+
+    Returns:
+        The last `info`, with the measures, and `return`, the sum of all rewards.
+    """
+    inner = cast("DispatchEnv", env.unwrapped)
+    _, info = env.reset(seed=seed)
+    total, over = 0.0, inner.situation is None
+    while not over:
+        assert inner.situation is not None
+        advice = policy.advise(inner.situation, inner.policy_rng)
+        asked, actions = inner.situation, inner.actions_of(advice)
+        for action in actions:
+            if over or inner.situation is not asked:
+                break  # nothing was left to decide
+            _, reward, over, _, info = env.step(action)
+            total += float(reward)
+    return {**info, "return": total}

@@ -1,0 +1,131 @@
+"""`dva_sim/Drive-v0`: drive a robot to an event by pictures that come late.
+
+The robot is asked of the DVA, started, and sent commands by the scenario's messaging pattern over
+its link, all in virtual time. What is seen is what the newest picture shows that has arrived.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from typing_extensions import override
+
+from dva_sim.agents.route_following import Route
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.full.stepping import SteppedDrive
+from dva_sim.simulation.models import model_of
+from dva_sim.simulation.scenario import Scenario, load
+
+Vector = NDArray[np.float32]
+Info = dict[str, Any]
+
+COLUMNS: Final = (
+    "way_left_m",  # along the planned way
+    "offset_m",  # from the planned way
+    "bearing_near_rad",  # to the point of the way that is NEAR ahead, to the left
+    "bearing_far_rad",  # the same for FAR
+    "speed_mps",  # as the picture shows it
+    "turn_rate_radps",
+    "picture_age_s",  # since it was taken
+    "asked_speed",  # what the last action asked for, as shares of the limits
+    "asked_turn",
+)
+NEAR, FAR = 0.8, 2.5  # [m]
+MOST: Final = 1e4  # bound of all observations
+
+
+class DriveEnv(gymnasium.Env[Vector, Vector]):
+    """One drive of one robot to the first event of a scenario.
+
+    Actions are two shares of the robot's limits, asked for until the next step: speed, 0 to 1, and
+    turn rate, -1 to 1, positive to the left. Observations are those of `COLUMNS`, float32. The way
+    is planned once, from the first picture on.
+
+    The reward of a step is the time that the way gained takes at top speed minus the time of the
+    step [s]: the return is minus the time that a drive took longer than one without any delay or
+    curve. A drive has ended when the event is within 3 m in the picture (`info["outcome"]` is
+    `arrived`), or when the robot stopped being driven (`lost`), and is cut off at the horizon.
+
+    Args:
+        scenario: A scenario of the full model by name or path.
+        changes: New values by dotted key, such as `{"link.delay_s": 0.5}`.
+        dt: Time of a step [s].
+
+    Raises:
+        ConfigError: there is no such scenario, it is of another model, or not valid.
+    """
+
+    def __init__(
+        self,
+        scenario: str = "drive-to-event",
+        *,
+        changes: Mapping[str, Any] | None = None,
+        dt: float = 0.2,
+    ) -> None:
+        document = load(scenario)
+        built = model_of(document).build(document, changes or {})
+        if not isinstance(built, Scenario):
+            raise ConfigError(f"{scenario!r} is not of the full model, in which robots are driven")
+        if not 0.0 < dt <= 10.0:
+            raise ConfigError(f"dt is {dt} s; should be above 0, up to 10")
+        self.scenario, self.dt = built, dt
+        low, high = np.array([0, -1], np.float32), np.array([1, 1], np.float32)
+        self.action_space = cast("spaces.Space[Vector]", spaces.Box(low, high))
+        box = spaces.Box(-MOST, MOST, (len(COLUMNS),), np.float32)
+        self.observation_space = cast("spaces.Space[Vector]", box)
+        self.drive: SteppedDrive | None = None
+
+    @override
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Vector, Info]:
+        """Begin a run, be given the robot, and start it.
+
+        Raises:
+            ConfigError: the robot cannot be had, as when nothing gets through to it.
+        """
+        super().reset(seed=seed)
+        drawn = int(self.np_random.integers(2**31)) if seed is None else seed
+        self.drive = SteppedDrive(self.scenario, drawn)
+        seen = self.drive.begin().observation
+        points = self.drive.run.stage.planner.path((seen.x, seen.y), self.drive.goal)
+        if points is None:
+            raise ConfigError("there is no way from the robot to the event")
+        self._route = Route(points)
+        self._asked = 0.0, 0.0
+        self._left = self._route.length
+        return self._seen(), {"outcome": ""}
+
+    @override
+    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Info]:
+        drive = self.drive
+        if drive is None:
+            raise RuntimeError("no drive has begun: call reset first")
+        speed, turn = (float(share) for share in np.asarray(action, dtype=np.float64))
+        if not np.isfinite([speed, turn]).all():
+            raise ValueError(f"an action is two finite numbers, not {speed}, {turn}")
+        self._asked = min(max(speed, 0.0), 1.0), min(max(turn, -1.0), 1.0)
+        outcome = drive.step(*self._asked, self.dt)
+        before, seen = self._left, self._seen()
+        reward = (before - self._left) / drive.limits[0] - self.dt
+        cut = not outcome and drive.now >= self.scenario.horizon_s
+        return seen, reward, bool(outcome), cut, {"outcome": outcome, "time_s": drive.now}
+
+    def _seen(self) -> Vector:
+        """What the newest picture shows; the last one, where the drive is over."""
+        drive = self.drive
+        assert drive is not None
+        if (frame := drive.frame) is not None:
+            seen = frame.observation
+            near = self._route.ahead(seen.x, seen.y, seen.heading, NEAR)
+            far = self._route.ahead(seen.x, seen.y, seen.heading, FAR)
+            self._left = far.remaining
+            age = drive.now - frame.captured
+            pose = (far.remaining, near.offset, near.bearing, far.bearing)
+            self._shown = (*pose, seen.speed, seen.turn_rate, age)
+        return np.clip(np.array([*self._shown, *self._asked], np.float32), -MOST, MOST)
