@@ -139,8 +139,8 @@ class Band:
         high: Its upper edge `(k,)`.
         pointwise_low: Lower end of each level's own interval `(k,)`.
         pointwise_high: Its upper end `(k,)`.
-        critical: Standard errors between each mean and the band's edge `(k,)`, if the level's
-            own interval does not end farther out; nan where there is no spread to measure by.
+        critical: Standard errors between each mean and the farther edge of the band `(k,)`; nan
+            where there is no spread to measure by.
         n_persons: How many persons have at least one value.
     """
 
@@ -156,10 +156,12 @@ class Band:
 def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLES) -> Band:
     """A band that holds all levels at once with the given confidence.
 
-    Its width comes from the largest studentised deviation over the levels when persons are
-    drawn anew: that respects how the levels depend on each other and how skewed they are.
-    Nowhere does it end inside a level's own interval. A level with fewer than 6 persons gets
-    Bonferroni's t, and the others share what it leaves of the chance to err.
+    It is each level's own interval at a stricter confidence, the same for all levels: the one at
+    which all of them hold at once when persons are drawn anew. That respects how the levels
+    depend on each other and how skewed each is. A deviation counts by how rare it is at its own
+    level, so that a level at which next to nobody differs, whose deviations are large in standard
+    errors, widens no other. A level with fewer than 6 persons gets Bonferroni's t, and the others
+    share what it leaves of the chance to err.
 
     Args:
         differences: One row per person `(n_persons, k)`, nan where a cell is missing.
@@ -167,38 +169,50 @@ def band(differences: ArrayLike, level: float = LEVEL, resamples: int = RESAMPLE
         resamples: How many times persons are drawn.
 
     References:
-        Westfall & Young, Resampling-Based Multiple Testing (1993), section 2.2 (max-t).
+        Westfall & Young, Resampling-Based Multiple Testing (1993), section 2.3 (min-p); Beran,
+        J. Am. Stat. Assoc. 83 (1988) 679-686 (balanced simultaneous confidence sets).
     """
     values = np.atleast_2d(np.asarray(differences, dtype=float))
     values = values[np.isfinite(values).any(axis=1)]
     mean, error, count = (x[0] for x in moments(values, np.ones((1, len(values)))))
     judged = error > 0  # neither nan nor without spread
     ratio = studentised(values[:, judged], mean[judged], error[judged], resamples)
-    down, up = np.where(count > 1, 0.0, np.nan), np.where(count > 1, 0.0, np.nan)
-    down[judged], up[judged] = reach(ratio, count[judged], level)
-    critical = np.full(len(mean), np.nan)
-    critical[judged] = _critical(ratio, count[judged], level)
-    reached = np.where(judged, critical, 0.0) * error
-    lowest, highest = mean - down * error, mean + up * error
-    low, high = np.minimum(mean - reached, lowest), np.maximum(mean + reached, highest)
+    alone, together = np.where(count > 1, 0.0, np.full((2, 2, len(mean)), np.nan))
+    alone[:, judged] = reach(ratio, count[judged], level)
+    together[:, judged] = _reach_of_all(ratio, count[judged], level)
+    together = np.maximum(together, alone)
     return Band(
         mean=mean,
-        low=low,
-        high=high,
-        pointwise_low=lowest,
-        pointwise_high=highest,
-        critical=critical,
+        low=mean - together[0] * error,
+        high=mean + together[1] * error,
+        pointwise_low=mean - alone[0] * error,
+        pointwise_high=mean + alone[1] * error,
+        critical=np.where(judged, together.max(axis=0), np.nan),
         n_persons=len(values),
     )
 
 
-def _critical(ratio: Floats, count: Floats, level: float) -> Floats:
-    """Standard errors `(k,)` that hold all levels at once; never less than the widest one alone."""
+def _reach_of_all(ratio: Floats, count: Floats, level: float) -> tuple[Floats, Floats]:
+    """Standard errors down and up to the ends of the band `(k,)`; see `reach`."""
     each = (1 - level) / max(len(count), 1)
-    critical = np.array([students_t(1 - each, int(n)) for n in count])
     many = count >= FEWEST_TO_RESAMPLE
+    down = np.array([students_t(1 - each, int(n)) for n in count])
+    up = down.copy()
     if many.any():
-        together = 1 - each * many.sum()
-        largest = np.sort(abs(ratio[:, many]).max(axis=1))[place(len(ratio), together)]
-        critical[many] = max(float(largest), students_t(together, int(count[many].min())))
-    return critical
+        stricter = 1 - max(_share_of_each(abs(ratio[:, many]), 1 - each * many.sum()), each)
+        down[many], up[many] = reach(ratio[:, many], count[many], stricter)
+    return down, up
+
+
+def _share_of_each(sizes: Floats, level: float) -> float:
+    """The chance to err at each level that leaves all of them to hold at once with `level`.
+
+    Args:
+        sizes: Deviations of persons drawn anew `(resamples, k)`.
+        level: Confidence that all hold.
+    """
+    drawn = len(sizes)
+    columns = zip(np.sort(sizes, axis=0).T, sizes.T, strict=True)
+    at_least = [drawn - np.searchsorted(ranked, of_level) for ranked, of_level in columns]
+    rarest = np.sort(np.min(at_least, axis=0))
+    return float(rarest[drawn - 1 - place(drawn, level)]) / drawn

@@ -12,6 +12,7 @@ from dva_sim.statistics import (
     mean_interval,
     quantile_interval,
     share_interval,
+    students_t,
     variance_reduction,
 )
 
@@ -142,6 +143,29 @@ def test_a_band_over_six_levels_holds_all_of_them_in_93_to_97_of_100_studies(per
         found = band(values, resamples=1000)
         held += bool(((found.low <= 0) & (found.high >= 0)).all())
     assert 0.93 <= held / studies <= 0.97
+
+
+def levels_of_which_half_are_the_same(persons, n, rng):
+    """Three levels of one line, and three at which one person in ten differs by a little."""
+    common, own = rng.normal(size=(n, persons, 1)), rng.normal(size=(n, persons, 6))
+    values = 0.8 * common + 0.6 * own
+    values[:, :, 3:] = 0.01 * own[:, :, 3:] * (rng.random((n, persons, 3)) < 0.1)
+    return values
+
+
+@pytest.mark.parametrize(
+    "studies", [150, pytest.param(5000, marks=pytest.mark.soak)], ids=["few", "many"]
+)
+def test_levels_at_which_nothing_differs_neither_widen_the_band_nor_break_it(studies):
+    """Bonferroni's would be as wide; with the largest deviation of all levels it was half wider."""
+    rng, held, widths = np.random.default_rng(2019), 0, []
+    for values in levels_of_which_half_are_the_same(24, studies, rng):
+        found = band(values, resamples=1000)
+        held += bool(((found.low <= 0) & (found.high >= 0)).all())
+        error = values[:, :3].std(axis=0, ddof=1) / np.sqrt(24)
+        widths.append((found.high - found.low)[:3] / (2 * students_t(1 - 0.05 / 6, 24) * error))
+    assert 0.93 <= held / studies <= 0.985
+    assert 0.85 < np.median(widths) < 1.05
 
 
 def pairs_and_what_is_known(persons, n, rng):

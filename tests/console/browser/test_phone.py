@@ -111,7 +111,9 @@ def test_what_takes_the_phone_from_the_hand_ends_the_drive_for_good(hand):
 
 def test_a_page_that_stands_still_for_a_moment_does_not_blame_the_sensor(hand):
     hand.drive()
-    hand.page.evaluate("{ const from = performance.now(); while (performance.now() < from + 450); }")
+    hand.page.evaluate(
+        "{ const from = performance.now(); while (performance.now() < from + 450); }"
+    )
     hand.tilt(FORWARDS)
     hand.speed("0.20")
     assert hand.sent("gone") == []
