@@ -170,7 +170,7 @@ class BusyDriver:
             return
         if self._chance.random() < 0.8:
             self._order(m.CancelMission())
-        self._finish()
+        self._finish(self._chance.uniform(1.0, 15.0))
 
     def _wait(self) -> None:
         if self._clock.now >= self._until:
@@ -180,7 +180,7 @@ class BusyDriver:
 
     def _stop(self) -> None:
         self._order(m.StopTeleOp())
-        self._finish()
+        self._finish(self._chance.uniform(1.0, 15.0))
 
     def _stop_and_go_on(self) -> None:
         self._order(m.StopTeleOp())
@@ -191,7 +191,7 @@ class BusyDriver:
         """Hold the robot without driving it, for longer than a lease lasts."""
         self._finish(KEPT)
 
-    def _finish(self, after: float = 2.0) -> None:
+    def _finish(self, after: float) -> None:
         self._does, self._until = self._wait, self._clock.now + after
 
     def _give_back(self) -> None:

@@ -24,6 +24,7 @@ Begin = Callable[[StormScene, Fault, random.Random], End | None]
 ANY: Final = ("robot", "operator", "driver", "guard", "dva")
 DRIVERS: Final = ("operator", "driver")
 ON_DRIVING: Final = ("StartTeleOp", "SetTeleOp", "PermissionGrant", "PermissionRevocation", "Reply")
+DRIVEN: Final = ("SetTeleOp", "SetTeleOp", "StartTeleOp", "PermissionGrant")
 DRIFT: Final = 200e-6  # of a robot's clock; a quartz is off by less, one that is slewed by more
 GIVEN_BACK: Final = 5.0  # after it was granted, what was asked for too much [s]
 HAND: Final = "somebody at the robot"
@@ -105,10 +106,11 @@ def _freeze(storm: StormScene, fault: Fault, chance: random.Random) -> End:
 
 
 def _replay(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    """Some of the last messages reach a node again."""
+    """Some of the last messages reach a node again, at once or within some seconds."""
     past = storm.interference.past(storm.id_of(fault.target))
+    after = chance.choice((0.0, chance.uniform(0.0, 5.0)))
     for passing in chance.sample(past, min(len(past), max(1, round(fault.value)))):
-        storm.interference.deliver(passing)
+        storm.interference.later(passing, after)
 
 
 def _replay_by_another(storm: StormScene, fault: Fault, chance: random.Random) -> None:
@@ -465,7 +467,12 @@ FAULTS: Final[dict[str, FaultKind]] = {
         on=ON_DRIVING,
     ),
     "replay": FaultKind(
-        "so many of the last messages arrive again", ANY, _replay, value=(1.0, 64.0), on=ON_DRIVING
+        "so many of the last messages arrive again",
+        ANY,
+        _replay,
+        value=(1.0, 64.0),
+        on=("StopTeleOp", "CancelMission", "StartTeleOp", "PermissionRevocation"),
+        weight=2.0,
     ),
     "replay-by-another": FaultKind(
         "an intruder sends so many of the last messages again",
@@ -570,10 +577,10 @@ FAULTS: Final[dict[str, FaultKind]] = {
         "somebody stops a robot", ("robot",), _emergency, on=ON_DRIVING, weight=3.0
     ),
     "revocation": FaultKind(
-        "the DVA ends a permission", ("robot",), _revoke, on=ON_DRIVING, weight=2.0
+        "the DVA ends a permission", ("robot",), _revoke, on=DRIVEN, weight=2.0
     ),
     "take-over": FaultKind(
-        "the DVA gives a robot to somebody else", ("robot",), _take_over, on=ON_DRIVING, weight=2.0
+        "the DVA gives a robot to somebody else", ("robot",), _take_over, on=DRIVEN, weight=2.0
     ),
     "asks-twice": FaultKind(
         "an operator asks so many times for a robot", DRIVERS, _ask_twice, value=(1.0, 5.0)

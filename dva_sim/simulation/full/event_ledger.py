@@ -19,6 +19,7 @@ from dva_sim.simulation.full.observations import Page, Right
 
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
 SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
+LOST_BY_RESTART = 1.0  # a DVA that was killed goes on from the time that it wrote last [s]
 TOLD_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
@@ -108,7 +109,7 @@ class EventLedger:
         self._felt: dict[str, float] = {}
         self._seen: dict[int, Seen] = {}
         self._open: dict[int, tuple[str, m.Position]] = {}
-        self._now = 0.0
+        self._now, self._was_down = 0.0, False
 
     # --- what is said --------------------------------------------------------------------
 
@@ -223,7 +224,11 @@ class EventLedger:
         yield from self._unheard(page.rights, now, page.works)
         if not page.works:  # what it has not kept, nobody knows when it is back
             self._let_no_time_pass(passed)
+            self._was_down = True
             return
+        if self._was_down:
+            self._was_down = False
+            self._let_no_time_pass(LOST_BY_RESTART)
         book = self._book = page.book
         if self._is_new:
             self._is_new = False

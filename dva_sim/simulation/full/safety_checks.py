@@ -28,6 +28,7 @@ from dva_sim.simulation.full.physical_world import PHYSICS_TICK
 from dva_sim.worlds.bodies import G
 
 MOVING = 0.05  # above this a robot is going somewhere [m/s]
+TURNING = 0.1  # above this it turns [rad/s]
 SLACK = 1.02  # measured speeds may exceed a limit by so much
 OBEYS_WITHIN = 5.0  # a robot may wait so long, and ten messages' processing, until it obeys [s]
 ROUNDED = 0.002  # of ticks [s]
@@ -43,9 +44,9 @@ CHECKED: Final = {
     "the hand that has taken it, within the watchdog; "
     "slack: a tick of the motors, and until it can have braked",
     "S2": "no command acts by a session that is over, no robot changes hands while it moves "
-    f"({MOVING:g} m/s), none is driven by hand that somebody holds, nor by messages that is driven "
-    f"by hand; nobody keeps a robot of whom it hears nothing valid for {LEASE:g} s, or the DVA "
-    f"nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the end, {OBEYS_WITHIN:g} s "
+    f"({MOVING:g} m/s, {TURNING:g} rad/s), none is driven by hand that somebody holds, nor by "
+    "messages that is driven by hand; nobody keeps a robot of whom it hears nothing valid for "
+    f"{LEASE:g} s, or the DVA nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the end, {OBEYS_WITHIN:g} s "
     f"and ten messages, {LEASE_SLACK:g} s of silence",
     "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
@@ -396,11 +397,8 @@ class SafetyAudit:
         if witness.in_hand(now) and motion.mode != Mode.IDLE:
             yield "S2", f"obeys {message.source} while it is driven by hand"
         another = witness.owner not in (None, message.source)
-        if another and abs(motion.speed) > MOVING and not _pushed(motion, limits, now):
-            yield (
-                "S2",
-                f"changed its driver to {message.source} while moving at {motion.speed:.2f} m/s",
-            )
+        if another and _goes(motion) and not _pushed(motion, limits, now):
+            yield "S2", f"changed its driver to {message.source} while moving at {_pace(motion)}"
         witness.owner, witness.ordered, witness.heard = message.source, asked.at, now
         does = Doing(message.source, message.session, level)
         if does != witness.does:  # who drives, and starts once more, goes on
@@ -558,23 +556,32 @@ def broken_by_moving(
     """Rules that the motion of a robot breaks now; what was pushed breaks none by moving."""
     speed, turn_rate = motion.speed, motion.turn_rate
     found: list[Broken] = []
-    if abs(speed) > MOVING:
+    if _goes(motion):
         allowed = max(witness.allowed, witness.last_mission)
         stopping = _stopping(motion, limits)
         if now > allowed + stopping:
             late = f"{now - allowed:.1f} s after it had to stop"
-            found.append(("S1", f"moves at {speed:.2f} m/s, {late}"))
+            found.append(("S1", f"moves at {_pace(motion)}, {late}"))
         if witness.stopped > witness.ordered and now > witness.stopped + stopping:
             late = f"{now - witness.stopped:.1f} s after an emergency"
-            found.append(("S3", f"moves at {speed:.2f} m/s, {late}"))
+            found.append(("S3", f"moves at {_pace(motion)}, {late}"))
     if not _is_within(speed, turn_rate, limits):
-        found.append(("S4", f"moves at {speed:.2f} m/s and {turn_rate:.2f} rad/s"))
+        found.append(("S4", f"moves at {_pace(motion)}"))
     if found and _pushed(motion, limits, now):
         found.clear()
     if not _is_within(motion.asked_speed, motion.asked_turn_rate, limits):
         asked = f"{motion.asked_speed:.2f} m/s and {motion.asked_turn_rate:.2f} rad/s"
         found.append(("S4", f"its motors were commanded to {asked}"))
     return found
+
+
+def _goes(motion: RobotMotion) -> bool:
+    """Return True if it drives or turns."""
+    return abs(motion.speed) > MOVING or abs(motion.turn_rate) > TURNING
+
+
+def _pace(motion: RobotMotion) -> str:
+    return f"{motion.speed:.2f} m/s and {motion.turn_rate:.2f} rad/s"
 
 
 def _is_within(speed: float, turn_rate: float, limits: MotorLimits) -> bool:
@@ -590,8 +597,8 @@ def _taken_by_hand(
     holder = witness.holder()
     if holder is not None:
         yield "S2", f"was taken by hand while {holder} held it"
-    if abs(motion.speed) > MOVING and not _pushed(motion, limits, now):
-        yield "S2", f"was taken by hand while moving at {motion.speed:.2f} m/s"
+    if _goes(motion) and not _pushed(motion, limits, now):
+        yield "S2", f"was taken by hand while moving at {_pace(motion)}"
 
 
 def _stopping(motion: RobotMotion, limits: MotorLimits) -> float:
