@@ -137,12 +137,18 @@ def give_back_unanswered(
         device: Whose permission.
         robot: Of the robot.
         level: As in the request.
-        is_wanted: Whether the robot is wanted again by now: then nothing is given back.
+        is_wanted: Whether the robot is wanted again: as long as it is, nothing is given back.
     """
 
     def answered(reply: m.Reply) -> None:
-        if isinstance(reply.content, m.Permission) and not is_wanted():
-            give_back(device, robot, reply.content.session)
+        if isinstance(reply.content, m.Permission):
+            let_go(reply.content.session)
+
+    def let_go(session: int) -> None:
+        if is_wanted():  # the robot may be wanted no longer before anybody asks for it
+            device.clock.call_after(GIVE_BACK_AGAIN, let_go, session)
+        else:
+            give_back(device, robot, session)
 
     def again() -> None:
         device.clock.call_after(GIVE_BACK_AGAIN, ask)

@@ -46,8 +46,9 @@ CHECKED: Final = {
     "S2": "no command acts by a session that is over, no robot changes hands while it moves "
     f"({MOVING:g} m/s, {TURNING:g} rad/s), none is driven by hand that somebody holds, nor by "
     "messages that is driven by hand; nobody keeps a robot of whom it hears nothing valid for "
-    f"{LEASE:g} s, or the DVA nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the end, {OBEYS_WITHIN:g} s "
-    f"and ten messages, {LEASE_SLACK:g} s of silence",
+    f"{LEASE:g} s, or the DVA nothing for {SILENT_AFTER:g} s; slack: until it has confirmed the "
+    f"end, {OBEYS_WITHIN:g} s and ten messages, {LEASE_SLACK:g} s of silence; of each session that "
+    "is over the robot is told",
     "S3": "nothing that came before an emergency moves a robot after it; slack: as for S1 and S2",
     "S4": "speed and turn rate, and what the motors are asked for, stay within their limits; "
     f"slack: {SLACK - 1:.0%}, and "
