@@ -187,6 +187,14 @@ def _plugins_of(trial: CheckedKind) -> Iterator[NamedThing]:
         yield NamedThing(name, description)
 
 
+_ABBREVIATED: Final = re.compile(
+    r"\b([A-Z]|al|cf|doi|ed|ff|no|pp|vol|Conf|Fig|Int|J|Proc|Symp|Trans)\.$"
+)
+
+
 def _first(text: str) -> str:
-    """The first sentence, in which initials are no end."""
-    return re.split(r"(?<=[^A-Z\s][.?!])\s+(?=[A-Z])", text)[0]
+    """The first sentence, which no initial and no abbreviation ends."""
+    for end in re.finditer(r"[.?!](?=\s+[A-Z])", text):
+        if not _ABBREVIATED.search(text[: end.end()]):
+            return text[: end.end()]
+    return text

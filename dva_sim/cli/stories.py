@@ -31,12 +31,10 @@ from dva_sim.recordings.pictures import Wanted
 from dva_sim.recordings.pictures.run_endings import story
 from dva_sim.simulation.full import Playback, Recording
 from dva_sim.simulation.full.episode_measures import RUN_COLUMNS
-from dva_sim.simulation.full.safety_checks import CHECKED_IN_SHORT
 from dva_sim.simulation.models import Tables, model_for
 from dva_sim.simulation.task import TaskScenario
 from dva_sim.simulation.timed import TimedRecording, TimedScenario
 from dva_sim.simulation.timed.recording import OUTCOMES
-from dva_sim.simulation.timed.simulation import CHECKED_OF_SHIFTS
 from dva_sim.simulation.transports import TransportScenario
 
 Row = Mapping[str, Any]
@@ -123,9 +121,8 @@ def tell_outcome(tables: Tables, how: str, console: Console) -> None:
         lines.append(f"robots: {outcome}{cause} {attempts}, {_driven(row)}")
     if tables["people"]:
         lines.append(f"people: {_fared(row, tables['people'])}")
-    counts = f"{row['messages']} messages, {row['violations']} safety rules broken"
-    counts += f" ({CHECKED_IN_SHORT})"
-    lines.append(f"{row['simulated_s']:.0f} s {how}, {counts}")
+    lines.append(f"{row['simulated_s']:.0f} s {how}, {row['messages']:,} messages")
+    lines.append(f"safety rules S1 to S7: {_violations(row['violations'])}")
     lines += _failed(row)
     print_lines(["", *lines], console)
     tell_measures(row, RUN_COLUMNS)
@@ -178,6 +175,11 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
     return ", ".join(parts)
 
 
+def _violations(count: int) -> str:
+    """Whether rules were broken, and where to read what they are."""
+    return "none was broken" if not count else f"broken {count} times; see docs/invariants.md"
+
+
 # --- a shift -------------------------------------------------------------------------
 def tell_shift(run: Played, console: Console) -> None:
     """A shift: its first events, and what it took to deal with all."""
@@ -191,8 +193,8 @@ def tell_shift(run: Played, console: Console) -> None:
     print_lines([*_shift_lines(recording), *_failed(row)], console)
     broken = sum(recording.violations.values())
     console.print(
-        f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages} messages, "
-        f"{broken} safety rules broken ({CHECKED_OF_SHIFTS})",
+        f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages:,} messages\n"
+        f"safety rules S6 and S7: {_violations(broken)}",
         soft_wrap=True,
     )
     if is_verbose() and scenario.keep == "events":

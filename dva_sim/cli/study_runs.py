@@ -31,6 +31,7 @@ _MANY = 500  # configurations, which take some seconds to check
 _MANY_RUNS = 100_000  # whose list takes seconds, too
 _LINE_S = 30.0  # between two lines of progress in a file
 _MINUTE_S, _HOUR_S = 60, 3600
+_SURE_AFTER_S, _SURE_SHARE = 10.0, 0.05  # before both, the first runs say little of the others
 
 
 def run(request: RunRequest) -> ExitCode:
@@ -228,14 +229,15 @@ class RunPace:
         self._first: tuple[int, float] | None = None
 
     def line(self, done: int, total: int) -> str:
-        """So many runs are done: their rate, and the time left at this rate."""
+        """Runs that are done, their rate, and once that says something, the time left at it."""
         now = self._clock()
         self._first = self._first or (done, now)
         made, took = done - self._first[0], now - self._first[1]
         if not made or not took:
             return f"{done}/{total} {self._things}"
         rate = made / took
-        left = "" if done == total else f", {duration((total - done) / rate)} left"
+        told = done < total and (took >= _SURE_AFTER_S or made >= _SURE_SHARE * total)
+        left = f", {duration((total - done) / rate)} left" if told else ""
         often = f"{rate:.1f} {self._things}/s"
         if rate < 1:
             often = f"{rate * _MINUTE_S:.1f} {self._things}/min"

@@ -26,6 +26,10 @@ def test_the_rate_counts_what_this_session_made_not_what_was_done_before_slow_ru
     pace = RunPace(iter([0.0, 120.0]).__next__)
     pace.line(0, 10)
     assert pace.line(3, 10).split(", ") == ["3/10 runs", "1.5 runs/min", "5 min left"]
+    pace = RunPace(iter([0.0, 9.0, 11.0]).__next__)
+    pace.line(0, 1000)
+    assert pace.line(40, 1000).split(", ") == ["40/1000 runs", "4.4 runs/s"]
+    assert pace.line(44, 1000).split(", ") == ["44/1000 runs", "4.0 runs/s", "4 min left"]
     pace = RunPace(iter([100.0, 110.0, 130.0]).__next__)
     assert pace.line(600, 1000) == "600/1000 runs"
     assert pace.line(620, 1000).split(", ") == ["620/1000 runs", "2.0 runs/s", "3 min left"]

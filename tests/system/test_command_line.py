@@ -172,7 +172,7 @@ def test_an_episode_tells_its_story_and_shows_it(tmp_path):
         cwd=tmp_path,
     )
     assert told.returncode == 0, told.stderr
-    story = ("breaks out", "assigned to operator-1", "Teleoperation", "safety rules broken")
+    story = ("breaks out", "assigned to operator-1", "Teleoperation", "safety rules")
     assert unnamed(told.stdout, *story) == []
     with Image.open(tmp_path / "both.png") as picture:
         assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 100

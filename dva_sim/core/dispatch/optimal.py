@@ -66,7 +66,7 @@ class BatchOptimal(Policy):
 
 
 class OperatorAware(BatchOptimal):
-    """As `BatchOptimal` by ETA, where sending a robot must be worth an operator.
+    """As `batch_optimal` by ETA, where sending a robot must be worth an operator.
 
     Operators are scarcer than robots, and one who drives is missing at the next event. So they
     go where a robot saves most against a person, and where it saves too little a person goes.

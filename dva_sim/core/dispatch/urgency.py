@@ -35,7 +35,7 @@ class PriorityEta(Policy):
 
 
 class Preemptive(Policy):
-    """As `PriorityEta`, but who is under way may be sent to something clearly more urgent.
+    """As `priority_eta`, but whoever is under way may be sent to something clearly more urgent.
 
     That happens only if nobody idle can serve the task well: not at all, or much later. What
     is left behind waits again, and is seen as such by the next decision.

@@ -145,7 +145,7 @@ class Truth(Generic[S]):
 
 @final
 class Oracle:
-    """The same steering as `Pursuit`, from where what is asked for now takes effect.
+    """The same steering as `pursuit`, from where what is asked for now takes effect.
 
     It is no `Strategy`, as it sees nothing. Nothing derives from it: it alone is told the truth.
 
