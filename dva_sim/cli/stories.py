@@ -177,7 +177,8 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
 
 def _violations(count: int) -> str:
     """Whether rules were broken, and where to read what they are."""
-    return "none was broken" if not count else f"broken {count} times; see docs/invariants.md"
+    times = "once" if count == 1 else f"{count} times"
+    return "none was broken" if not count else f"broken {times}; see docs/invariants.md"
 
 
 # --- a shift -------------------------------------------------------------------------
@@ -193,7 +194,8 @@ def tell_shift(run: Played, console: Console) -> None:
     print_lines([*_shift_lines(recording), *_failed(row)], console)
     broken = sum(recording.violations.values())
     console.print(
-        f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, {recording.messages:,} messages\n"
+        f"{recording.ended:.0f} s simulated in {run.took_s:.2f} s, "
+        f"{recording.messages:,} messages\n"
         f"safety rules S6 and S7: {_violations(broken)}",
         soft_wrap=True,
     )
