@@ -1,7 +1,7 @@
 """An example of a learnt policy: each pair of task and responder has a score, linear in features.
 
-`agents/learners/cross_entropy.py` finds weights by playing shifts, and begins with those below, which
-decide much as `min_eta` does. Name it as `linear.py:Linear`, with the weights found as an option.
+`agents/learners/cross_entropy.py` finds weights by playing shifts, and begins with those below,
+which decide much as `min_eta` does. Name it as `linear.py:Linear`, with the weights as an option.
 """
 
 from collections.abc import Sequence
