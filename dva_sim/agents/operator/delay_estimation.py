@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dva_sim.agents.habits import DelayHabits
+from dva_sim.agents.habits import AimingHabits, DelayHabits
 
 Floats = NDArray[np.float64]
 
@@ -121,3 +123,147 @@ class DelayEstimate:
         since, (one, other) = slice(self._filled, due), self._intent
         self._asked[0, since], self._asked[1, since] = one, other
         self._filled = due
+
+
+class PeriodEstimate:
+    """How often commands get through, as a person sees it: by when what it asks for takes effect.
+
+    A change that is asked for takes effect after the delay and the time until the next command
+    gets through. So times to effects differ by up to the period, a short move lasts until the
+    next command, and one for which there was no command has no effect. The period is taken to be
+    what the times to the last effects differ by, or by how much moves lasted longer than asked,
+    or more than the length of a move that was lost, whichever is the largest.
+
+    Args:
+        habits: Changes that are noticed, and how many effects are remembered.
+
+    Attributes:
+        value: The period; 0 until anything was seen of it [s].
+    """
+
+    LONGER = 1.5  # design: a move after one that was lost is so much longer
+    FORGETS = 0.97  # design: what a lost move taught fades with each effect that is seen
+    EARLY, LATE = 0.5, 1.5  # design: of the delay; seen sooner, it was asked for before
+    FEWEST = 3  # design: effects before which nothing is said of their spread
+
+    def __init__(self, habits: DelayHabits) -> None:
+        self._habits = habits
+        self._lags: deque[float] = deque(maxlen=habits.effects)
+        self._channels = (
+            _Channel(),
+            _Channel(),
+        )  # a turn that was lost is no less lost if one went on
+        self._lost = self._extra = self._delay = 0.0
+        self.value = 0.0
+
+    def intend(self, now: float, one: float, other: float) -> None:
+        """The person asks for this from `now` [s] on, as shares of the limits."""
+        for channel, asked in zip(self._channels, (one, other), strict=True):
+            lost = channel.ask(now, self._delay, asks=abs(asked) >= self._habits.noticed)
+            self._lost = max(self._lost, self.LONGER * lost)
+
+    def see(self, now: float, one: float, other: float, delay: float) -> float:
+        """The picture shows this motion, as shares of the limits: the period as it is taken now.
+
+        Args:
+            now: [s]
+            one: Of the motion; see `intend`.
+            other: Likewise.
+            delay: What the person takes the whole delay to be [s].
+        """
+        self._delay = delay
+        for channel, motion in zip(self._channels, (one, other), strict=True):
+            moves, move = abs(motion) >= 0.5 * self._habits.noticed, channel.move
+            channel.moves = moves
+            if move is not None:
+                channel.move = self._learn(move, now, delay, moves=moves)
+        spread = 0.0
+        if len(self._lags) >= self.FEWEST:
+            middle, late = np.quantile(self._lags, [0.5, 0.9])
+            spread = float(late - middle) / 0.4  # of times that differ evenly by up to a period
+        self.value = min(max(spread, self._extra, self._lost), self._habits.remembers_s)
+        return self.value
+
+    def _learn(self, move: _Move, now: float, delay: float, *, moves: bool) -> _Move | None:
+        """What a picture says of a move: the move, as long as more of it is to be seen."""
+        if move.seen is None and moves:
+            if now - move.begun < self.EARLY * delay:
+                return None
+            self._lags.append(now - move.begun)
+            self._lost *= self.FORGETS
+            return move._replace(seen=now)
+        if move.ended is None:
+            return move
+        asked = move.ended - move.begun
+        if move.seen is not None and not moves:
+            self._extra += 0.5 * (max(now - move.seen - asked, 0.0) - self._extra)
+            return None
+        if move.seen is None and now > move.ended + self.LATE * delay + self.value:
+            self._lost = max(self._lost, self.LONGER * asked)
+            return None
+        return move
+
+
+class _Move(NamedTuple):
+    """A motion that began at rest, and what was seen of it [s]."""
+
+    begun: float
+    ended: float | None = None
+    seen: float | None = None
+
+
+class _Channel:
+    """Speed or turn rate: whether it is asked for and seen, and the move that is followed.
+
+    Attributes:
+        move: That is followed; None: what began when something else still moved tells nothing.
+        moves: Whether motion is seen.
+    """
+
+    def __init__(self) -> None:
+        self.move: _Move | None = None
+        self._asks = self.moves = False
+
+    def ask(self, now: float, delay: float, *, asks: bool) -> float:
+        """Motion is asked for from `now` [s] on, or rest: the length of a move that was lost [s].
+
+        Args:
+            now: [s]
+            delay: After which the last move should have been seen [s].
+            asks: Whether motion is asked for.
+        """
+        lost, last = 0.0, self.move
+        if asks and not self._asks:
+            if last is not None and last.ended is not None and last.seen is None:
+                lost = last.ended - last.begun if now >= last.ended + delay else 0.0
+            known = last is None or lost > 0.0
+            self.move = _Move(now) if known and not self.moves else None
+        elif self._asks and not asks and self.move is not None:
+            self.move = self.move._replace(ended=now)
+        self._asks = asks
+        return lost
+
+
+class Timing:
+    """How a person misjudges a time: by a share of it that changes from moment to moment.
+
+    Args:
+        habits: How much, and how fast that changes.
+        rng: Luck of it.
+
+    References:
+        J. Gibbon: Scalar expectancy theory and Weber's law in animal timing. Psychological Review
+        84 (1977): the standard deviation of a judged time is a share of it.
+    """
+
+    def __init__(self, habits: AimingHabits, rng: np.random.Generator) -> None:
+        self._habits, self._rng = habits, rng
+        self._last, self._state = 0.0, float(rng.normal())
+
+    def at(self, now: float) -> float:
+        """What a time is taken to be at `now` [s], as a multiple of it."""
+        keep = math.exp(-max(now - self._last, 0.0) / self._habits.recalls_s)
+        fresh = math.sqrt(1.0 - keep * keep)
+        self._state = keep * self._state + fresh * float(self._rng.normal())
+        self._last = now
+        return math.exp(self._habits.misjudges * self._state)
