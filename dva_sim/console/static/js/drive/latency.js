@@ -13,22 +13,25 @@ const DASHES = [undefined, [6, 3]];
 
 /** @typedef {import('../lines.js').Thing} Thing */
 
-const KINDS = /** @type {{title: string, hint: string, none: string, read: (i: number) => number | null}[]} */ ([
+/** Patterns by which a robot answers no command. */
+const UNANSWERED = ['pub-sub', 'latest-wins'];
+
+const KINDS = /** @type {{title: string, hint: string, none: (i: number) => string, read: (i: number) => number | null}[]} */ ([
   {
     title: 'Command age',
-    none: 'no command yet',
+    none: () => 'no command yet',
     hint: 'how old the command in force was when the robot applied it',
     read: (i) => driveOf(i)?.command_age_ms ?? null,
   },
   {
     title: 'Round trip',
-    none: 'this pattern has no answers',
+    none: (i) => (UNANSWERED.includes(rowOf(i)?.pattern ?? '') ? 'this pattern has no answers' : 'no answer yet'),
     hint: 'from a command sent to its answer',
     read: (i) => driveOf(i)?.round_trip_ms ?? null,
   },
   {
     title: 'Picture age',
-    none: 'no picture',
+    none: () => 'no picture',
     hint: 'since the picture in sight was taken',
     read: (i) => {
       const age = pictureAge(i);
@@ -86,11 +89,11 @@ function value(history, n, none) {
   return html`<b>${msText(last)}</b> <span class="soft p95">p95 ${msText(history.p95(n))}</span>`;
 }
 
-/** @param {{history: History, robots: Thing[], none: string}} props */
+/** @param {{history: History, robots: Thing[], none: (i: number) => string}} props */
 function Figures({ history, robots, none }) {
   useEvery(500);
   return html`<p class="figures">${robots.map(
     (robot, n) => html`<span><i class=${`line line-${n} pattern-${rowOf(robot.i)?.pattern}`}></i>
-      ${robot.label} ${value(history, n, none)}</span>`,
+      ${robot.label} ${value(history, n, none(robot.i))}</span>`,
   )}</p>`;
 }

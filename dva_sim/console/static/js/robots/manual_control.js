@@ -21,12 +21,14 @@ export function ManualControl({ robot }) {
     if (connection.value !== 'open' || driveLost.value) interrupt('The connection was lost.');
   }, [connection.value, driveLost.value]);
   const may = maySteer.value;
-  const listens = windowOf(robot.i)?.station.state === 'listening';
+  const shown = windowOf(robot.i);
+  const listens = shown?.station.state === 'listening';
+  const isFree = !mine && !shown?.holder && shown?.hand === null;
   const limits = { max_speed_mps: robot.max_speed_mps, max_turn_rate_radps: robot.max_turn_rate_radps };
   return html`<section class="panel controls manual" aria-label="Manual control"><h2>Manual control</h2>
     <${Station} robot=${robot} />
     <div class="buttons">
-      <button type="button" class=${mine ? '' : 'go'} disabled=${!may || mine || !listens} onClick=${() => take(robot.i)}>Take manual control</button>
+      <button type="button" class=${isFree ? 'go' : ''} disabled=${!may || mine || !listens} onClick=${() => take(robot.i)}>Take manual control</button>
       <button type="button" disabled=${!may || !mine} onClick=${() => act('manual_release')}>Release manual control</button>
     </div>
     <p class="hint" role="status" aria-label="Manual control">${hint(robot)}</p>

@@ -83,9 +83,9 @@ function Age() {
 
 function Alarms() {
   const counts = alarms();
-  return html`<a class="item alarms" href="#/events" title="Open events, by severity">
+  return html`<a class="item alarms" href="#/events" title="Open events, by severity"><span class="word soft">alarms</span>
     ${Object.entries(counts).map(
-      ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'}>
+      ([rank, count]) => html`<span class=${count ? 'some' : 'nothing'} title=${`${count} open events of severity ${rank}`}>
         <${SeverityMark} severity=${rank} quiet=${!count} />${count}<span class="hidden">${rank}</span></span>`,
     )}</a>`;
 }
