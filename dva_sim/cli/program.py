@@ -96,7 +96,9 @@ class DvaSimProgram(PanelGroup):
     """The program itself, whose help ends with the exit codes."""
 
     panels: ClassVar[Panels] = {
-        "Studies": _named(studies.demo, studies.run, studies.new, studies.register, studies.tune),
+        "Studies": _named(
+            studies.demo, studies.run, studies.new, studies.register, studies.tune, studies.screen
+        ),
         "Results": _named(results.report, results.show, results.export, results.compare),
         "Single runs": {
             **_named(runs.episode, runs.replay, runs.live, runs.console),

@@ -9,7 +9,7 @@ from typing import Any
 import typer
 
 from dva_sim import api
-from dva_sim.cli.options import Jobs, Quiet, Verbose, asks, file, flag, takes
+from dva_sim.cli.options import REQUIRED, Jobs, Quiet, Verbose, argument, asks, file, flag, takes
 from dva_sim.cli.verbosity import loudness
 
 
@@ -99,6 +99,38 @@ def tune(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
 
     with loudness(quiet, verbose):
         code = study_runs.tune(**asked)
+    raise typer.Exit(code)
+
+
+@asks(
+    study=(argument("A study by name or path.", "STUDY"), REQUIRED),
+    out=(
+        file("Results folder; default: results/STUDY-screening.", "-o", "--out", metavar="FOLDER"),
+        None,
+    ),
+    jobs=(Jobs, None),
+    dry_run=(flag("--dry-run", "Only say what would run."), False),
+)
+def screen(
+    study: str,
+    out: str | None,
+    jobs: int | None,
+    dry_run: bool,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Find the assumed numbers that move an answer most.
+
+    Each is varied within its band; one that was interrupted goes on where it stopped.
+
+    Examples:
+        dva-sim screen req-rep-vs-pub-sub --dry-run  # how many runs, and how long they take
+        dva-sim screen req-rep-vs-pub-sub  # a table, and a figure of the five that move it most
+    """
+    from dva_sim.cli import study_runs  # late: start-up
+
+    with loudness(quiet, verbose):
+        code = study_runs.screen(study, out, jobs, dry_run)
     raise typer.Exit(code)
 
 

@@ -22,6 +22,7 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
 from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.screening import folder_of_screening, screened, screening_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
 from dva_sim.kernel.errors import ExitCode, error_line
@@ -83,6 +84,32 @@ def tune(study: str, out: str | None, jobs: int | None) -> ExitCode:
         when = ", ".join(f"{name} {level}" for name, level in choice.when.items())
         say(f"{when}: {tuned.tuning.key} {choice.value:g}")
     say(f"Kept in {save_tuned(asked, tuned)}")
+    return ExitCode.OK
+
+
+def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> ExitCode:
+    """Vary the assumed numbers behind a study's answer, and draw what moves it; the exit code."""
+    from dva_sim.experiments.analysis.screening import screen as run_all  # late: start-up
+    from dva_sim.experiments.report.figures.screening import draw_screening  # late: start-up
+
+    asked = open_study(study)
+    trials = screening_study(asked)
+    folder = Path(out or folder_of_screening(study))
+    say(f"[bold]{escape(trials.question)}[/bold]")
+    say(f"{len(screened(asked))} assumed numbers, each within its band")
+    before = dry_run(trials, folder, jobs=jobs, probe=run_job if only_plan else None)
+    say(_plan(before, folder))
+    if only_plan:
+        say(escape(_time(before)))
+        return ExitCode.OK
+    try:
+        with _shown("screening", before.runs) as show:
+            found = run_all(asked, folder, jobs=jobs, progress=show)
+    except KeyboardInterrupt as stopped:
+        return _stopped(stopped)
+    for line in draw_screening(asked, found, folder):
+        say(escape(line))
+    tell_files(folder, found.write(folder).name)
     return ExitCode.OK
 
 

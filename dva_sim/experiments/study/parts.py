@@ -291,6 +291,32 @@ class RobustnessRule(Config):
     replications: Count = 2
 
 
+class ScreeningRule(Config):
+    """Which assumed numbers are varied within their bands, to see which move the answer.
+
+    `dva-sim screen` runs it: each trajectory changes one number after the other, so that with `k`
+    numbers there are `trajectories` times `k + 1` points, each with both sides of the contrast.
+
+    Attributes:
+        over: Keys of assumed numbers, `*` for any part of them; `dva-sim assumed` lists them.
+        at: Level of the factor that the answer runs `over`; by default its last.
+        trajectories: How many.
+        persons: Simulated persons at each point, others than the study's.
+        replications: Trials of each.
+        seed: Of the screening; not that of the study.
+    """
+
+    over: Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_distinct)] = (
+        "operator.*",
+        "phone.*",
+    )
+    at: Level = None
+    trajectories: Annotated[int, Field(ge=2, le=1000)] = 8
+    persons: Count = 4
+    replications: Count = 1
+    seed: Seed
+
+
 DESIGN: dict[str, str] = {
     "part": "part of the study",
     "cell": "position of the configuration in the design, -1 for a reference run",

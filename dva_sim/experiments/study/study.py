@@ -21,6 +21,7 @@ from dva_sim.experiments.study.parts import (
     Prediction,
     RobustnessRule,
     ScenarioChanges,
+    ScreeningRule,
     Seed,
     StopRule,
     StudyPart,
@@ -72,6 +73,7 @@ class Study(Config):
         hypotheses: Claims about contrasts, by name; `dva-sim register` fixes them.
         tuning: How the level `tuned` of the factor `tuning` comes by its value.
         robustness: The answer again under other models of the persons.
+        screening: Which assumed numbers `dva-sim screen` varies; the study's own runs do not.
         stop: When enough persons were simulated.
         budget_s: Time by the clock [s] after which no further persons are begun.
         measures: Further columns of the runs: covariates of ours, such as `way_off_m`, and
@@ -99,6 +101,7 @@ class Study(Config):
     hypotheses: dict[str, Hypothesis] = Field(default_factory=dict)
     tuning: Tuning | None = None
     robustness: RobustnessRule | None = None
+    screening: ScreeningRule | None = None
     stop: StopRule | None = None
     budget_s: Annotated[float, Field(gt=0)] | None = None
     measures: tuple[str, ...] = ()
@@ -149,7 +152,8 @@ class Study(Config):
     def asked(self) -> dict[str, Any]:
         """All keys that say what is run and how it is read, as JSON would hold them."""
         unasked = [key for key in ("measures", "covariates") if not getattr(self, key)]
-        return self.model_dump(mode="json", exclude={"record", "figures", *VERSIONS, *unasked})
+        apart = {"record", "figures", "screening", *VERSIONS, *unasked}
+        return self.model_dump(mode="json", exclude=apart)
 
     @property
     def file(self) -> Path:

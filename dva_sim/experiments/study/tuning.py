@@ -19,9 +19,9 @@ from dva_sim.kernel.yaml_files import load_yaml
 
 FOLDER = "tuned"  # beside the study
 # What a study asks for, and the study that tunes its values does not.
-_LEFT = (
+LEFT = (
     *("predictions", "design", "answer", "comparisons", "hypotheses"),
-    *("tuning", "robustness", "stop", "budget_s", "record"),
+    *("tuning", "robustness", "screening", "stop", "budget_s", "record"),
 )
 
 
@@ -190,7 +190,7 @@ def tuning_study(study: Study) -> Study:
     factors |= {name: study.factors[name] for name in rule.by}
     factors[rule.key] = rule.levels
     part = study.parts[rule.part]
-    usual = {key: Study.model_fields[key] for key in _LEFT}
+    usual = {key: Study.model_fields[key] for key in LEFT}
     trials = study.model_copy(
         update={
             **{key: field.get_default(call_default_factory=True) for key, field in usual.items()},

@@ -1,0 +1,109 @@
+"""Screening: run every point, or go on with it, and say which assumed numbers move the answer."""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dva_sim.experiments.analysis.run_grid import Factor, RunGrid
+from dva_sim.experiments.execution.runner import Progress, run_study
+from dva_sim.experiments.execution.scheduling import LIMIT_S, Simulate
+from dva_sim.experiments.results.results import Results
+from dva_sim.experiments.study.parts import POINT
+from dva_sim.experiments.study.screening import rule_of, screened, screening_study, walks_of
+from dva_sim.experiments.study.study import Study
+from dva_sim.kernel.assumed import Assumption
+from dva_sim.kernel.errors import RunsFailed
+from dva_sim.statistics.morris import ElementaryEffects, elementary_effects
+
+MOST_MOVING = 5  # that figures and texts show
+TABLE = "screening.csv"
+
+
+@dataclass(frozen=True)
+class Screening:
+    """What a screening found.
+
+    Attributes:
+        numbers: Each assumed number with its effects on the answer over its whole band, in the
+            measure's unit; the one that moves it most first.
+        usual: The answer over all points, mean of the persons' differences.
+        points: How many points were run.
+        persons: Simulated persons at each.
+    """
+
+    numbers: tuple[tuple[Assumption, ElementaryEffects], ...]
+    usual: float
+    points: int
+    persons: int
+
+    @property
+    def most_moving(self) -> tuple[tuple[Assumption, ElementaryEffects], ...]:
+        """The few that move the answer most; none that does not move it at all."""
+        return tuple(each for each in self.numbers[:MOST_MOVING] if each[1].size > 0.0)
+
+    def write(self, folder: Path) -> Path:
+        """Write all numbers as a table beside the results."""
+        path = folder / TABLE
+        with path.open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            names = "key,default,low,high,unit,size,mean,mean_low,mean_high,spread"
+            table.writerow(names.split(","))
+            for each, found in self.numbers:
+                about = each.key, each.default, each.low, each.high, each.unit
+                ends = found.mean.mean, found.mean.low, found.mean.high
+                effects = [f"{value:.6g}" for value in (found.size, *ends, found.spread)]
+                table.writerow([*about, *effects])
+        return path
+
+
+def screen(
+    study: Study,
+    out: str | Path,
+    *,
+    jobs: int | None = None,
+    episode: Simulate | None = None,
+    progress: Progress | None = None,
+    limit_s: float = LIMIT_S,
+) -> Screening:
+    """Run what the folder does not hold yet, and judge all of it.
+
+    Args:
+        study: What is screened.
+        out: Results folder.
+        jobs: Processes; by default one for each core.
+        episode: Makes the tables of one run; by default a simulation.
+        progress: Called with the number of runs done and of all runs, as they finish.
+        limit_s: A run that takes longer, by the wall clock, has failed.
+
+    Raises:
+        ConfigError: the study is not screened.
+        RunsFailed: some did, so that points would be judged by different persons.
+    """
+    trials = screening_study(study)
+    run_study(trials, out, jobs=jobs, episode=episode, progress=progress, limit_s=limit_s)
+    results = Results.load(out)
+    if results.failures:
+        error = str(results.failures[0]["error"])
+        raise RunsFailed(f"{len(results.failures)} runs failed, so nothing is judged: {error}")
+    return judged(study, results)
+
+
+def judged(study: Study, results: Results) -> Screening:
+    """The effects of all assumed numbers, from the runs of every point."""
+    _, answer = rule_of(study)
+    walks, numbers = walks_of(study), screened(study)
+    count, points = walks.shape[0], walks.shape[0] * walks.shape[1]
+    factors = [Factor(POINT, tuple(range(points))), Factor(answer.factor, answer.contrast)]
+    part = RunGrid(results.table("runs"), answer.part, factors)
+    values = part.grid(answer.measure)  # (points, contrast, persons, trials)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a person without a value is left out
+        outcome = np.nanmean(values[:, 0] - values[:, 1], axis=(1, 2)).reshape(count, -1)
+    effects = zip(numbers, elementary_effects(walks, outcome), strict=True)
+    ranked = sorted(effects, key=lambda each: (-np.nan_to_num(each[1].size), each[0].key))
+    return Screening(tuple(ranked), float(np.nanmean(outcome)), points, len(part.persons))

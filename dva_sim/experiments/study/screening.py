@@ -1,0 +1,122 @@
+"""The study that screens another one: its answer again, with every assumed number within its band.
+
+One assumed number after the other is changed along trajectories (Morris), and both sides of the
+answer's contrast are run at each point, for the same persons and random numbers.
+"""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from dva_sim.experiments.study import validation
+from dva_sim.experiments.study.designs import Design, ValueRange, value_at
+from dva_sim.experiments.study.parts import POINT, Contrast, Level, Levels, ScreeningRule
+from dva_sim.experiments.study.study import Status, Study
+from dva_sim.experiments.study.tuning import LEFT
+from dva_sim.kernel.assumed import Assumption
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.streams import Streams
+from dva_sim.simulation.scenario.assumptions import all_assumptions
+from dva_sim.statistics import Floats
+from dva_sim.statistics.morris import trajectories
+
+_WIDE = 3.0  # from this ratio of its ends on, a band is divided by equal ratios
+
+
+def rule_of(study: Study) -> tuple[ScreeningRule, Contrast]:
+    """What a study is screened by, and its answer.
+
+    Raises:
+        ConfigError: it has no screening, or nothing to screen.
+    """
+    if study.screening is None or study.answer is None:
+        lacking = "screening" if study.screening is None else "answer"
+        raise ConfigError(f"{study.file} has no key {lacking!r}, so nothing is screened")
+    return study.screening, study.answer
+
+
+def screened(study: Study) -> list[Assumption]:
+    """The assumed numbers that are varied: all that the patterns name and the study does not set.
+
+    Raises:
+        ConfigError: a pattern names none.
+    """
+    rule, _ = rule_of(study)
+    every = all_assumptions()
+    for index, pattern in enumerate(rule.over):
+        if not any(fnmatchcase(each.key, pattern) for each in every):
+            problem = f"no assumed number is called {pattern!r}; 'dva-sim assumed' lists them"
+            raise study.error(problem, ("screening", "over", index))
+    return [
+        each
+        for each in every
+        if each.key not in study.factors and any(fnmatchcase(each.key, p) for p in rule.over)
+    ]
+
+
+def walks_of(study: Study) -> Floats:
+    """The trajectories `(count, numbers + 1, numbers)` in the unit cube."""
+    rule, _ = rule_of(study)
+    rng = Streams(rule.seed).fresh("screening")
+    return trajectories(len(screened(study)), rule.trajectories, rng)
+
+
+def screening_study(study: Study) -> Study:
+    """The study of all points, with persons and random numbers of its own.
+
+    Raises:
+        ConfigError: see `rule_of` and `screened`.
+    """
+    rule, answer = rule_of(study)
+    numbers = screened(study)
+    rows: list[dict[str, Level]] = [
+        {each.key: _within(each, float(place)) for each, place in zip(numbers, point, strict=True)}
+        for point in walks_of(study).reshape(-1, len(numbers))
+    ]
+    factors: dict[str, Levels] = {POINT: tuple(range(len(rows)))}
+    factors |= {name: (level,) for name, level in answer.within.items()}
+    if answer.over is not None:
+        at = study.factors[answer.over][-1] if rule.at is None else rule.at
+        factors[answer.over] = (at,)
+    factors[answer.factor] = answer.contrast
+    part = study.parts[answer.part]
+    usual = {key: Study.model_fields[key] for key in LEFT}
+    trials = study.model_copy(
+        update={
+            **{key: field.get_default(call_default_factory=True) for key, field in usual.items()},
+            "question": f"Which assumed numbers move the answer of {study.file.stem}?",
+            "seed": rule.seed,
+            "persons": rule.persons,
+            "replications": rule.replications,
+            "factors": factors,
+            "design": Design(rows=tuple(rows)),
+            "parts": {
+                answer.part: part.model_copy(update={"reference": None, "replications": None})
+            },
+        }
+    )
+    for problem, _ in validation.of_size(trials):
+        raise study.error(f"screening: {problem}", ("screening",))
+    trials._status, trials._table = Status(), None
+    return trials
+
+
+def folder_of_screening(name: str) -> Path:
+    """Where the runs of a screening go unless another folder is given."""
+    return Path("results") / f"{Path(name).stem}-screening"
+
+
+@cache
+def _range_of(number: Assumption) -> ValueRange:
+    low, high = number.low, number.high
+    if number.is_whole:
+        return ValueRange(low=low, high=high, scale="whole")
+    return ValueRange(low=low, high=high, scale="log" if 0 < low * _WIDE < high else "linear")
+
+
+def _within(number: Assumption, share: float) -> float | int:
+    return value_at(_range_of(number), float(np.clip(share, 0.0, 1.0)))
