@@ -83,12 +83,15 @@ class SupportConfig(Config):
 
     Attributes:
         strategies: Whom they speak of.
+        steering: What people did there: `closed`, they steered by what they saw; `waiting`, they
+            moved and waited.
         low_s: From.
         high_s: To.
         why: Whose data.
     """
 
     strategies: tuple[str, ...]
+    steering: Literal["closed", "waiting"]
     low_s: Annotated[float, Field(ge=0)]
     high_s: Annotated[float, Field(gt=0)]
     why: str
@@ -312,6 +315,12 @@ def supports_of(strategy: str) -> tuple[SupportConfig, ...]:
     return tuple(sorted(found, key=lambda support: support.low_s))
 
 
-def ranges(strategy: str) -> tuple[tuple[float, float], ...]:
-    """From which to which delays of the loop people were watched [s]."""
-    return tuple((support.low_s, support.high_s) for support in supports_of(strategy))
+def ranges(strategy: str, steering: str | None = None) -> tuple[tuple[float, float], ...]:
+    """Delays of the loop at which people were watched, each from and to [s].
+
+    Args:
+        strategy: Of the operators.
+        steering: `closed` or `waiting`: only of people who steered so.
+    """
+    supports = supports_of(strategy)
+    return tuple((s.low_s, s.high_s) for s in supports if steering in (None, s.steering))

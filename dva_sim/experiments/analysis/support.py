@@ -1,8 +1,13 @@
-"""Cells beyond the delays at which people were studied: extrapolations."""
+"""Cells beyond the delays at which people were studied: extrapolations.
+
+People who move and wait were watched at long delays, people who steer by what they see at short
+ones. A cell in which a loop is closed at a delay that nobody was watched at is an extrapolation,
+whatever is known of waiting there, and the other way round.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +23,8 @@ LOOP = "loop_delay_mean_s"
 
 
 PERSONAL = ("delay_human_s", "delay_hand_s")
+WAITING = "move_and_wait_share"
+SELDOM = 0.05  # a way of steering that takes less of the driving time does not count
 
 
 Marks = NDArray[np.bool_]
@@ -53,11 +60,30 @@ def support_of_part(part: RunGrid, scenario: Mapping[str, Any]) -> Support | Non
     for column in PERSONAL:
         runs = runs - np.nan_to_num(part.grid(column))
     delays = nan_mean(runs.reshape(*runs.shape[:-2], -1), axis=-1)
+    waits = _waiting(part, delays)
     outside = np.isfinite(delays)
     for name in strategies:
-        for low, high in ranges(name):
-            outside &= ~(_has(part, name) & (delays >= low) & (delays <= high))
+        covered = np.full(delays.shape, bool(ranges(name)))
+        for steering, share in (("closed", 1.0 - waits), ("waiting", waits)):
+            covered &= (share <= SELDOM) | _watched(delays, ranges(name, steering))
+        outside &= ~(_has(part, name) & covered)
     return Support(delays, outside, "; ".join(map(_coverage, strategies)))
+
+
+def _waiting(part: RunGrid, delays: Floats) -> Floats:
+    """Share of the driving time that each cell's persons moved and waited; else by strategy."""
+    if part.has(WAITING):
+        shares = part.grid(WAITING)
+        return np.nan_to_num(nan_mean(shares.reshape(*shares.shape[:-2], -1), axis=-1))
+    return np.where(_has(part, "move_and_wait"), 1.0, np.zeros(delays.shape))
+
+
+def _watched(delays: Floats, known: Sequence[tuple[float, float]]) -> Marks:
+    """Which delays lie in one of some ranges."""
+    watched = np.zeros(delays.shape, dtype=bool)
+    for low, high in known:
+        watched |= (delays >= low) & (delays <= high)
+    return watched
 
 
 def _strategies(part: RunGrid, scenario: Mapping[str, Any]) -> tuple[str, ...]:

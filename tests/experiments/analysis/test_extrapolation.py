@@ -12,8 +12,11 @@ DELAY = Factor("link.delay_s", (0.0, 0.5, 5.0))
 STRATEGY = Factor("operator.strategy", ("pursuit", "adaptive"))
 
 
-def part_of(*, extra=(), human=0.3):
-    """A person and trial for each cell; the loop is twice the delay of the link and 0.1 s more."""
+def part_of(*, extra=(), human=0.3, waits=1.0):
+    """A person and trial for each cell; the loop is twice the delay of the link and 0.1 s more.
+
+    With delay, who steers adaptively moves and waits for a share of the time.
+    """
     cells = [(delay, name) for delay in DELAY.levels for name in STRATEGY.levels]
     count = len(cells)
     delays = np.array([delay for delay, _ in cells])
@@ -28,6 +31,7 @@ def part_of(*, extra=(), human=0.3):
         "drive_time_s": 40 + delays,
         "loop_delay_mean_s": 2 * delays + 0.1 + human,
         "delay_human_s": np.full(count, human),
+        "move_and_wait_share": np.array([waits * (d > 0 and n == "adaptive") for d, n in cells]),
     }
     return RunGrid(table | dict(extra), "drive", [DELAY, STRATEGY])
 
@@ -46,8 +50,23 @@ def test_each_strategy_has_the_support_of_its_own_data():
     assert found.outside.tolist() == [[False, False], [True, False], [True, True]]
 
 
+@pytest.mark.parametrize(("waits", "is_outside"), [(1.0, False), (0.97, False), (0.55, True)])
+def test_a_loop_closed_where_people_were_only_watched_waiting_is_an_extrapolation(
+    waits, is_outside
+):
+    """At 1.1 s people moved and waited (Ferrell); nobody was watched steering by what it saw."""
+    assert support_of_part(part_of(waits=waits), {}).outside[1, 1] == is_outside
+
+
+def test_waiting_where_people_were_only_watched_steering_is_one_too():
+    part = part_of(extra={"move_and_wait_share": np.tile([0.0, 0.5], 3)}.items())
+    assert support_of_part(part, {}).outside[0].tolist() == [False, True]
+
+
 def test_between_two_ranges_nobody_was_watched():
-    part = part_of(extra={"loop_delay_mean_s": np.repeat([0.5, 1.0, 1.4], 2) + 0.3}.items())
+    shares = np.tile([0.0, 1.0], 3)
+    delays = {"loop_delay_mean_s": np.repeat([0.5, 1.0, 1.4], 2) + 0.3}
+    part = part_of(extra=(delays | {"move_and_wait_share": shares}).items())
     found = support_of_part(part, {})
     assert found.outside[:, 1].tolist() == [True, False, False]
     ranges_ = ("adaptive: 0 to 0.225 s", "pointing", "1 to 1.5 s", "move-and-wait")

@@ -71,7 +71,9 @@ def drawn(view, found):
 
 def test_repeats_at_delays_at_which_nobody_was_watched_are_told_and_drawn_hollow():
     rows = [
-        row | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
+        row
+        | {"loop_delay_mean_s": 1.4, "delay_human_s": 0.2}
+        | {"move_and_wait_share": float(row["operator.strategy"] == "adaptive")}
         for row in synthetic_results.repeat_rows(EFFECTS)
     ]
     view, found = read(EFFECTS, rows=rows)
