@@ -52,7 +52,7 @@ def _draw(found: Screening, label: str, path: Path) -> None:
         mean = each.mean
         ax.barh(row, 2 * each.size, left=-each.size, height=0.55, color=SOFT, zorder=1)
         ax.plot([mean.low, mean.high], [row, row], color=INK, linewidth=1.5, zorder=2)
-        ax.plot([mean.mean], [row], "o", color=ONE, zorder=3)
+        ax.plot([mean.mean], [row], "o", color=ONE.colour, zorder=3)
     ax.axvline(0.0, color=INK, linewidth=0.8)
     ax.set_yticks(rows, [f"{_called(number)}\n{_band(number)}" for number, _ in most])
     ax.set_xlabel(f"Effect over the whole band on {label}")
