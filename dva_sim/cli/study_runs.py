@@ -22,6 +22,7 @@ from dva_sim.experiments.results.results import Results
 from dva_sim.experiments.study.factor_levels import cells_of_repeats, runs_of, size
 from dva_sim.experiments.study.file_kinds import open_study
 from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.screening import file_of as file_of_screening
 from dva_sim.experiments.study.screening import folder_of_screening, screened, screening_study
 from dva_sim.experiments.study.study import Study
 from dva_sim.experiments.study.tuning import folder_of_tuning, save_tuned, tuning_study
@@ -89,6 +90,7 @@ def tune(study: str, out: str | None, jobs: int | None) -> ExitCode:
 
 def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> ExitCode:
     """Vary the assumed numbers behind a study's answer, and draw what moves it; the exit code."""
+    from dva_sim.experiments.analysis.screening import TABLE  # late: start-up
     from dva_sim.experiments.analysis.screening import screen as run_all  # late: start-up
     from dva_sim.experiments.report.figures.screening import draw_screening  # late: start-up
 
@@ -109,7 +111,8 @@ def screen(study: str, out: str | None, jobs: int | None, only_plan: bool) -> Ex
         return _stopped(stopped)
     for line in draw_screening(asked, found, folder):
         say(escape(line))
-    tell_files(folder, found.write(folder).name)
+    tell_files(folder, found.write(folder / TABLE).name)
+    say(f"Kept in {found.write(file_of_screening(asked))}, which the reports of other studies cite")
     return ExitCode.OK
 
 

@@ -35,7 +35,10 @@ COMMANDS = {
     "export": "export {results} -o {out}/runs.csv",
     "compare": "compare {results} {results}",
     "episode": "episode drive-to-event --set horizon_s=1",
-    **{name: f"{name} {NOBODY}" for name in ("run", "register", "tune", "screen", "report", "replay")},
+    **{
+        name: f"{name} {NOBODY}"
+        for name in ("run", "register", "tune", "screen", "report", "replay")
+    },
     "phone-log": f"phone-log {NOBODY}",
     **{name: f"{name} {NOBODY}" for name in ("live", "console", "validate", "storm")},
     "robot": f"robot {NOBODY}",

@@ -46,9 +46,9 @@ class Screening:
         """The few that move the answer most; none that does not move it at all."""
         return tuple(each for each in self.numbers[:MOST_MOVING] if each[1].size > 0.0)
 
-    def write(self, folder: Path) -> Path:
-        """Write all numbers as a table beside the results."""
-        path = folder / TABLE
+    def write(self, path: Path) -> Path:
+        """Write all numbers as a table; the same bytes for the same numbers."""
+        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("w", encoding="utf-8", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
             names = "key,default,low,high,unit,size,mean,mean_low,mean_high,spread"

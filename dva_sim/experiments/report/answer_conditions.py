@@ -28,14 +28,17 @@ from dva_sim.experiments.analysis.study_view import (
 )
 from dva_sim.experiments.report.results_reading import ResultsReading
 from dva_sim.experiments.study.parts import STRATEGY, TUNING
+from dva_sim.experiments.study.screening import MAIN, kept_keys
 from dva_sim.kernel.wording import capital, listing, number, percent, quantity
 from dva_sim.simulation.labels import brief, level_name, setting
+from dva_sim.simulation.scenario.assumptions import all_assumptions
 from dva_sim.statistics import band
 
 _WAITING = "move_and_wait_share"
 
 
 _MOST_SETTINGS = 3  # told one by one
+_MOST_KEYS = 5
 
 
 def depends(reading: ResultsReading) -> dict[str, str]:
@@ -46,6 +49,7 @@ def depends(reading: ResultsReading) -> dict[str, str]:
     told = {
         _whom(reading): _persons(reading, view, finding),
         "Settings": " ".join(_settings(reading, view, finding)),
+        "Assumptions": _assumptions(reading, finding),
         "Delays": _beyond(view, finding),
     }
     return {about: words for about, words in told.items() if words}
@@ -73,6 +77,18 @@ def _persons(reading: ResultsReading, view: StudyView, finding: Finding) -> str:
     if reading.robustness is not None:
         return f"{who} {steer}. {_under_others(reading.robustness)}"
     return f"{who} {steer}; with another, not tried here, the difference may be smaller or larger."
+
+
+def _assumptions(reading: ResultsReading, finding: Finding) -> str:
+    """How many numbers about the persons nobody measured, and which of them move an answer."""
+    if not get(reading.scenario_of(finding.part), STRATEGY):
+        return ""
+    count = len(all_assumptions())
+    told = f"{count} numbers about people and phones are assumed (dva-sim assumed)."
+    keys = kept_keys(_MOST_KEYS)
+    if not keys:
+        return f"{told} Which of them move such an answer: dva-sim screen {MAIN}."
+    return f"{told} In the screening of {MAIN} those that move it most are {listing(keys)}."
 
 
 def _how(view: StudyView, finding: Finding) -> str:

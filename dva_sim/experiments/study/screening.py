@@ -6,6 +6,7 @@ answer's contrast are run at each point, for the same persons and random numbers
 
 from __future__ import annotations
 
+import csv
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from dva_sim.experiments.study.designs import Design, ValueRange, value_at
 from dva_sim.experiments.study.parts import POINT, Contrast, Level, Levels, ScreeningRule
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.experiments.study.tuning import LEFT
+from dva_sim.kernel import resources
 from dva_sim.kernel.assumed import Assumption
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.kernel.streams import Streams
@@ -103,6 +105,26 @@ def screening_study(study: Study) -> Study:
         raise study.error(f"screening: {problem}", ("screening",))
     trials._status, trials._table = Status(), None
     return trials
+
+
+MAIN = "req-rep-vs-pub-sub"
+"""The study whose screening speaks for all others about driving."""
+KEPT = "experiments/screened"
+
+
+def file_of(study: Study) -> Path:
+    """Where what a screening found is kept: beside the study."""
+    return study.folder / "screened" / f"{study.file.stem}.csv"
+
+
+def kept_keys(most: int) -> list[str]:
+    """Keys of the numbers that move the main study's answer most; none if it was not screened."""
+    path = resources.available(KEPT, "*.csv").get(MAIN)
+    if path is None:
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if float(row["size"]) > 0.0]
+    return [row["key"] for row in rows[:most]]
 
 
 def folder_of_screening(name: str) -> Path:

@@ -13,7 +13,14 @@ from dva_sim.experiments.execution.scheduling import run_job
 from dva_sim.experiments.report.figures.screening import FIGURE, draw_screening
 from dva_sim.experiments.study.factor_levels import runs_of
 from dva_sim.experiments.study.file_kinds import open_study
-from dva_sim.experiments.study.screening import screened, screening_study
+from dva_sim.experiments.study.screening import (
+    KEPT,
+    MAIN,
+    file_of,
+    kept_keys,
+    screened,
+    screening_study,
+)
 from dva_sim.kernel.errors import ConfigError
 
 STUDY = """
@@ -79,7 +86,7 @@ def test_what_moves_the_answer_is_found_drawn_and_written(tmp_path):
     told = " ".join(draw_screening(asked, found, folder))
     assert unnamed(told, "3 of the numbers do not", first.key, second.key, FIGURE) == []
     assert (folder / FIGURE).read_bytes().startswith(b"\x89PNG")
-    rows = list(csv.DictReader(found.write(folder).read_text().splitlines()))
+    rows = list(csv.DictReader(found.write(folder / TABLE).read_text().splitlines()))
     assert [row["key"] for row in rows[:2]] == [first.key, second.key]
     assert len(rows) == len(screened(asked))
     assert (folder / TABLE).is_file()
@@ -112,3 +119,16 @@ def test_a_study_without_a_screening_says_which_key_it_lacks(tmp_path):
     with pytest.raises(ConfigError) as error:
         screening_study(study(tmp_path, text))
     assert unnamed(str(error.value), "'screening'", "mine.yaml") == []
+
+
+def test_what_a_screening_found_is_kept_beside_its_study_for_the_reports_of_others(
+    tmp_path, monkeypatch
+):
+    asked = study(tmp_path)
+    found = screen(asked, tmp_path / "out", jobs=1, episode=pretend)
+    assert file_of(asked) == tmp_path / "screened" / "mine.csv"
+    monkeypatch.chdir(tmp_path)
+    assert kept_keys(5) == []
+    found.write(tmp_path / KEPT / f"{MAIN}.csv")
+    assert kept_keys(1) == [f"{WAITING}shortest_s"]
+    assert len(kept_keys(5)) == 2  # the others do not move it at all

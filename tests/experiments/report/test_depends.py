@@ -6,6 +6,9 @@ import pytest
 from helpers.studies import synthetic_results
 from helpers.wording import unnamed
 
+from dva_sim.experiments.study.screening import KEPT, MAIN
+from dva_sim.simulation.scenario.assumptions import all_assumptions
+
 STRATEGY = {"operator": {"strategy": "adaptive"}, "phone": {"profile": "default"}}
 
 
@@ -49,6 +52,20 @@ def test_the_answer_under_the_other_settings_that_were_run_stands_beside_it(tmp_
     assert "for profile default." in settings
     assert "with profile dissertation." in settings
     assert settings.endswith("Not varied: phone default.")
+
+
+def test_the_assumed_numbers_are_counted_and_the_screening_of_the_main_study_is_cited(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    told_of = told(reading(tmp_path).answer.depends)["Assumptions"]
+    count = str(len(all_assumptions()))
+    assert unnamed(told_of, count, "dva-sim screen req-rep-vs-pub-sub") == []
+    kept = tmp_path / KEPT / f"{MAIN}.csv"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("key,size\noperator.habits.waiting.shortest_s,51.6\nphone.warming_k,0\n")
+    told_of = told(reading(tmp_path / "again").answer.depends)["Assumptions"]
+    assert told_of.endswith("are operator.habits.waiting.shortest_s.")
 
 
 def test_a_study_without_a_contrast_depends_on_nothing_that_can_be_told(tmp_path):
