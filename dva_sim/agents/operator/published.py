@@ -97,6 +97,33 @@ class SupportConfig(Config):
     why: str
 
 
+class CurveConfig(Config):
+    """Points that people gave, drawn beside what is simulated.
+
+    Attributes:
+        what: What they are.
+        source: The publication.
+        x: Conditions.
+        y: Values.
+        low: Lower ends of intervals; left out: none are known.
+        high: Upper ends.
+    """
+
+    what: str
+    source: str
+    x: Annotated[tuple[float, ...], Field(min_length=1)]
+    y: tuple[float, ...]
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+
+    @model_validator(mode="after")
+    def _as_many(self) -> CurveConfig:
+        intervals = len(self.low), len(self.high)
+        if len(self.y) != len(self.x) or intervals not in ((0, 0), (len(self.x), len(self.x))):
+            raise ValueError("x, y, low and high should be equally many")
+        return self
+
+
 class TargetFile(Config):
     """The file of targets.
 
@@ -104,12 +131,14 @@ class TargetFile(Config):
         description: What it is.
         tags: What the letters of a tag mean.
         checks: Published results by their short name.
+        curves: Points of people by the name of the figure.
         support: Delays that published data cover.
     """
 
     description: str = ""
     tags: dict[str, str]
     checks: Annotated[dict[str, CheckConfig], Field(min_length=1)]
+    curves: dict[str, CurveConfig] = Field(default_factory=dict)
     support: dict[str, SupportConfig]
 
     @model_validator(mode="after")

@@ -233,12 +233,12 @@ def log_times(trials: Trials) -> Floats:
     return np.log(trials["movement_time_s"])
 
 
-def moving_ratios(cells: Cells, added: float) -> Floats:
+def moving_ratios(cells: Cells, added: float, speeds: Sequence[float] = SPEEDS_MPS) -> Floats:
     """Of each person, time at a lag over that at none, geometric mean over speeds `(persons,)`."""
     logs = [
         person_means_of(cells[moving_cell(added, v)], log_times)
         - person_means_of(cells[moving_cell(0.0, v)], log_times)
-        for v in SPEEDS_MPS
+        for v in speeds
     ]
     return np.asarray(np.exp(np.mean(logs, axis=0)))
 

@@ -16,6 +16,7 @@ from dva_sim.experiments.report.figures.style import Drawn, panels, styled
 from dva_sim.simulation.task.movement_laws import FittedLine, fit_line
 from dva_sim.validation.frame import captioned
 from dva_sim.validation.operators import experiments as of
+from dva_sim.validation.operators.people_figures import draw_curves
 from dva_sim.validation.operators.trials import Cells, Floats, Trials, mean, person_means
 from dva_sim.validation.operators.verdicts import LineVerdict
 
@@ -289,7 +290,7 @@ _LIMIT = 1.6  # half widths of the band shown; what is further off stands at the
 def draw_all(verdicts: Sequence[LineVerdict], played: Mapping[str, Cells]) -> list[Drawn]:
     """Every figure."""
     with styled():
-        return [_overview(verdicts), *draw_people(verdicts, played)]
+        return [_overview(verdicts), *draw_people(verdicts, played), *draw_curves(played)]
 
 
 def _overview(verdicts: Sequence[LineVerdict]) -> Drawn:
