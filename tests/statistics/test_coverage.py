@@ -154,7 +154,7 @@ def levels_of_which_half_are_the_same(persons, n, rng):
 
 
 @pytest.mark.parametrize(
-    "studies", [150, pytest.param(5000, marks=pytest.mark.soak)], ids=["few", "many"]
+    "studies", [150, pytest.param(2000, marks=pytest.mark.soak)], ids=["few", "many"]
 )
 def test_levels_at_which_nothing_differs_neither_widen_the_band_nor_break_it(studies):
     """Bonferroni's would be as wide; with the largest deviation of all levels it was half wider."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dva_sim.experiments.analysis.screening import Screening
 from dva_sim.experiments.report.figures import style
-from dva_sim.experiments.report.figures.palette import INK, ONE, SOFT
+from dva_sim.experiments.report.figures.palette import FAINT, INK, ONE
 from dva_sim.experiments.study.screening import rule_of
 from dva_sim.experiments.study.study import Study
 from dva_sim.kernel.assumed import Assumption
@@ -25,7 +25,8 @@ def draw_screening(study: Study, found: Screening, folder: Path) -> Iterator[str
     first, second = (level_name(answer.factor, level) for level in answer.contrast)
     words, unit = measure_name(answer.measure), unit_of(answer.measure)
     most = found.most_moving
-    _draw(found, f"{first} minus {second} in {words} [{unit}]", folder / FIGURE)
+    with style.styled():
+        _draw(found, f"{first} minus {second} in {words} [{unit}]", folder / FIGURE)
     yield (
         f"{first} minus {second} in {words}: {found.usual:.3g} {unit} on average over "
         f"{found.points} points within the bands of {len(found.numbers)} assumed numbers, "
@@ -50,12 +51,12 @@ def _draw(found: Screening, label: str, path: Path) -> None:
     rows = list(range(len(most)))[::-1]
     for row, (_, each) in zip(rows, most, strict=True):
         mean = each.mean
-        ax.barh(row, 2 * each.size, left=-each.size, height=0.55, color=SOFT, zorder=1)
+        ax.barh(row, 2 * each.size, left=-each.size, height=0.55, color=FAINT, zorder=1)
         ax.plot([mean.low, mean.high], [row, row], color=INK, linewidth=1.5, zorder=2)
         ax.plot([mean.mean], [row], "o", color=ONE.colour, zorder=3)
     ax.axvline(0.0, color=INK, linewidth=0.8)
     ax.set_yticks(rows, [f"{_called(number)}\n{_band(number)}" for number, _ in most])
-    ax.set_xlabel(f"Effect over the whole band on {label}")
+    ax.set_xlabel(f"Effect of the whole band on\n{label}")
     ax.set_title("Assumed numbers that move the answer most", loc="left")
     note = "Bar: mean size, either way. Dot and line: mean effect and its 95 % interval."
     figure.supxlabel(note, fontsize="small")
