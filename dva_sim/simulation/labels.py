@@ -105,7 +105,8 @@ def measure_called(name: str, model: str = "") -> Measure:
 def factor_name(factor: str) -> str:
     """`link.delay_s` is the one-way delay."""
     said = _keys().get(factor)
-    return said.title if said else _OF_STUDIES.get(factor, without_unit(factor))
+    habit = factor.partition(".habits.")[2]
+    return said.title if said else _OF_STUDIES.get(factor, without_unit(habit or factor))
 
 
 def absent_at_zero(factor: str) -> str:

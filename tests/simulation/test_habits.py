@@ -5,6 +5,7 @@ from helpers.wording import unnamed
 
 from dva_sim.agents.population import Population, draw_person
 from dva_sim.kernel.errors import ConfigError
+from dva_sim.simulation.labels import with_unit
 from dva_sim.simulation.scenario import Scenario, build
 from dva_sim.simulation.scenario.assumptions import all_assumptions
 from dva_sim.simulation.scenario.parts import OperatorConfig
@@ -35,6 +36,10 @@ def test_a_scenario_changes_the_habits_of_its_population_key_by_key():
     operator = OperatorConfig.model_validate({"habits": {"attention": {"glance_s": 3.0}}})
     habits = people.habits.changed_by(operator.habits).attention
     assert (habits.glance_s, habits.reconsiders_s) == (3.0, 1.0)
+
+
+def test_a_habit_is_called_by_what_it_is_about():
+    assert with_unit("operator.habits.waiting.shortest_s") == "waiting shortest [s]"
 
 
 @pytest.mark.parametrize(
