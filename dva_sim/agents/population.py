@@ -63,8 +63,6 @@ class Population(Config):
             there.
         patience_s: How long it goes on without getting anywhere, or without seeing anything.
         switch_s: From turning to another robot's picture to understanding it.
-        tempo: Time that everything takes which the person does itself, against the median person.
-        waits_from_s: Delay at which it watches for half of the delay before it acts again.
         habits: Numbers that are the same for all persons, none of them measured.
     """
 
@@ -109,12 +107,6 @@ class Population(Config):
     switch_s: Annotated[
         Trait, Assumed(0.5, 3.0, "costs of switching a task, with a scene to be understood")
     ] = Trait(median=1.0, spread=0.3)
-    tempo: Annotated[Trait, Assumed(0.8, 1.25, "what a hurry, or care, makes of it")] = Trait(
-        median=1.0, spread=0.25
-    )
-    waits_from_s: Annotated[
-        Trait, Assumed(0.4, 1.5, "hardly anybody waits at 0.2 s, nearly all at 2 to 3 s")
-    ] = Trait(median=0.55, spread=0.4)
     habits: OperatorHabits = Field(default_factory=OperatorHabits)
 
     @property
@@ -177,8 +169,6 @@ class Person:
     search: float
     patience: float
     switch: float
-    tempo: float
-    waits_from: float
     habits: OperatorHabits = field(default_factory=OperatorHabits, kw_only=True)
 
 

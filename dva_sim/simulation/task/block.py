@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
-from dva_sim.agents.operator.delay_estimation import DelayEstimate, Timing
+from dva_sim.agents.operator.delay_estimation import DelayEstimate
 from dva_sim.agents.operator.strategies import (
     load_strategy,
 )
@@ -24,8 +23,6 @@ from dva_sim.simulation.task.trial import Seat, Trace
 from dva_sim.simulation.task.tunnel_goal import TunnelGoal
 
 Row = dict[str, Any]
-PRACTISED = 5  # trials after which a person has its own tempo; assumed
-REACTIONS = 0.23  # standard deviation of the log of a person's reactions; Goodridge et al. 2022
 PAUSE = 1.0  # between two trials, nothing is done [s]
 FINE = 0.01  # resolution at which the delay is learnt from a cursor [s]
 
@@ -76,29 +73,16 @@ def seat_of(scenario: TaskScenario) -> Seat:
     return Seat(person, load_strategy(operator.strategy, operator.options), delay)
 
 
-def practised(person: Person, number: int) -> Person:
-    """The same person after so many trials: quicker by the power law of practice.
-
-    References:
-        A. Newell, P. S. Rosenbloom: Mechanisms of skill acquisition and the law of practice, 1981.
-    """
-    share = ((number + 1) / PRACTISED) ** -person.habits.aiming.practice
-    return replace(person, tempo=person.tempo * share)
-
-
 def _play(
     scenario: TaskScenario, seed: int, drawn: int | None, recording: RecordedDelays | None = None
 ) -> Iterator[tuple[Row, Trace]]:
     seat, operator = seat_of(scenario), scenario.operator
-    who = seat.person
     conditions = list(scenario.task.conditions())
     plan = [(conditions[0], -1)] * scenario.practice
     plan += [(c, n) for n, c in enumerate(conditions) for _ in range(scenario.trials)]
     for number, (condition, cell) in enumerate(plan):
         kept = number - scenario.practice
         streams = Streams(derive_seed(seed, operator.population_seed, operator.person, number))
-        seat.person = practised(who, number)
-        seat.timing = Timing(who.habits.aiming, streams.fresh("timing"))
         trial = _trial(scenario, seat, condition, number, streams)
         if recording is not None and isinstance(trial, DriveTrial):
             trial.replay(recording, streams.fresh("recording").uniform(0.0, recording.length))
@@ -120,9 +104,7 @@ def _trial(
     number: int,
     streams: Streams,
 ) -> CursorTrial | DriveTrial:
-    task = scenario.task
-    reaction = seat.person.reaction
-    reaction *= math.exp(REACTIONS * streams.fresh("reaction").normal())
+    task, reaction = scenario.task, seat.person.reaction
     if isinstance(task, HeadingStep):
         return HeadingTrial(scenario, seat, condition, streams, reaction, leftwards=number % 2 == 0)
     if scenario.is_driven:

@@ -33,7 +33,6 @@ ENDLESS = 1000.0  # length of a way that nobody comes to the end of [m]
 MACHINE_LOOK = 1.0  # of a machine that steers by itself [m]; assumed
 CONE = 0.1  # radius in a picture [m]
 ONSET = 0.1  # share of its first peak at which a correction has begun; assumed
-SMOOTHED = 0.15  # over so long steering is averaged before it is looked at [s]; assumed
 CONE_STEP = 0.1  # between corners of the line that stands for a slalom [m]
 Points = list[Pair]
 
@@ -134,17 +133,13 @@ class DriveTrial(Trial[Observation]):
     def decide(self, driver: Driver, seen: Observation, now: float) -> None:
         """See `Trial`."""
         delay = self.seat.delay
-        delay.see(now, *self._motion(seen))
+        delay.see(now, seen.speed, seen.turn_rate)
         if isinstance(driver, Oracle):
             intent = driver.drive(self._seen_way, Truth(seen), 0.0)
         else:
             intent = driver.drive(self._seen_way, View(now, self._judged(seen), delay.value), 0.0)
         self.device.aim(intent.speed / self._top[0], intent.turn_rate / self._top[1])
         self.intended(now, intent.speed, intent.turn_rate)
-
-    def _motion(self, seen: Observation) -> Pair:
-        """What the person learns the delay from [m/s, rad/s]."""
-        return seen.speed, seen.turn_rate
 
     def _judged(self, seen: Observation) -> Observation:
         """As the person takes it: place and heading with an error."""
@@ -225,13 +220,6 @@ class HeadingTrial(DriveTrial):
         self.plant.speed = self._top[0]
         self._steered: list[float] = []  # against the error, step by step
 
-    def intended(self, now: float, one: float, other: float) -> None:
-        """The machine holds the speed: it tells nothing of the delay."""
-        super().intended(now, 0.0, other)
-
-    def _motion(self, seen: Observation) -> Pair:
-        return 0.0, seen.turn_rate
-
     def commanded(self, dt: float) -> Pair:
         """The machine holds the speed."""
         _, turn = super().commanded(dt)
@@ -245,10 +233,8 @@ class HeadingTrial(DriveTrial):
 
     def row(self) -> dict[str, Any]:
         """When the first correction began, and how long it grew [s]."""
-        over = round(SMOOTHED / self.STEP)
-        steered = np.convolve(self._steered, np.full(over, 1.0 / over), "same").tolist()
-        peak = movement_laws.first_peak(steered)
-        begun = movement_laws.first_above(steered, ONSET * steered[peak])
+        peak = movement_laws.first_peak(self._steered)
+        begun = movement_laws.first_above(self._steered, ONSET * self._steered[peak])
         return {
             **super().row(),
             "reaction_s": begun * self.STEP,

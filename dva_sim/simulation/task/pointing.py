@@ -22,7 +22,6 @@ from dva_sim.agents.operator.strategies import (
     PointView,
     Reach,
     Sighting,
-    Strategy,
     Truth,
     Velocity,
 )
@@ -31,7 +30,7 @@ from dva_sim.kernel.streams import Streams
 from dva_sim.simulation.task.devices import make_device
 from dva_sim.simulation.task.plants import Cursor, Pair
 from dva_sim.simulation.task.scenario import TaskScenario
-from dva_sim.simulation.task.tasks import Pointing, ReachTask
+from dva_sim.simulation.task.tasks import ReachTask
 from dva_sim.simulation.task.trial import Seat, Trace, Trial
 
 MOVED = 1e-3  # a cursor that has gone so far has moved [m]; assumed
@@ -124,13 +123,8 @@ class Goal(ABC):
     def draw(self, trace: Trace) -> None:
         """Add the geometry to a picture."""
 
-    def press(self, now: float) -> None:  # noqa: B027
-        """The person presses the button; some goals are reached by that."""
-
-    @property
-    def awaits_press(self) -> bool:
-        """Whether pressing the button does anything now."""
-        return False
+    def notice(self, now: float, seen: Sighting, delay: float) -> None:  # noqa: B027
+        """The person has seen a frame; some goals are reached by what it then does."""
 
     def pushed(self, now: float, wanted: Velocity) -> Velocity:
         """The command with what disturbs the cursor [m/s]."""
@@ -178,7 +172,6 @@ class CursorTrial(Trial[Sighting]):
         self.goal = goal
         self._motion, self._summed = Motion(), summed_over(scenario.frames.rate_hz)
         self.moved_at: float | None = None
-        self._eye = Strategy(seat.person, reach)
 
     def sight(self) -> Sighting:
         """Velocities are those of the last frames; see `Motion`."""
@@ -205,21 +198,12 @@ class CursorTrial(Trial[Sighting]):
         """See `Trial`."""
         delay = self.seat.delay
         delay.see(now, seen.vx, seen.vy, self._summed)
-        judged = self.seat.judged_delay(now)
-        vx, vy = self._ask(driver, seen, now, judged)
-        if self.goal.awaits_press and self._presses(driver, PointView(now, seen, judged)):
-            self.goal.press(self.now)
+        vx, vy = self._ask(driver, seen, now, delay.value)
+        self.goal.notice(self.now, seen, delay.value)
         if self.goal.flat:
             vy = 0.0
         self.device.aim(vx, vy)
         self.intended(now, vx, vy)
-
-    def _presses(self, driver: Driver, view: PointView) -> bool:
-        task = self.scenario.task
-        hurried = isinstance(task, Pointing) and task.errors == "free"
-        if isinstance(driver, Oracle):
-            return Strategy.presses(self._eye, view, hurried)
-        return driver.presses(view, hurried)
 
     def _ask(self, driver: Driver, seen: Sighting, now: float, delay: float) -> Velocity:
         path = self.goal.path

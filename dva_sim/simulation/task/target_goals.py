@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from dva_sim.agents.operator.strategies import Velocity
+from dva_sim.agents.operator.strategies import (
+    Sighting,
+    Velocity,
+)
 from dva_sim.simulation.task import movement_laws
 from dva_sim.simulation.task.plants import Cursor, Pair
 from dva_sim.simulation.task.pointing import CursorTrial, Goal
@@ -106,15 +109,15 @@ class PointGoal(ToTarget):
         """See `Goal`."""
         return self._way.at(now)
 
-    def press(self, now: float) -> None:
-        """See `Goal`."""
-        self._pressed_at = now + self._press
-        self._presses += 1
-
-    @property
-    def awaits_press(self) -> bool:
-        """See `Goal`."""
-        return self._task.selection == "click" and self._pressed_at == math.inf
+    def notice(self, now: float, seen: Sighting, delay: float) -> None:
+        """Who sees the cursor inside, so slow that it stays inside, presses."""
+        if self._task.selection != "click" or self._pressed_at < math.inf:
+            return
+        off = math.hypot(seen.x - seen.target_x, seen.y - seen.target_y)
+        drift = math.hypot(seen.vx - seen.target_vx, seen.vy - seen.target_vy)
+        if off + drift * delay <= self.tolerance:
+            self._pressed_at = now + self._press
+            self._presses += 1
 
     def check(self, now: float, x: float, y: float, dt: float) -> bool:
         """See `Goal`."""

@@ -7,11 +7,9 @@ played, with the exact checks, spread over processes.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
 from typing import Any, cast
 
 import numpy as np
@@ -220,7 +218,7 @@ def _parabola(x: Floats, y: Floats) -> float:
 # --- moving targets under late clicks: Claypool, Eg & Raaen 2017 -------------------------------
 ADDED_S = (0.0, 0.1, 0.2, 0.3, 0.4)  # on top of the local lag
 LOCAL_S = 0.1
-SPEEDS_MPS = (0.025, 0.05, 0.075)
+SPEEDS_MPS = (0.0375, 0.075, 0.1125)
 
 
 def moving_cell(added: float, speed: float) -> str:
@@ -572,29 +570,22 @@ def perform_exact(job: StudyJob) -> Tables:
 
 def perform(job: StudyJob) -> Tables:
     """All trials of one person in one cell."""
-    if "population" in dict(job.cell):
+    if isinstance(job.scenario, Person):
         part, cell = job.config.split("/")
-        return {"rows": PARTS[part](_asked_person(job), cell, job.seed)}
+        return {"rows": PARTS[part](job.scenario, cell, job.seed)}
     return {"rows": play(cast(TaskScenario, job.scenario), job.seed)}
-
-
-def _asked_person(job: StudyJob) -> Person:
-    """Who is asked, of the population that the job names."""
-    asked = dict(job.cell)
-    everybody = population(OperatorConfig()).with_medians(json.loads(str(asked["traits"])))
-    return draw_person(everybody, int(str(asked["population"])), job.person)
 
 
 def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
     """Those of each cell; a person meets the same luck in all of them."""
     jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
     if experiment.scenario is None:
-        traits = json.dumps(setting.traits or {})
-        for cell, person in product(experiment.cells, range(setting.persons)):
-            seed = derive_seed("operators", experiment.name, setting.seed, person)
-            name = f"{experiment.name}/{cell}"
-            job = job_of(name, seed, None, person=person, population=setting.seed, traits=traits)
-            jobs[cell].append(job)
+        everybody = population(OperatorConfig()).with_medians(setting.traits or {})
+        for person in range(setting.persons):
+            who = draw_person(everybody, setting.seed, person)
+            for cell in experiment.cells:
+                seed = derive_seed("operators", experiment.name, setting.seed, person)
+                jobs[cell].append(job_of(f"{experiment.name}/{cell}", seed, who, person=person))
         return jobs
     document = load_yaml(resources.find(experiment.scenario, FOLDER))
     for cell, changes in experiment.cells.items():

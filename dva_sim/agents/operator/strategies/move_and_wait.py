@@ -142,7 +142,6 @@ class MoveAndWait(Strategy):
 
     Attributes:
         trusted: How far a robot is driven in one move [m].
-        period: Between two commands that get through, as far as it is known [s].
     """
 
     def __init__(self, person: Person, reach: Reach) -> None:
@@ -151,8 +150,6 @@ class MoveAndWait(Strategy):
         self._in_curves = person.habits.steering.in_curves
         self.moves = Moves(person.reaction, habits)
         self.trusted = habits.off_way_m / max(person.heading_error + person.motor_noise, SHORTEST)
-
-    period = 0.0
 
     def drive(self, route: Route, view: View, stop_before: float) -> Intent:
         """See `Strategy`."""
@@ -249,8 +246,8 @@ class MoveAndWait(Strategy):
         return self.moves.begin(now, [(lasts, vx, vy)], self._flow(vx, vy))
 
     def _lasting(self, way: float, most: float) -> float:
-        """How long a move, or a turn, takes at most so fast [s]; what is shorter may be lost."""
-        return max(way / most, self._habits.shortest_s, self.period)
+        """How long a move, or a turn, takes at most so fast [s]."""
+        return max(way / most, self._habits.shortest_s)
 
     def _pace(self, speed: float, turn_rate: float) -> float:
         """How fast a robot moves, driving or turning, as a share of what it can."""
