@@ -7,9 +7,11 @@ played, with the exact checks, spread over processes.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any, cast
 
 import numpy as np
@@ -327,19 +329,24 @@ def pushed_values(cells: Cells) -> Values:
 
 
 # --- the first steering: Goodridge et al. 2022 -------------------------------------------------
+SOONEST_S = 1e-3  # an operator without a reaction time has one of so much, for its logarithm
+
+
+def log_reactions(trials: Trials) -> Floats:
+    """Natural logarithms of reaction times [log s], shape `(trials,)`."""
+    return np.log(np.maximum(trials["reaction_s"], SOONEST_S))
+
+
 def heading_values(cells: Cells) -> Values:
     """Reaction times by error, their spread, and how long the first correction grows."""
     errors = {int(error): own for (error,), own in cells["heading"].by("heading_error_deg")}
-    medians = {error: person_medians(own, "reaction_s") for error, own in errors.items()}
+    medians = {e: np.maximum(person_medians(t, "reaction_s"), SOONEST_S) for e, t in errors.items()}
     pulses = np.concatenate([own["pulse_s"] for own in errors.values()])
-    logs = {error: np.log(own["reaction_s"]) for error, own in errors.items()}
-    means = np.array(
-        [person_means_of(own, lambda t: np.log(t["reaction_s"])) for own in errors.values()]
-    )
+    means = np.array([person_means_of(own, log_reactions) for own in errors.values()])
     left = np.concatenate(
         [
-            logs[e] - person_means_of(own, lambda t: np.log(t["reaction_s"]))[own.person]
-            for e, own in errors.items()
+            log_reactions(own) - person_means_of(own, log_reactions)[own.person]
+            for own in errors.values()
         ]
     )
     cellwise = means.size
@@ -570,22 +577,29 @@ def perform_exact(job: StudyJob) -> Tables:
 
 def perform(job: StudyJob) -> Tables:
     """All trials of one person in one cell."""
-    if isinstance(job.scenario, Person):
+    if "population" in dict(job.cell):
         part, cell = job.config.split("/")
-        return {"rows": PARTS[part](job.scenario, cell, job.seed)}
+        return {"rows": PARTS[part](_asked_person(job), cell, job.seed)}
     return {"rows": play(cast(TaskScenario, job.scenario), job.seed)}
+
+
+def _asked_person(job: StudyJob) -> Person:
+    """Who is asked, of the population that the job names."""
+    asked = dict(job.cell)
+    everybody = population(OperatorConfig()).with_medians(json.loads(str(asked["traits"])))
+    return draw_person(everybody, int(str(asked["population"])), job.person)
 
 
 def _jobs(experiment: Experiment, setting: OperatorsSetting) -> dict[str, list[StudyJob]]:
     """Those of each cell; a person meets the same luck in all of them."""
     jobs: dict[str, list[StudyJob]] = {cell: [] for cell in experiment.cells}
     if experiment.scenario is None:
-        everybody = population(OperatorConfig()).with_medians(setting.traits or {})
-        for person in range(setting.persons):
-            who = draw_person(everybody, setting.seed, person)
-            for cell in experiment.cells:
-                seed = derive_seed("operators", experiment.name, setting.seed, person)
-                jobs[cell].append(job_of(f"{experiment.name}/{cell}", seed, who, person=person))
+        traits = json.dumps(setting.traits or {})
+        for cell, person in product(experiment.cells, range(setting.persons)):
+            seed = derive_seed("operators", experiment.name, setting.seed, person)
+            name = f"{experiment.name}/{cell}"
+            job = job_of(name, seed, None, person=person, population=setting.seed, traits=traits)
+            jobs[cell].append(job)
         return jobs
     document = load_yaml(resources.find(experiment.scenario, FOLDER))
     for cell, changes in experiment.cells.items():

@@ -117,7 +117,8 @@ def with_intervals(measure: Measure, cells: Cells, rng: np.random.Generator) -> 
         for name, drawn in draws.items():
             drawn.append(again[name])
     return {
-        name: Found(value, *_middle(draws[name]), len(persons)) for name, value in values.items()
+        name: Found(float(value), *_middle(draws[name]), len(persons))
+        for name, value in values.items()
     }
 
 
