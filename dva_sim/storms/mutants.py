@@ -512,6 +512,118 @@ def _endless_queue(original: Original, bug: Bug) -> Original:
     return wrong
 
 
+def _counts_from_now(original: Original, bug: Bug) -> Original:
+    """A command is in force from when it was read, not from when it arrived."""
+
+    def wrong(self: Any, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Any:
+        waited = now - arrived
+        decision = original(self, message, body, max(arrived, now), now)
+        if decision.code == m.OK and waited > 0.1 and arrived > self.emergency_at:
+            bug.act(f"{self.id_tag} obeys a command {waited:.1f} s too long, which had waited")
+        return decision
+
+    return wrong
+
+
+def _mission_goes_on(original: Original, bug: Bug) -> Original:
+    """An emergency stops a robot for a moment; its mission is not over."""
+
+    def wrong(self: Any, now: float) -> Any:
+        kept = self.mode, self.owner, self.mission, self.mission_status
+        decision = original(self, now)
+        if kept[0] is Mode.MISSION:
+            bug.act(f"{self.id_tag} has its mission still after an emergency")
+            self.mode, self.owner, self.mission, self.mission_status = kept
+            return Decision(decision.code, decision.text)
+        return decision
+
+    return wrong
+
+
+def _turns_too_fast(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, speed: float, turn_rate: float, until: float) -> Any:
+        original(self, speed, turn_rate, until)
+        newest = self._asked.newest
+        if abs(turn_rate) > 0.2:
+            bug.act(f"motors are asked to turn with {1.5 * turn_rate:.2f} rad/s")
+            target = TickTarget(newest[0], 2.0 * turn_rate, self._world.tick_at(until))
+            self._asked.put(self._world.next_tick(), target)
+
+    return wrong
+
+
+def _any_level(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, level: str) -> Any:
+        refusal = original(self, message, level)
+        if refusal is None or self.grant is None or not self.knows(message):
+            return refusal
+        bug.act(f"{self.id_tag} lets {message.source} act: {refusal.text}")
+        return None
+
+    return wrong
+
+
+def _swallows(original: Original, bug: Bug) -> Original:
+    """A report counts as one of any open event of its kind, wherever that is."""
+
+    def wrong(self: Any, kind: str, position: m.Position) -> Any:
+        known = original(self, kind, position)
+        if known is not None:
+            return known
+        other = next((event for event in self.open.values() if event.kind == kind), None)
+        if other is not None:
+            bug.act(f"a {kind} elsewhere counts as event {other.number}")
+        return other
+
+    return wrong
+
+
+def _meets_once(original: Original, bug: Bug) -> Original:
+    """The DVA subscribes only once to what a device publishes."""
+    met = set[tuple[int, str]]()
+
+    def wrong(self: Any, device: m.Device) -> Any:
+        key = id(self), device.id_tag
+        if key in met and device.id_tag not in self._heard:
+            bug.act(f"{device.label} is back, and the DVA does not listen to it")
+            return None
+        met.add(key)
+        return original(self, device)
+
+    return wrong
+
+
+def _keeps_all_waiting(original: Original, bug: Bug) -> Original:
+    """Any number of messages waits for an answer of the DVA, and for ever."""
+
+    def wrong(self: Any, letter: Any, message: m.Message) -> Any:
+        waiting = list(self._waiting)
+        self._waiting.clear()
+        kept = original(self, letter, message)
+        self._waiting[:0] = waiting
+        if len(self._waiting) > 64:
+            bug.act(f"{len(self._waiting)} messages wait for an answer of the DVA")
+        return kept
+
+    return wrong
+
+
+def _silent_when_busy(original: Original, bug: Bug) -> Original:
+    """Who asks for something that is not free gets no answer, and nobody counts that."""
+
+    def wrong(self: Any, request: Any, message: m.Message, handler: Any, **named: Any) -> Any:
+        def quiet(asked: m.Message) -> Any:
+            reply = handler(asked)
+            if reply is not None and reply.code == m.BUSY:
+                bug.act(f"{self.label} says nothing to {message.source}")
+                return None
+            return reply
+
+        return original(self, request, message, quiet, **named)
+
+    return wrong
+
+
 MUTANTS: Final[dict[str, Mutant]] = {
     "watchdog-too-long": Mutant(
         "S1", "a command is in force two seconds too long", f"{_ROBOT}._set", _afterwards(_longer)
@@ -764,6 +876,51 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "a message for which there is no room is dropped without a word",
         "dva_sim.agents.robot.robot:RobotAgent._turn_away",
         _skipped(),
+    ),
+    "counts-from-reading": Mutant(
+        "S1", "a command that waited is in force too long", f"{_ROBOT}._set", _counts_from_now
+    ),
+    "end-not-passed-on": Mutant(
+        "S2",
+        "no robot hears that a session is over",
+        "dva_sim.core.sessions:Sessions.tell_robot",
+        _skipped(),
+    ),
+    "mission-survives-emergency": Mutant(
+        "S3", "a mission goes on after an emergency", f"{_ROBOT}._emergency", _mission_goes_on
+    ),
+    "turns-too-fast": Mutant(
+        "S4",
+        "motors are asked to turn faster than they may",
+        "dva_sim.worlds.bodies:RobotBody.drive",
+        _turns_too_fast,
+    ),
+    "level-not-checked": Mutant(
+        "S5", "who may drive may send on missions, too", f"{_ROBOT}._refusal", _any_level
+    ),
+    "reports-swallowed": Mutant(
+        "S6",
+        "a report is taken for one of another event",
+        "dva_sim.core.events:EventBook.near",
+        _swallows,
+    ),
+    "subscribes-once": Mutant(
+        "S8",
+        "the DVA does not listen to who comes back",
+        "dva_sim.simulation.full.dva_server:DvaAgent._meet",
+        _meets_once,
+    ),
+    "questions-without-bound": Mutant(
+        "S10",
+        "any number of messages waits for the DVA's answer",
+        "dva_sim.agents.robot.confirmations:Confirmations.keep",
+        _keeps_all_waiting,
+    ),
+    "silent-when-busy": Mutant(
+        "S11",
+        "a refusal as busy is not said",
+        "dva_sim.agents.device:AgentDevice.conclude",
+        _silent_when_busy,
     ),
 }
 
