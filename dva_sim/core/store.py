@@ -4,7 +4,9 @@ Detectors report an event once and a holder is granted a robot once, so neither 
 by asking around; hence a file. What comes by itself within seconds is not kept: positions,
 modes, signs of life, auctions. Each change is kept before anything is said because of it, so
 that a DVA that was killed never promised what its next life does not know. After the kill of
-the process nothing is lost; after a power failure the last moments may be.
+the process nothing is lost; after a power failure the last moments may be. While nothing can be
+written, to a full disk for example, no permission is given, and nothing is confirmed that would
+be lost.
 
 Times are kept on a clock of their own, which goes while a DVA runs and stands while none does: how
 long an event has waited must not hang on the clock on the wall, which may be an hour off by then,
@@ -75,6 +77,7 @@ class Store:
         self._time_kept_at = -math.inf  # by the DVA's time
         self._sessions: dict[str, dict[str, str]] = {"grants": {}, "untold": {}}
         self._session_changes, self._asks = 0, False
+        self._held: dict[int, Grant] = {}  # by session, as the DVA was last seen
         self._events: dict[int, Event] = {}
         self._devices: dict[str, DeviceEntry | None] = {}
         self._lasting: set[str] = set()
@@ -124,9 +127,10 @@ class Store:
     # --- to the file -------------------------------------------------------------------
 
     def keep(self, dva: Dva, changed: Iterable[Event], now: float) -> str | None:
-        """Write down what has changed; what went wrong, in words, or None.
+        """Write down what has changed; return what went wrong, in words, or None.
 
-        What cannot be written, to a full disk for example, is tried again with the next change.
+        What cannot be written is tried again with the next call. A permission that cannot is
+        withdrawn: the next life of the DVA would give the robot to somebody else.
         """
         self._events |= {event.number: event for event in changed}
         self._devices |= dva.registry.changes()
@@ -147,11 +151,34 @@ class Store:
         except sqlite3.Error as error:
             if self._file.in_transaction:
                 self._file.execute("ROLLBACK")
+            self._withdraw(dva)
             return f"cannot keep its memory: {error}"
         self._events, self._devices, self._sessions = {}, {}, sessions
         self._session_changes, self._lasting, self._asks = changes, lasting, asks
         self._time_kept_at = now
+        if changed_sessions:
+            self._held = _held(dva)
         return None
+
+    def knows(self, session: int) -> bool:
+        """Return True for a permission that the file holds."""
+        return str(session) in self._sessions["grants"]
+
+    def _withdraw(self, dva: Dva) -> None:
+        """End each permission that is not in the file; what it has replaced holds again.
+
+        Nobody has heard of it yet, so nobody has to hear that it is over.
+        """
+        sessions = dva.sessions
+        held = _held(dva)
+        unkept = [grant for session, grant in held.items() if not self.knows(session)]
+        for grant in unkept:
+            sessions.permissions.end(grant.session)
+        for session, before in self._held.items():
+            replaced = session not in held and session not in sessions.untold
+            if replaced and any(_is_same_right(grant, before) for grant in unkept):
+                sessions.permissions.restore(before)
+        self._held = _held(dva)
 
     def _time_is_due(self, dva: Dva, now: float) -> bool:
         due = self._time_kept_at + self.keeps_time * (1 if dva.book.open else IDLE)
@@ -252,7 +279,7 @@ class Store:
             permissions.restore(_grant(json.loads(data)))
         for data in self._sessions["untold"].values():
             dva.sessions.tell_robot(PermissionRevocation(*json.loads(data)))
-        self._session_changes = _session_changes(dva)
+        self._session_changes, self._held = _session_changes(dva), _held(dva)
         self._lasting = dva.sessions.with_something_open()
         permissions.count = max(permissions.count, self._about("sessions"))
 
@@ -348,6 +375,17 @@ def _choice(kept: list[Any] | None, past: float) -> Choice | None:
 
 def _session_changes(dva: Dva) -> int:
     return dva.sessions.permissions.changes + dva.sessions.changes
+
+
+def _held(dva: Dva) -> dict[int, Grant]:
+    return {grant.session: grant for grant in dva.sessions.permissions.all()}
+
+
+def _is_same_right(one: Grant, other: Grant) -> bool:
+    """Return True if a robot cannot have both."""
+    if "sensors" in (one.level, other.level):
+        return (one.robot, one.holder, one.level) == (other.robot, other.holder, other.level)
+    return one.robot == other.robot
 
 
 def _of_sessions(dva: Dva) -> dict[str, dict[str, str]]:

@@ -12,6 +12,7 @@ from dva_sim.protocol.codec import encode
 from dva_sim.simulation.full.stage import DVA, Stage
 
 NUMBER = 900  # beyond all operators of a scenario
+BUSY_FOR = 2.0  # before the DVA is asked again [s]
 
 
 class Intruder:
@@ -82,9 +83,13 @@ class Intruder:
 
 
 def give_back(device: AgentDevice, held: m.PermissionRevocation, after: float = 0.0) -> None:
-    """Let a device give a permission back after some time [s], until the DVA has heard it."""
+    """Let a device give a permission back after some time [s], until the DVA has kept that."""
+
+    def answered(reply: m.Reply) -> None:
+        if reply.code == m.BUSY:
+            device.clock.call_after(BUSY_FOR, again)
 
     def again() -> None:
-        device.clock.call_after(after, device.ask, DVA, held, do_nothing, again)
+        device.clock.call_after(after, device.ask, DVA, held, answered, again)
 
     again()

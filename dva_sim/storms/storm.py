@@ -173,6 +173,7 @@ class Storm(StormScene):
     @override
     def dva_is_down(self, is_down: bool) -> None:
         self._excuse(DVA, is_down)
+        self.run.audit.kept_nothing_for(self.dva.lost)
 
     def _motion(self, robot: str) -> Any:
         return motion_of(self.run.field.robots[robot])

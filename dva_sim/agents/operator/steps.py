@@ -117,13 +117,17 @@ def start(
 
 
 def give_back(device: AgentDevice, robot: str, session: int) -> None:
-    """Tell the DVA that a permission is needed no longer, until it has heard that."""
+    """Tell the DVA that a permission is needed no longer, until it has heard and kept that."""
 
     def again() -> None:
         device.clock.call_after(GIVE_BACK_AGAIN, give_back, device, robot, session)
 
+    def answered(reply: m.Reply) -> None:
+        if reply.code == m.BUSY:
+            again()
+
     body = m.PermissionRevocation(robot, device.id_tag, session)
-    device.ask(device.dva, body, on_failure=again)
+    device.ask(device.dva, body, answered, again)
 
 
 def give_back_unanswered(

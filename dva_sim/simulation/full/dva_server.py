@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Final
 
 from dva_sim.agents.device import (
     AUDIT,
@@ -28,6 +29,12 @@ MOST_TOLD = 20_000  # events whose last word is remembered, so that none is said
 FIRST_BEAT = 1.27  # after the start, when hardly anything else happens at the same moment [s]
 MOST_TURNED_AWAY = 1000  # devices that were not registered, of which that was told
 TICK = 1.0  # how often the desk looks at deadlines [s]
+NOTHING_TO_KEEP: Final = (
+    *(m.Registration, m.TaskBid, m.GetGrant, m.GetDeviceList, m.GetSensorInfo),
+    *(m.GetEventList, m.GetDispatch, m.GetProposal),
+)
+"""Requests that are answered with OK even while nothing can be written: a registration is renewed
+every 10 s, and the others only ask."""
 
 
 class DvaAgent:
@@ -129,7 +136,26 @@ class DvaAgent:
             self._tell_refused(message.source, message.body, reply.text)
         self._attend()
         self._carry_out(sends)
-        return reply
+        return self._confirmed(message, reply)
+
+    def _confirmed(self, message: m.Message, reply: m.Reply) -> m.Reply:
+        """Return the reply, or a refusal where it would confirm what the memory has not kept.
+
+        What was asked is done all the same, but for permissions, and is written as soon as that
+        is possible: a report is acted on, and a session ends.
+        """
+        if not self._problem or isinstance(message.body, NOTHING_TO_KEEP):
+            return reply
+        content, ends = reply.content, isinstance(message.body, m.PermissionRevocation)
+        if isinstance(content, m.Permission) and self._is_kept(content.session):
+            return reply
+        if reply.code != m.OK and not ends:
+            return reply
+        text = "the DVA cannot write to its memory now; ask again"
+        return m.Reply(message.message_id, m.BUSY, text)
+
+    def _is_kept(self, session: int) -> bool:
+        return self._memory is None or not self._problem or self._memory.knows(session)
 
     def _tell_refused(self, source: str, wish: m.Registration, why: str) -> None:
         """Tell once of each device that is not registered: it asks again and again."""
@@ -207,6 +233,8 @@ class DvaAgent:
         self._keep_changes()
         self._count_failures()
         for send in sends:
+            if isinstance(send.body, m.PermissionGrant) and not self._is_kept(send.session):
+                continue
             if send.to not in self.desk.registry.entries:
                 self.device.clock.call_after(0.0, self._undelivered, send)
                 continue
@@ -270,9 +298,12 @@ class DvaAgent:
                 self.device.tell(f"its policy failed, so min_eta decides: {why}", "order")
 
     def _complain(self, problem: str | None) -> None:
-        """Say once what goes wrong with the memory; the DVA works on."""
-        if problem is not None and problem != self._problem:
-            self.device.tell(problem, "link")
+        """Report once that the memory cannot be written, and once that it can be again."""
+        if problem and not self._problem:
+            text = f"{problem}; until it can, it gives no permission and confirms no report"
+            self.device.tell(text, "link")
+        elif self._problem and not problem:
+            self.device.tell("keeps its memory again", "link")
         self._problem = problem
 
     def _tell(self, event: Event) -> None:

@@ -109,7 +109,8 @@ class EventLedger:
         self._felt: dict[str, float] = {}
         self._seen: dict[int, Seen] = {}
         self._open: dict[int, tuple[str, m.Position]] = {}
-        self._now, self._was_down = 0.0, False
+        self._promised: dict[int, None] = {}
+        self._now, self._was_down, self._not_kept = 0.0, False, 0.0
 
     # --- what is said --------------------------------------------------------------------
 
@@ -147,6 +148,10 @@ class EventLedger:
     def is_heard(self, source: str, now: float) -> None:
         """The DVA has heard a device, whatever it said."""
         self._heard[source] = now
+
+    def kept_nothing_for(self, seconds: float) -> None:
+        """The DVA that has been killed could write nothing for so long before [s]."""
+        self._not_kept = seconds
 
     def waits_for(self, data: bytes) -> bool:
         """Return True for an order of the DVA, or an answer that is waited for."""
@@ -228,13 +233,17 @@ class EventLedger:
             return
         if self._was_down:
             self._was_down = False
-            self._let_no_time_pass(LOST_BY_RESTART)
+            self._let_no_time_pass(LOST_BY_RESTART + self._not_kept)
+            self._not_kept = 0.0
+            self._forget_unpromised(page.book)
         book = self._book = page.book
         if self._is_new:
             self._is_new = False
             self._adopt(now)
         for report in self._taken:
-            if not self._is_booked(report):
+            booked = [*self._fitting(report)]
+            self._promised |= dict.fromkeys(booked)
+            if not booked:
                 yield "S6", f"a {report.kind} was reported, but the DVA does not list it"
         self._taken.clear()
         if sum(book.counts.values()) != book.total:
@@ -250,6 +259,7 @@ class EventLedger:
             yield "S6", f"event {number} is open and closed"
         for number in self._open.keys() - book.open.keys() - book.closed.keys():
             yield "S6", f"event {number} was open, but the DVA does not list it"
+        self._promised = {n: None for n in self._promised if n in book.open}
         known, self._open = self._open, {n: (e.kind, e.position) for n, e in book.open.items()}
         for number in known.keys() & self._open.keys():
             (kind, place), (was, before) = self._open[number], known[number]
@@ -260,12 +270,24 @@ class EventLedger:
         for event in every:
             yield from self._of_event(event, seen.get(event.number), now)
 
-    def _is_booked(self, report: m.EventReport) -> bool:
-        """Return True if the book has an event, open or closed, that fits a report."""
+    def _forget_unpromised(self, book: EventBook) -> None:
+        """Forget events of which nobody was told that they are known, if a restart has lost them.
+
+        Another event may have the number of such a one.
+        """
+        for number in [n for n in self._open if n not in self._promised]:
+            event, (kind, place) = book.open.get(number), self._open[number]
+            if event is None or event.kind != kind or apart(event.position, place) > MOVED:
+                del self._open[number]
+                self._words.pop(number, None)
+                self._seen.pop(number, None)
+
+    def _fitting(self, report: m.EventReport) -> Iterator[int]:
+        """Yield the numbers of the events, open or closed, that fit a report."""
         near, kind = max(self._rules.merge_distance, SAME_SPOT), report.kind
         known = (*self._book.open.values(), *self._book.closed.values())
         same = (e for e in known if e.kind == kind)
-        return any(apart(e.position, report.position) < near for e in same)
+        return (e.number for e in same if apart(e.position, report.position) < near)
 
     def _adopt(self, now: float) -> None:
         """Accept the first page as it is: its events are of an earlier life of the DVA.
@@ -276,6 +298,7 @@ class EventLedger:
             word = self._word(event.number)
             sent = {event.operator: event.responder, event.responder: event.responder}
             sent[event.actor] = event.actor
+            self._promised[event.number] = None
             word.ordered.update((who, goes or who) for who, goes in sent.items() if who)
             found = FOUND.intersection((*event.times, event.state.value))
             self._seen[event.number] = Seen(found, _in_hand(event), now, now)

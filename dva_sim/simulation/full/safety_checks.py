@@ -276,6 +276,10 @@ class SafetyAudit:
         """Note that the DVA has heard a device."""
         self._ledger.is_heard(device, now)
 
+    def kept_nothing_for(self, seconds: float) -> None:
+        """See `EventLedger.kept_nothing_for`."""
+        self._ledger.kept_nothing_for(seconds)
+
     def _reaches_robot(self, now: float, source: str, robot: str, data: bytes) -> None:
         witness, message = self.witness(robot), _read(data)
         if message is None or isinstance(message.body, m.Heartbeat):
