@@ -22,7 +22,7 @@ PROFILES: Final[dict[str, tuple[str, ...]]] = {
     "nodes": tuple(
         kind
         for kind in FAULTS
-        if kind.startswith(("robot", "dva", "frozen", "clock", "vanishes", "replies"))
+        if kind.startswith(("robot", "dva", "disk", "frozen", "clock", "vanishes", "replies"))
     ),
     "people": (
         *("revocation", "take-over", "emergency", "asks-twice", "old-session", "held-tilt"),

@@ -271,6 +271,33 @@ def _kill_dva_writing(storm: StormScene, fault: Fault, chance: random.Random) ->
     storm.dva.kill_at_write(chance.randrange(40), fault.value)
 
 
+def _fill_disk(storm: StormScene, fault: Fault, chance: random.Random) -> End:
+    """Let the DVA write nothing to its memory, in this life and the next."""
+    storm.dva.full += 1
+
+    def ends() -> None:
+        storm.dva.full -= 1
+
+    return ends
+
+
+def _slow_dva(storm: StormScene, fault: Fault, chance: random.Random) -> End:
+    """Let each request wait until those before it have had so much of the DVA's time."""
+    interference, free_at = storm.interference, storm.now
+
+    def meets(passing: i.PassingMessage) -> bool:
+        nonlocal free_at
+        if passing.to != DVA:
+            return False
+        free_at = max(free_at, storm.now) + fault.value
+        interference.counts[fault.kind] += 1
+        interference.later(passing, free_at - storm.now)
+        return True
+
+    interference.rules.append(meets)
+    return lambda: interference.rules.remove(meets)
+
+
 def _silence_dva(storm: StormScene, fault: Fault, chance: random.Random) -> End:
     silenced = storm.run.dva
     silenced.silence(True)
@@ -314,12 +341,15 @@ def _emergency(storm: StormScene, fault: Fault, chance: random.Random) -> None:
 
 
 def _revoke(storm: StormScene, fault: Fault, chance: random.Random) -> None:
-    storm.run.dva.revoke(storm.id_of(fault.target), None, chance.random() < 0.5)
+    if not storm.run.dva.is_gone:
+        storm.run.dva.revoke(storm.id_of(fault.target), None, chance.random() < 0.5)
 
 
 def _take_over(storm: StormScene, fault: Fault, chance: random.Random) -> None:
     """Somebody else is given the robot, unasked, starts at once, and gives it back later."""
     robot, dva = storm.id_of(fault.target), storm.run.dva
+    if dva.is_gone:  # nobody is given anything by the dead
+        return
     others = [device for device in storm.labelled if device.startswith(DRIVERS)]
     taker = storm.device(chance.choice(sorted(others)))
     dva.revoke(robot, taker.id_tag, chance.random() < 0.5)
@@ -548,6 +578,17 @@ FAULTS: Final[dict[str, FaultKind]] = {
         _kill_dva_writing,
         value=(0.5, 20.0),
         weight=2.0,
+    ),
+    "disk-full": FaultKind(
+        "the DVA cannot write to its memory", ("dva",), _fill_disk, lasts=_LONG, weight=2.0
+    ),
+    "dva-slow": FaultKind(
+        "a message takes the DVA so many seconds",
+        ("dva",),
+        _slow_dva,
+        lasts=_SHORT,
+        value=(0.002, 0.02),
+        on=("EventReport", "PermissionRequest", "GetGrant"),
     ),
     "dva-silent": FaultKind(
         "the DVA says and decides nothing", ("dva",), _silence_dva, lasts=_LONG

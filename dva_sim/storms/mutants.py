@@ -429,6 +429,15 @@ def _says_before_keeping(original: Original, bug: Bug) -> Original:
     return wrong
 
 
+def _confirms_anyway(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, reply: m.Reply) -> Any:
+        if original(self, message, reply) is not reply:
+            bug.act(f"{type(message.body).__name__} is confirmed, and not kept")
+        return reply
+
+    return wrong
+
+
 def _loses_grants(original: Original, bug: Bug) -> Original:
     """A restarted DVA has forgotten who holds what."""
 
@@ -822,6 +831,12 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "the DVA answers before it has written",
         "dva_sim.simulation.full.dva_server:DvaAgent._keep_changes",
         _says_before_keeping,
+    ),
+    "confirms-unkept": Mutant(
+        "S6",
+        "a DVA with a full disk confirms what it has not written",
+        "dva_sim.simulation.full.dva_server:DvaAgent._confirmed",
+        _confirms_anyway,
     ),
     "times-out-of-order": Mutant(
         "S7",

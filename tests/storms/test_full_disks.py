@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 from helpers.wording import unnamed
-from storms.test_storms import SMALL
+from storms.test_storms import SMALL, small
 
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA
-from dva_sim.storms.plan import StormPlan
-from dva_sim.storms.storm import Storm
+from dva_sim.storms.plan import Fault, StormPlan
+from dva_sim.storms.storm import Storm, play
 
 PLACE = m.Position(38.6612, -9.2058)
 FIRE = m.EventReport(None, "fire", PLACE, 0.5, 0.9, "detected")
@@ -160,3 +160,17 @@ def test_a_permission_that_replaces_one_and_cannot_be_kept_leaves_that_in_force(
         assert asks.ask(DVA, m.PermissionRequest(robot, "both")).code == m.BUSY
         assert asks.ask(DVA, m.PermissionRequest(robot, "teleoperation")).content == held
         assert sessions.permissions.grants[robot].session == held.session
+
+
+@pytest.mark.system
+@pytest.mark.invariant("S6", "S8")
+def test_a_storm_recovers_from_full_disks_and_kills():
+    faults = (
+        Fault("disk-full", 16.0, 30.0, "dva"),
+        Fault("dva-killed", 25.0, target="dva", value=3.0),
+        Fault("disk-full", 40.0, 20.0, "dva"),
+        Fault("dva-killed-writing", 50.0, target="dva", value=3.0),
+    )
+    plan = small(*faults, calm=80.0)
+    outcome = play(StormPlan(1, TEAM, plan.faults, plan.calm_s, drivers=1))
+    assert (outcome.breaches, outcome.error) == ([], "")
