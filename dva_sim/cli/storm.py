@@ -73,7 +73,7 @@ def storm(
     first, last = _range(seeds)
     draw(first, profile)  # an unknown profile is refused before anything starts
     if mutants:
-        raise typer.Exit(_hunt(mutants, range(first, last + 1), profile))
+        raise typer.Exit(_hunt(mutants, range(first, last + 1), profile, out))
     out.mkdir(parents=True, exist_ok=True)
     tally, known = StormTally(), 0
     numbers: Iterable[int] = itertools.count(first) if hours else range(first, last + 1)
@@ -114,16 +114,19 @@ def _replay(plan: StormPlan) -> ExitCode:
     return ExitCode.OK if outcome.is_clean else ExitCode.DOES_NOT_HOLD
 
 
-def _hunt(mutants: str, seeds: range, profile: str) -> ExitCode:
-    """Tell how many storms it takes to find each planted bug."""
-    from dva_sim.storms.hunting import hunt  # late: start-up
+def _hunt(mutants: str, seeds: range, profile: str, out: Path) -> ExitCode:
+    """Print how many storms it takes to find each planted bug, and keep that as a table."""
+    from dva_sim.storms.hunting import hunt, table  # late: start-up
     from dva_sim.storms.mutants import named  # late: start-up
 
-    missed = 0
+    hunts = []
     for mutant in named(mutants):
-        found = hunt(mutant, seeds, profile)
-        missed += not found.rules
-        typer.echo(str(found))
+        hunts.append(hunt(mutant, seeds, profile))
+        typer.echo(str(hunts[-1]))
+    missed = sum(not found.rules for found in hunts)
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "mutants.md").write_text(table(hunts), encoding="utf-8")
+    typer.echo(table(hunts))
     typer.echo(f"{missed} planted bugs were not found" if missed else "all were found")
     return ExitCode.DOES_NOT_HOLD if missed else ExitCode.OK
 

@@ -38,6 +38,16 @@ class Hunt:
         return f"{self.mutant} ({planted_for}): {found}; {acted}"
 
 
+def table(hunts: Iterable[Hunt]) -> str:
+    """Return hunts as a table in Markdown: which storm has found each bug, by which rules."""
+    lines = ["| rule | mutant | found in storm | by | acted |", "|---|---|---|---|---|"]
+    for each in hunts:
+        found = str(each.storms) if each.rules else f"not in {each.storms}"
+        rule, by = MUTANTS[each.mutant].rule, ", ".join(each.rules)
+        lines.append(f"| {rule} | {each.mutant} | {found} | {by} | {each.acts} |")
+    return "\n".join(lines) + "\n"
+
+
 def hunt(mutant: str, seeds: Iterable[int], profile: str) -> Hunt:
     """Play storms with a planted bug until a rule breaks.
 

@@ -60,6 +60,14 @@ def test_a_bug_that_does_nothing_is_not_found(monkeypatch):
     assert hunt("idle", range(1), "none").rules == ()
 
 
+def test_hunts_are_a_table_with_a_line_for_each():
+    found = hunting.Hunt("stop-ignored", 3, ("S1", "S2"), 7, "")
+    missed = hunting.Hunt("counts-wrong", 8, (), 0, "")
+    *_, first, second = hunting.table([found, missed]).splitlines()
+    assert unnamed(first, "S1", "stop-ignored", "3", "S2", "7") == []
+    assert unnamed(second, "S6", "counts-wrong", "not in 8", "0") == []
+
+
 EMERGENCY = Fault("emergency", 20.0, target="robot-*", on="SetTeleOp")
 OTHERS = (
     Fault("clock-drifts", 16.0, 5.0, "robot-1"),
