@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from helpers.dva.permissions import confirmation, give
+from helpers.dva.permissions import confirmation, give, hear
 from helpers.wording import unnamed
 
 from dva_sim.agents.robot.controller import (
@@ -73,6 +73,23 @@ def test_a_robot_that_somebody_holds_says_who_and_goes_into_no_hand(robot):
     assert robot.inquiry.next(2.0) is not None
     assert robot.take_by_hand(HERE, 2.5, moving=False).code == m.BUSY  # the DVA is being asked
     assert robot.take_by_hand(HERE, 2.0 + PATIENCE, moving=False).code == m.OK
+
+
+@pytest.mark.invariant("S2")
+def test_a_robot_that_has_restarted_asks_who_holds_it_before_it_goes_into_a_hand(robot):
+    grant = m.PermissionGrant(ANA, "teleoperation", 7)
+    say(robot, DVA, grant, 0.0)
+    robot.restart(clock_offset=5.0, now=100.0)
+    assert robot.take_by_hand(HERE, 100.03, moving=False).code == m.BUSY
+    assert robot.inquiry.next(100.1) == m.GetGrant()
+    hear(robot, confirmation(grant), 100.2)
+    assert robot.take_by_hand(HERE, 200.0, moving=False).text == f"held by {ANA}"
+
+
+@pytest.mark.invariant("S2")
+def test_a_robot_that_has_restarted_without_a_dva_goes_into_a_hand_after_a_while(robot):
+    robot.restart(clock_offset=5.0, now=100.0)
+    assert robot.take_by_hand(HERE, 100.0 + PATIENCE, moving=False).code == m.OK
 
 
 @pytest.mark.invariant("S2")

@@ -208,14 +208,15 @@ class RobotController:
         """Its computer hangs, and starts anew idle: an order that was under way is given up."""
         self._idle("its computer hung")
 
-    def restart(self, clock_offset: float) -> None:
+    def restart(self, clock_offset: float, now: float) -> None:
         """Begin again as after a restart of the program: idle, and with no known holder.
 
         Args:
             clock_offset: What its clock shows at the run's start from now on [s].
+            now: Time [s].
         """
         self._idle("its computer was restarted")
-        self.inquiry.restart()
+        self.inquiry.restart(now)
         self.grant, self.clock_offset = None, clock_offset
         self.observers.clear()
         self.last_order_id = self.last_set_id = self._numbered = 0

@@ -46,9 +46,13 @@ class Inquiry:
         """True while the question who holds the robot is open or under way."""
         return self._holder or (self.asked is not None and self.asked.level is None)
 
-    def restart(self) -> None:
-        """Forget every question."""
-        fresh = Inquiry()
+    def restart(self, now: float) -> None:
+        """Forget every question, and open the one who holds the robot, as that is forgotten, too.
+
+        Args:
+            now: From then on nobody is let at the robot for a while, as after a question [s].
+        """
+        fresh = Inquiry(asked_at=now, _holder=True)
         for name in vars(self):
             setattr(self, name, getattr(fresh, name))
 

@@ -236,16 +236,17 @@ class RobotAgent:
             self.mode_changed("")
 
     def restart(self, clock_offset: float) -> None:
-        """Restart the program: it forgets its driver and registers again.
+        """Restart the program: it forgets its driver, registers again, and asks who holds it.
 
         Args:
             clock_offset: See `RobotController.restart`.
         """
         self.hang()
-        self.controller.restart(clock_offset)
+        self.controller.restart(clock_offset, self.device.clock.now)
         self.device.restart()
         self.device.register()
         self.device.connect(self.device.dva)
+        self._confirmations.ask()
 
     def power(self, on: bool) -> None:
         """Give motors, computer and radio power, or none: then it brakes, and is silent."""
