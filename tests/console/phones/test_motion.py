@@ -51,7 +51,7 @@ def test_what_was_kept_replays_to_the_commands_that_were_sent_byte_for_byte(
     assert "motion-1.csv" in answer["text"]
     motion = read_motion(tmp_path / "motion-1.csv")
     sent = page.world.recorder.drives[-1].commands
-    assert len(sent) > 5
+    assert len(sent) >= 5
     motion.apps = motion.apps[-1:]
     looks = iter(time for time, *_ in sent)
     motion.samples = [s for s in motion.samples if s.came < sent[-1][0] + 0.1]

@@ -61,6 +61,7 @@ def replay(scenario: Scenario, seed: int, tape: Tape) -> Recording:
 
         hand_lag, keeps_alive, failures, first_failure = 0.0, tape.keeps_alive, 0, ""
         samples = values = 0
+        waits = False
 
         def __init__(self, *_: Any) -> None:
             self._looks, self._next_looks = deque(tape.looks), deque(tape.next_looks)
