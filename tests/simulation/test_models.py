@@ -16,6 +16,7 @@ SHORT = {
     "tasks/fitts-lag": {"trials": 1},
     "tasks/fitts-tilt": {"trials": 1},
     "tasks/steering-law": {"trials": 1},
+    "tasks/heading-step": {"trials": 1, "practice": 0},
     "tasks/tracking": {
         "task.record_s": 30,
         "task.frequencies_rad_s": [0.5, 1, 2, 4],
@@ -44,6 +45,7 @@ def numbers_of(name):
             "tasks/fitts-lag",
             "tasks/steering-law",
             "tasks/tracking",
+            "tasks/heading-step",
             "tasks/course",
             "tasks/excavator",
             "tasks/fitts-tilt",
