@@ -24,13 +24,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "policies"))
 
-from linear import FEATURES, Linear
+from linear import FEATURES, WEIGHTS, Linear
 
 from dva_sim.core.dispatch import MinEta, Policy
 
 SHIFT, CHANGES = "busy-shift", {"intensity": 6.9}
 POPULATION, BEST, SHIFTS = 24, 6, 6  # of a round
-LIKE_MIN_ETA = (5.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0)
 LEARNT, TESTED = 10_000, 20_000  # the first seeds of shifts to learn on, and to test on
 NOISE = 0.5  # added to the spread, less each round
 
@@ -49,9 +48,9 @@ def _value(work: tuple[Sequence[float], Sequence[int]]) -> float:
 
 
 def learn(pool: ProcessPoolExecutor, rounds: int, seed: int = 1) -> list[float]:
-    """Weights after so many rounds; they begin as what `min_eta` does."""
+    """Weights after so many rounds; they begin with those of `linear.py`."""
     rng = np.random.default_rng(seed)
-    mean, spread = np.array(LIKE_MIN_ETA), np.full(len(FEATURES), 1.0)
+    mean, spread = np.array(WEIGHTS), np.full(len(FEATURES), 1.0)
     for number in range(rounds):
         drawn = mean + spread * rng.normal(size=(POPULATION, len(FEATURES)))
         drawn[0] = mean

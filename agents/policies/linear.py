@@ -30,7 +30,7 @@ MOST = 3.0  # [100 s]; what is longer counts like this
 
 
 def features(eta: Floats, about: Floats, robot: Floats) -> Floats:
-    """What a choice depends on, for each task and responder.
+    """Features of each pair of a task and a responder.
 
     Args:
         eta: Expected time to arrival [s], shape `(tasks, responders)`; infinite for never.

@@ -19,7 +19,7 @@ from dva_sim.kernel.config import Config
 
 
 class SteeringHabits(Sparse):
-    """How a person follows a route in a closed loop.
+    """Following a route in a closed loop.
 
     Attributes:
         nearest_look_m: Shortest look-ahead.
@@ -49,7 +49,7 @@ class SteeringHabits(Sparse):
 
 
 class WaitingHabits(Sparse):
-    """How a person moves and waits, and when it changes to that.
+    """Moving and waiting, and the choice of it.
 
     Attributes:
         settled_s: Time for which the picture must stand still.
@@ -86,7 +86,7 @@ class WaitingHabits(Sparse):
 
 
 class DelayHabits(Sparse):
-    """How a person learns the delay from what it did and what it sees.
+    """Learning the delay from commands and the motion that follows.
 
     Attributes:
         first_guess_s: Delay that it expects before having seen any.
@@ -114,7 +114,7 @@ class DelayHabits(Sparse):
 
 
 class CloseQuarterHabits(Sparse):
-    """How a person drives whose robot is held back by its collision guard.
+    """Driving a robot that its collision guard holds back.
 
     Attributes:
         look_m: Look-ahead.
@@ -175,7 +175,7 @@ class StuckHabits(Sparse):
 
 
 class LookingHabits(Sparse):
-    """How a person becomes sure of an event from pictures of its place.
+    """Becoming sure of an event from pictures of its place.
 
     Attributes:
         half_seen_rad: Angle filled by what looks half like what it is.
@@ -208,7 +208,7 @@ class LookingHabits(Sparse):
 
 
 class AttentionHabits(Sparse):
-    """How a person shares its eyes among the pictures of several robots.
+    """Dividing attention among the pictures of several robots.
 
     Attributes:
         glance_s: Time for which it looks at a robot that only drives.
@@ -222,7 +222,7 @@ class AttentionHabits(Sparse):
 
 
 class AskingHabits(Sparse):
-    """How a person deals with a robot that it cannot have at once.
+    """Waiting for a robot that is not free.
 
     Attributes:
         again_after_s: Time until it asks once more for a robot that somebody else holds.
@@ -256,7 +256,7 @@ class OperatorHabits(Sparse):
 
 
 class WalkingHabits(Sparse):
-    """How a person walks, and gives way to others.
+    """Walking, and giving way to others.
 
     Attributes:
         radius_m: Radius of the disc that stands for a person, seen from above.
@@ -351,7 +351,7 @@ class OnFootHabits(Sparse):
 
 
 class GuardWorkHabits(Sparse):
-    """How a guard deals with an event.
+    """A guard's work on an event.
 
     Attributes:
         sees_from_m: Distance from which it sees what there is.
@@ -383,7 +383,7 @@ class GuardHabits(OnFootHabits):
 
 
 class NoticingHabits(Sparse):
-    """What makes a bystander notice that something is wrong.
+    """Signs by which a bystander notices that something is wrong.
 
     Attributes:
         warm_c: Air temperature.
@@ -412,7 +412,7 @@ class BystanderHabits(OnFootHabits):
 
 
 class PhoneHabits(Config):
-    """What was assumed about a phone, how it is held, and how its owner set it up.
+    """Assumptions about a phone, its grip and its settings.
 
     Attributes:
         sample_jitter: Standard deviation of the time of a sample, as a share of the time between
@@ -422,7 +422,7 @@ class PhoneHabits(Config):
         max_tilt_deg: Farthest that the hand tilts the phone away from rest.
         max_tilt_speed_deg_s: Fastest that it does.
         warming_k: Standard deviation of the temperature in a session, against the calibration's.
-        reference_error_mps2: How far off the pose that means nothing was when the owner calibrated,
+        reference_error_mps2: Error of the neutral pose when the owner calibrated,
             standard deviation of x and y; the offset of the part itself is calibrated away.
         speed_step_mps2: Acceleration along the tilt axis for one level of speed.
         turn_step_mps2: Acceleration across it for one degree per second of turn.

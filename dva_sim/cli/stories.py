@@ -176,7 +176,7 @@ def _fared(row: Row, people: list[dict[str, Any]]) -> str:
 
 
 def _violations(count: int) -> str:
-    """Whether rules were broken, and where to read what they are."""
+    """A count of broken rules in words."""
     times = "once" if count == 1 else f"{count} times"
     return "none was broken" if not count else f"broken {times}; see docs/invariants.md"
 

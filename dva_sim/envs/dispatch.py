@@ -25,10 +25,10 @@ from dva_sim.core.dispatch import (
     Situation,
 )
 from dva_sim.core.events import Event
+from dva_sim.envs.scenarios import scenario_of
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.protocol.event_kinds import EVENT_KINDS
-from dva_sim.simulation.models import model_for, model_of
-from dva_sim.simulation.scenario import load
+from dva_sim.simulation.models import model_for
 from dva_sim.simulation.timed.scenario import TimedScenario
 from dva_sim.simulation.timed.stepping import SteppedShift
 
@@ -53,7 +53,7 @@ MOST: Final = 1e7  # bound of all observations
 
 
 class DispatchEnv(gymnasium.Env[Observations, int]):
-    """Who goes where.
+    """Decisions about who goes where, one order at a time.
 
     Decisions in which nothing can be done but wait end by themselves. Actions are numbers: 0 ends
     the decision, `1 + task * units + unit` sends a unit to a task, and where they are asked for,
@@ -99,13 +99,9 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
         auctions: bool = False,
         relocates: bool = False,
     ) -> None:
-        document = load(scenario)
-        built = model_of(document).build(document, changes or {})
-        if not isinstance(built, TimedScenario):
-            raise ConfigError(f"{scenario!r} is not of the timed model, which dispatch is about")
         if tasks < 1:
             raise ConfigError(f"tasks is {tasks}; should be a whole number from 1")
-        self.scenario = built
+        self.scenario = built = scenario_of(scenario, changes, TimedScenario, "timed")
         self._flags = {"preempts": preempts, "auctions": auctions, "relocates": relocates}
         self._tasks = tasks
         self._units = sum(group.count for group in built.responders)
@@ -124,7 +120,7 @@ class DispatchEnv(gymnasium.Env[Observations, int]):
 
     @property
     def situation(self) -> Situation | None:
-        """What the DVA asks about, as policies see it; None between shifts."""
+        """The situation that the DVA asks about, as policies see it; None between shifts."""
         return None if self._shift is None else self._shift.situation
 
     @property

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from typing_extensions import override
 
 from dva_sim.agents.route_following import Route
+from dva_sim.envs.scenarios import scenario_of
 from dva_sim.kernel.errors import ConfigError
 from dva_sim.simulation.full.stepping import SteppedDrive
-from dva_sim.simulation.models import model_of
-from dva_sim.simulation.scenario import Scenario, load
+from dva_sim.simulation.scenario import Scenario
 
 Vector = NDArray[np.float32]
 Info = dict[str, Any]
@@ -67,13 +67,9 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         changes: Mapping[str, Any] | None = None,
         dt: float = 0.2,
     ) -> None:
-        document = load(scenario)
-        built = model_of(document).build(document, changes or {})
-        if not isinstance(built, Scenario):
-            raise ConfigError(f"{scenario!r} is not of the full model, in which robots are driven")
         if not 0.0 < dt <= 10.0:
             raise ConfigError(f"dt is {dt} s; should be above 0, up to 10")
-        self.scenario, self.dt = built, dt
+        self.scenario, self.dt = scenario_of(scenario, changes, Scenario, "full"), dt
         low, high = np.array([0, -1], np.float32), np.array([1, 1], np.float32)
         self.action_space = cast("spaces.Space[Vector]", spaces.Box(low, high))
         box = spaces.Box(-MOST, MOST, (len(COLUMNS),), np.float32)
@@ -117,7 +113,7 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         return seen, reward, bool(outcome), cut, {"outcome": outcome, "time_s": drive.now}
 
     def _seen(self) -> Vector:
-        """What the newest picture shows; the last one, where the drive is over."""
+        """The newest picture as an observation; the last one, where the drive is over."""
         drive = self.drive
         assert drive is not None
         if (frame := drive.frame) is not None:

@@ -29,7 +29,7 @@ STILL = 1.0 / 3.0  # source: Nuthmann 2017: a still picture is worth one fixatio
 
 
 def clearness(angle: float, half_seen: float) -> float:
-    """How much something looks like what it is, from 0 to 1, by the angle that it fills [rad].
+    """Clearness of something in a picture, from 0 to 1, by the angle that it fills [rad].
 
     Args:
         angle: [rad]

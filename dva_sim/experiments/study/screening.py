@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dva_sim.experiments.study import validation
 from dva_sim.experiments.study.designs import Design, ValueRange, value_at
 from dva_sim.experiments.study.parts import POINT, Contrast, Level, Levels, ScreeningRule
-from dva_sim.experiments.study.study import Status, Study
-from dva_sim.experiments.study.tuning import LEFT
+from dva_sim.experiments.study.study import Study
+from dva_sim.experiments.study.tuning import trials_of
 from dva_sim.kernel import resources
 from dva_sim.kernel.assumed import Assumption
 from dva_sim.kernel.errors import ConfigError
@@ -85,26 +84,10 @@ def screening_study(study: Study) -> Study:
         at = study.factors[answer.over][-1] if rule.at is None else rule.at
         factors[answer.over] = (at,)
     factors[answer.factor] = answer.contrast
-    part = study.parts[answer.part]
-    usual = {key: Study.model_fields[key] for key in LEFT}
-    trials = study.model_copy(
-        update={
-            **{key: field.get_default(call_default_factory=True) for key, field in usual.items()},
-            "question": f"Which assumed numbers move the answer of {study.file.stem}?",
-            "seed": rule.seed,
-            "persons": rule.persons,
-            "replications": rule.replications,
-            "factors": factors,
-            "design": Design(rows=tuple(rows)),
-            "parts": {
-                answer.part: part.model_copy(update={"reference": None, "replications": None})
-            },
-        }
-    )
-    for problem, _ in validation.of_size(trials):
-        raise study.error(f"screening: {problem}", ("screening",))
-    trials._status, trials._table = Status(), None
-    return trials
+    question = f"Which assumed numbers move the answer of {study.file.stem}?"
+    design = Design(rows=tuple(rows))
+    changes = {"question": question, "factors": factors, "design": design}
+    return trials_of(study, "screening", rule, answer.part, **changes)
 
 
 MAIN = "req-rep-vs-pub-sub"
@@ -113,7 +96,7 @@ KEPT = "experiments/screened"
 
 
 def file_of(study: Study) -> Path:
-    """Where what a screening found is kept: beside the study."""
+    """File beside the study that keeps what a screening found."""
     return study.folder / "screened" / f"{study.file.stem}.csv"
 
 
@@ -128,7 +111,7 @@ def kept_keys(most: int) -> list[str]:
 
 
 def folder_of_screening(name: str) -> Path:
-    """Where the runs of a screening go unless another folder is given."""
+    """Default results folder of a screening."""
     return Path("results") / f"{Path(name).stem}-screening"
 
 

@@ -8,9 +8,10 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from dva_sim.experiments.study import validation
-from dva_sim.experiments.study.parts import Level, Levels, Tuning
+from dva_sim.experiments.study.parts import Level, Levels, ScreeningRule, Tuning
 from dva_sim.experiments.study.study import Status, Study
 from dva_sim.kernel import resources
 from dva_sim.kernel.config import Config, validate
@@ -189,21 +190,39 @@ def tuning_study(study: Study) -> Study:
     factors: dict[str, Levels] = {name: (level,) for name, level in rule.at.items()}
     factors |= {name: study.factors[name] for name in rule.by}
     factors[rule.key] = rule.levels
-    part = study.parts[rule.part]
-    usual = {key: Study.model_fields[key] for key in LEFT}
+    question = f"Which {rule.key} for each {', '.join(rule.by)}?"
+    return trials_of(study, "tuning", rule, rule.part, question=question, factors=factors)
+
+
+def trials_of(
+    study: Study, key: str, rule: Tuning | ScreeningRule, part: str, **changes: Any
+) -> Study:
+    """Runs of one part of a study alone, with persons and random numbers of its own.
+
+    Args:
+        study: It keeps everything but what `LEFT` names.
+        key: Where `rule` stands in the study, for errors.
+        rule: Its seed and its size.
+        part: Part that is run, without reference runs.
+        **changes: Further keys of the trials.
+
+    Raises:
+        ConfigError: there are more runs than a study may have.
+    """
+    usual = {left: Study.model_fields[left] for left in LEFT}
+    alone = study.parts[part].model_copy(update={"reference": None, "replications": None})
     trials = study.model_copy(
         update={
-            **{key: field.get_default(call_default_factory=True) for key, field in usual.items()},
-            "question": f"Which {rule.key} for each {', '.join(rule.by)}?",
+            **{left: field.get_default(call_default_factory=True) for left, field in usual.items()},
             "seed": rule.seed,
             "persons": rule.persons,
             "replications": rule.replications,
-            "factors": factors,
-            "parts": {rule.part: part.model_copy(update={"reference": None, "replications": None})},
+            "parts": {part: alone},
+            **changes,
         }
     )
     for problem, _ in validation.of_size(trials):
-        raise study.error(f"tuning: {problem}", ("tuning",))
+        raise study.error(f"{key}: {problem}", (key,))
     trials._status, trials._table = Status(), None
     return trials
 

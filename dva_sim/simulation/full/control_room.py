@@ -224,7 +224,7 @@ def add_dispatcher(stage: Stage) -> ScriptedDispatcher | None:
 
 
 def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
-    """How operators' commands are made and sent, by a scenario that says how the link is now."""
+    """Pattern, rate and time-outs of operators, for a scenario with the link as it is now."""
     command = scenario.command
     return OperatorSetup(
         pattern=stage.pattern_for,
@@ -239,7 +239,7 @@ def setup_of(stage: Stage, scenario: Scenario) -> OperatorSetup:
 
 
 def console_of(stage: Stage, scenario: Scenario) -> Console:
-    """What a person works with who is no simulated one."""
+    """Equipment of a real person at a console."""
     return Console(
         setup=setup_of(stage, scenario), phone=phone_profile(scenario), reach=stage.reach
     )
