@@ -1,6 +1,8 @@
 """The page Events in the fake world: alarms, decisions, two people at once, hostile words."""
 
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import Page, WebSocketRoute, expect
@@ -32,15 +34,25 @@ def both(fake, shared) -> tuple[Page, Page]:
 def raised(page: Page, kind: str = "fire") -> int:
     """Raise an event of one's own, for other tests decide on theirs."""
     page.get_by_label("Kind").select_option(label=kind)
-    page.get_by_role("button", name="Raise event").click()
-    return in_hand(page, kind)
+    with new_in_hand(page) as number:
+        page.get_by_role("button", name="Raise event").click()
+    return number()
 
 
-def in_hand(page: Page, kind: str) -> int:
-    """The number of the event that is in hand, once it is one of a kind."""
+@contextmanager
+def new_in_hand(page: Page) -> Iterator[Callable[[], int]]:
+    """The number of the event that the block raises, once it is in hand.
+
+    Until the answer is here, another event may be in hand, even one of the same kind.
+    """
+    told = page.get_by_role("status", name="Raised")
+    before = told.inner_text()
+    number = 0
+    yield lambda: number
+    expect(told).to_have_text(re.compile(rf"^(?!{before}$)event \d+ is raised$"))
+    number = int(told.inner_text().split()[1])
     heading = page.get_by_role("region", name="Event in hand").get_by_role("heading", level=2)
-    expect(heading).to_contain_text(kind.capitalize())
-    return int(heading.inner_text().split()[0])
+    expect(heading).to_contain_text(f"{number} ")
 
 
 def test_an_event_is_acknowledged_and_somebody_is_sent(both):
@@ -121,8 +133,9 @@ def test_all_is_done_by_keys_alone(both):
     page.get_by_label("x, m").focus()
     page.keyboard.press("Tab")
     page.keyboard.press("Tab")
-    page.keyboard.press("Enter")
-    number = in_hand(page, "fire")
+    with new_in_hand(page) as raised_number:
+        page.keyboard.press("Enter")
+    number = raised_number()
     cell(other, number, "Fire")
     page.get_by_role("button", name=f"Event {number}", exact=True).press("Enter")
     page.get_by_role("button", name="Acknowledge").press("Space")
