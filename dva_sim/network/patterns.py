@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 from dva_sim.kernel.clock import Clock
 from dva_sim.kernel.plugins import Plugins
+from dva_sim.network.request_window import MOST, RequestWindow
 
 
 class Command(Protocol):
@@ -175,6 +176,40 @@ class Pipelined(Requested):
         line.open_requests(line.window)
 
 
+class Paced(Requested):
+    """Requests, as many unanswered at a time as neither the link nor the robot lets queue.
+
+    How many follows from the times of the answers, see `RequestWindow`.
+    """
+
+    title, label, colour = "paced requests", "paced", "brown"
+    sockets, when_slow = "DEALER to ROUTER", "commands become rarer"
+
+    def begin(self, line: Line) -> None:
+        """See `Pattern`."""
+        self.line, self._window = line, RequestWindow(line.rate_hz)
+        line.open_requests(MOST)
+
+    def offer(self, command: Command) -> None:
+        """See `Pattern`."""
+        if self._window.is_open and not self.line.busy:
+            self._ask(command)
+            return
+        if self.waiting is not None:
+            self.line.supersede(self.waiting)
+        self.waiting = command
+
+    def _ask(self, command: Command) -> None:
+        number, sent_at = self._window.sent(), self.line.clock.now
+
+        def answered(reply: bytes) -> None:
+            now = self.line.clock.now
+            self._window.answered(number, now - sent_at, now)
+            self._answered(reply)
+
+        self.line.request(command, answered, self.line.lost)
+
+
 class PubSub(Pattern):
     """Publish and subscribe: the app sends without waiting, and the robot applies every command."""
 
@@ -198,6 +233,7 @@ class LatestWins(PubSub):
 PATTERNS: Final[dict[str, type[Pattern]]] = {
     "req-rep": ReqRep,
     "pipelined": Pipelined,
+    "paced": Paced,
     "pub-sub": PubSub,
     "latest-wins": LatestWins,
 }

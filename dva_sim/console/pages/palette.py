@@ -99,7 +99,8 @@ COLOURS: Mapping[str, tuple[str, str]] = {
 # Lines of patterns in charts: as in reports, but light enough for a dark card, dark enough for a
 # white one.
 _LINES = {"#0072b2": ("#0072b2", "#56b4e9"), "#d55e00": ("#d55e00", "#ff9a4d"),
-          "#009e73": ("#00845f", "#3cc79a"), "#cc79a7": ("#b0578a", "#e58fc0")}  # fmt: skip
+          "#009e73": ("#00845f", "#3cc79a"), "#cc79a7": ("#b0578a", "#e58fc0"),
+          "#613305": ("#613305", "#c9a26b")}  # fmt: skip
 
 _WORDS = ("soft", "ink", "focus", "warning", "danger", "idle", "mission", "teleoperation",
           "manual", "emergency", "link-good", "link-fair", "link-poor", "link-lost")  # fmt: skip

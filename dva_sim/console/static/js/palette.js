@@ -63,6 +63,7 @@ export const LIGHT = {
  "state-expired": "#613305",
  "pattern-req-rep": "#d55e00",
  "pattern-pipelined": "#b0578a",
+ "pattern-paced": "#613305",
  "pattern-pub-sub": "#0072b2",
  "pattern-latest-wins": "#00845f"
 };
@@ -130,6 +131,7 @@ export const DARK = {
  "state-expired": "#c4a48f",
  "pattern-req-rep": "#ff9a4d",
  "pattern-pipelined": "#e58fc0",
+ "pattern-paced": "#c9a26b",
  "pattern-pub-sub": "#56b4e9",
  "pattern-latest-wins": "#3cc79a"
 };

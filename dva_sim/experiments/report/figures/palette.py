@@ -53,7 +53,7 @@ LOOKS = (
 )
 ONE = Look(_VIOLET.colour, "o")  # a difference, or what stands alone
 
-_OF_PATTERNS = (_VERMILION, _PURPLE, _BLUE, _GREEN)
+_OF_PATTERNS = (_VERMILION, _PURPLE, _BROWN, _BLUE, _GREEN)
 _FREE = (  # of levels without a look of their own, in turn; those of patterns come last
     *(look for look in LOOKS if look not in (*_OF_PATTERNS, _VIOLET)),
     *(_OF_PATTERNS),
@@ -61,6 +61,7 @@ _FREE = (  # of levels without a look of their own, in turn; those of patterns c
 _NAMED = {
     "vermilion": _VERMILION,
     "purple": _PURPLE,
+    "brown": _BROWN,
     "blue": _BLUE,
     "green": _GREEN,
 }  # as patterns say
@@ -98,7 +99,7 @@ FATES: Mapping[str, Fill] = {
     "given up": Fill("#777777", "----"),
     "escalated": Fill("#906ef7", "\\\\\\\\"),
     "open": Fill("#dedede"),
-    "expired": Fill("#613305", "++++"),
+    "expired": Fill("#b4b464", "++++"),
     "undetected": Fill("#222222"),
     "never reported": Fill("#222222", "||||"),
     "other": Fill("#f0f0f0", "****"),
