@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "policies"))
 
-from linear import FEATURES, WEIGHTS, Linear
+from linear import FEATURES, FIRST, Linear
 
 from dva_sim.core.dispatch import MinEta, Policy
 
@@ -48,9 +48,9 @@ def _value(work: tuple[Sequence[float], Sequence[int]]) -> float:
 
 
 def learn(pool: ProcessPoolExecutor, rounds: int, seed: int = 1) -> list[float]:
-    """Weights after so many rounds; they begin with those of `linear.py`."""
+    """Weights after so many rounds; they begin with `FIRST` of `linear.py`."""
     rng = np.random.default_rng(seed)
-    mean, spread = np.array(WEIGHTS), np.full(len(FEATURES), 1.0)
+    mean, spread = np.array(FIRST), np.full(len(FEATURES), 1.0)
     for number in range(rounds):
         drawn = mean + spread * rng.normal(size=(POPULATION, len(FEATURES)))
         drawn[0] = mean

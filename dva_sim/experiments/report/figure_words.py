@@ -6,6 +6,7 @@ They stand here since the figures themselves bring all that studies are analysed
 from typing import Final
 
 WORDS: Final = {
+    "map": "The cost of each choice in each situation, beyond the best one, over all persons.",
     "answer": "The difference that answers the question.",
     "distributions": "Every run as a dot, with median and middle half.",
     "differences": (

@@ -34,6 +34,7 @@ from dva_sim.experiments.report.blocks import (
     texts_of,
 )
 from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.choice_table import choice_table
 from dva_sim.experiments.report.figures.registry import draw_all
 from dva_sim.experiments.report.figures.style import Drawn, ReportFigure
 from dva_sim.experiments.report.glossary import Marker, terms_in
@@ -186,6 +187,9 @@ def _endings(reading: Reading) -> Iterator[Block]:
 
 def _found(reading: Reading) -> Iterator[Block]:
     """The answer level by level, what else was found, and what other models of persons say."""
+    if reading.map is not None and reading.view is not None:
+        yield Heading("The map")
+        yield Printed(choice_table(reading.map, reading.view.part.name), is_words=True)
     table = answer_table(reading)
     if table is not None or reading.answer.notes:
         yield Heading("The answer in numbers")

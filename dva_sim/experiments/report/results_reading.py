@@ -11,6 +11,7 @@ import numpy as np
 
 from dva_sim import statistics
 from dva_sim.experiments.analysis.answer import Finding
+from dva_sim.experiments.analysis.choice_map import ChoiceMap, choice_map
 from dva_sim.experiments.analysis.competing_risks import Endings, horizon_of, with_endings
 from dva_sim.experiments.analysis.kept_episodes import KeptEpisode, Tables, typical_and_worst
 from dva_sim.experiments.analysis.robustness import RepeatedAnswer, robustness_of
@@ -163,6 +164,11 @@ class ResultsReading:
             return None
         scenario = self.scenario_of(self.view.part.name)
         return robustness_of(self.study, self.table(REPEATS), self.view, self.finding, scenario)
+
+    @cached_property
+    def map(self) -> ChoiceMap | None:
+        """What each choice costs in each situation, where the study declares a map."""
+        return None if self.view is None else choice_map(self.study, self.view)
 
     @property
     def points(self) -> list[str]:

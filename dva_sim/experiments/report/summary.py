@@ -25,6 +25,7 @@ from dva_sim.experiments.analysis.study_view import (
 from dva_sim.experiments.analysis.support import support_of_part
 from dva_sim.experiments.report.answer_conditions import depends
 from dva_sim.experiments.report.cell_table import CellTable, cell_table
+from dva_sim.experiments.report.choice_table import lead_of
 from dva_sim.experiments.report.heavy_runs import few_that_weigh
 from dva_sim.experiments.report.hypothesis_tables import verdict_sentences
 from dva_sim.experiments.report.results_reading import ResultsReading
@@ -51,6 +52,8 @@ class Reading(ResultsReading):
         if verdicts:
             lead = f"Not registered, over all levels at once: {found.lead}"
             found = replace(found, lead=" ".join([*verdicts, lead]))
+        if self.map is not None:
+            found = replace(found, lead=lead_of(self.map), notes=[found.lead, *found.notes])
         weighed = [few_that_weigh(self.finding, self.view)] if self.finding is not None else []
         notes = [*found.notes, *filter(None, weighed)]
         return replace(found, depends=found.depends | depends(self), notes=notes)

@@ -291,6 +291,19 @@ class RobustnessRule(Config):
     replications: Count = 2
 
 
+class MapRule(Config):
+    """What each level of the answer's factor costs at each level that it runs over.
+
+    Attributes:
+        models: Factor whose levels are the models of persons that the data leave open; what is
+            found is told as a range over them.
+        notes: What else rests on an assumption, by level of the factor that the answer runs over.
+    """
+
+    models: str
+    notes: dict[str, str] = Field(default_factory=dict)
+
+
 class ScreeningRule(Config):
     """Which assumed numbers are varied within their bands, to see which move the answer.
 

@@ -18,6 +18,7 @@ from dva_sim.experiments.study.parts import (
     Count,
     Hypothesis,
     Levels,
+    MapRule,
     Prediction,
     RobustnessRule,
     ScenarioChanges,
@@ -73,6 +74,7 @@ class Study(Config):
         hypotheses: Claims about contrasts, by name; `dva-sim register` fixes them.
         tuning: How the level `tuned` of the factor `tuning` comes by its value.
         robustness: The answer again under other models of the persons.
+        map: Which level of the answer's factor to choose at each level it runs over.
         screening: Which assumed numbers `dva-sim screen` varies; the study's own runs do not.
         stop: When enough persons were simulated.
         budget_s: Time by the clock [s] after which no further persons are begun.
@@ -101,6 +103,7 @@ class Study(Config):
     hypotheses: dict[str, Hypothesis] = Field(default_factory=dict)
     tuning: Tuning | None = None
     robustness: RobustnessRule | None = None
+    map: MapRule | None = None
     screening: ScreeningRule | None = None
     stop: StopRule | None = None
     budget_s: Annotated[float, Field(gt=0)] | None = None
@@ -151,7 +154,7 @@ class Study(Config):
 
     def asked(self) -> dict[str, Any]:
         """All keys that say what is run and how it is read, as JSON would hold them."""
-        unasked = [key for key in ("measures", "covariates") if not getattr(self, key)]
+        unasked = [key for key in ("measures", "covariates", "map") if not getattr(self, key)]
         apart = {"record", "figures", "screening", *VERSIONS, *unasked}
         return self.model_dump(mode="json", exclude=apart)
 

@@ -172,6 +172,7 @@ def of_claims(study: Study) -> Iterator[Problem]:
     """What was declared about factors and levels that the study does not have."""
     yield from of_answer(study)
     yield from of_robustness(study)
+    yield from of_map(study)
     if study.covariates and study.answer is None:
         yield "the answer is adjusted for covariates; declare one", ("covariates",)
     for name, comparison in study.comparisons.items():
@@ -192,6 +193,8 @@ def kept_claims(study: Study) -> Study:
     Predictions stay: of each is told that it was not run.
     """
     lost: dict[str, object] = {}
+    if any(of_map(study)):
+        lost["map"] = None
     if any(of_answer(study)):
         lost["answer"] = None
     if "answer" in lost or any(of_robustness(study)):
@@ -300,6 +303,24 @@ def of_robustness(study: Study) -> Iterator[Problem]:
     yield from _fault_of_level(study, (REPEATS, "at"), over, robustness.at or ())
     if robustness.strategies and STRATEGY in study.factors:
         yield f"{STRATEGY!r} is a factor already", (REPEATS, "strategies")
+
+
+def of_map(study: Study) -> Iterator[Problem]:
+    """Why the map cannot be drawn."""
+    if study.map is None:
+        return
+    answer, models = study.answer, study.map.models
+    if answer is None or answer.over is None:
+        yield "a map needs an answer that runs over a factor", ("map",)
+        return
+    yield from _fault_of_level(study, ("map", "models"), models, ())
+    if models in (answer.factor, answer.over):
+        yield f"{models!r} is what the answer compares or runs over", ("map", "models")
+    for name, levels in study.factors.items():
+        if len(levels) > 1 and name not in (answer.factor, answer.over, models):
+            yield f"a map has no room for the factor {name!r}", ("map",)
+    for level in study.map.notes:
+        yield from _fault_of_level(study, ("map", "notes", level), answer.over, (level,))
 
 
 def _fault_of_part(study: Study, path: KeyPath, part: str) -> Iterator[Problem]:

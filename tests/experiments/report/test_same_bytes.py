@@ -48,7 +48,7 @@ def grid(folder):
     facts["study"]["factors"] |= {"pattern": ["req-rep", "latest-wins"]}
     facts["study"]["factors"] |= {"link.delay_s": [0.0, 1.0]}
     facts["study"]["factors"] |= {"profile": ["default", "dissertation", "third"]}
-    facts["study"] |= synthetic_results.CLAIMS
+    facts["study"] |= synthetic_results.CLAIMS | {"map": {"models": "profile"}}
     return synthetic_results.write(folder, rows, facts)
 
 
@@ -100,7 +100,7 @@ def contest(folder):
 
 
 KINDS = {
-    *("distributions", "differences", "heat_map", "factorial_effects", "robustness"),
+    *("map", "distributions", "differences", "heat_map", "factorial_effects", "robustness"),
     *("delay_budget", "command_age", "command_rate", "tradeoff", "trajectories", "story_times"),
     *("time_lapse_typical", "time_lapse_worst", "story_outcomes", "endings", "scatter", "sobol"),
     *("answer", "trade", "stages", "fates", "way", "percentiles", "burden", "brought", "taken"),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from dva_sim.experiments.analysis.study_view import StudyView
 from dva_sim.experiments.report.figures import (
     answer_figure,
+    choice_map,
     commands,
     delay_budget,
     distribution,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 
 SHIPPED: Final[tuple[type[ReportFigure], ...]] = (
+    choice_map.ChoiceMapFigure,
     answer_figure.AnswerFigure,
     distribution.Distributions,
     effect.Differences,

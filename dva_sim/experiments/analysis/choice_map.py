@@ -1,0 +1,156 @@
+"""Which level of a factor to choose at each level of another, whoever the persons are.
+
+The answer's factor is what one can choose (a messaging pattern), the factor it runs over is what
+one is given (a link), and the levels of a third are models of the persons that the data leave open.
+The regret of a choice is what it costs more than the best choice for the same link and persons. In
+a mix of two models the regret is at most that of the worse one, so that the range over models
+bounds it for every share of persons in between.
+
+References:
+    L. J. Savage, The theory of statistical decision, J. Am. Stat. Assoc. 46 (1951), 55-67.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dva_sim.experiments.analysis.run_grid import Factor, Floats, RunGrid, nan_mean
+from dva_sim.experiments.analysis.study_view import StudyView, interval_of
+from dva_sim.experiments.study.parts import Level
+from dva_sim.kernel.units import unit_of
+
+
+@dataclass(frozen=True)
+class ChoiceMap:
+    """The regret of each choice in each situation, under each model of the persons.
+
+    Attributes:
+        measure: Column in which the loss is counted; less is better.
+        choice: Factor of the choices, `c` levels.
+        given: Factor of the situations, `g` levels.
+        models: Factor of the models of persons, `m` levels.
+        mean: Mean loss, `(g, c, m)`; nan where nothing was run.
+        regret: Mean loss beyond the least one, `(g, c, m)`; 0 for the best choice.
+        is_clear: Whether the 95 % interval of the regret, paired by person and trial, lies above 0
+            and the regret above `smallest`, `(g, c, m)`.
+        smallest: Smallest difference that matters; 0 where none was declared.
+        most: What runs that never ended count with; infinite where nothing bounds the measure.
+        outside: Whether a cell is beyond what people were watched at, `(g, c, m)`.
+        notes: What else rests on an assumption, by situation.
+    """
+
+    measure: str
+    choice: Factor
+    given: Factor
+    models: Factor
+    mean: Floats
+    regret: Floats
+    is_clear: NDArray[np.bool_]
+    smallest: float
+    most: float
+    outside: NDArray[np.bool_]
+    notes: Mapping[str, str]
+
+    @property
+    def unit(self) -> str:
+        """Unit of the loss."""
+        return unit_of(self.measure)
+
+    @cached_property
+    def least(self) -> Floats:
+        """Least regret over the models, `(g, c)`."""
+        return np.asarray(self.regret.min(axis=2))
+
+    @cached_property
+    def worst(self) -> Floats:
+        """Greatest regret over the models, `(g, c)`."""
+        return np.asarray(self.regret.max(axis=2))
+
+    @property
+    def is_worse(self) -> NDArray[np.bool_]:
+        """Whether a choice is clearly worse than the best under some model, `(g, c)`."""
+        return np.asarray(self.is_clear.any(axis=2))
+
+    @property
+    def overall(self) -> Floats:
+        """Greatest regret of each choice in any situation, `(c,)`."""
+        return np.asarray(self.worst.max(axis=0))
+
+    @property
+    def advised(self) -> Level:
+        """The choice whose greatest regret is least."""
+        return self.choice.levels[int(np.argmin(self.overall))]
+
+    def best_of(self, situation: int) -> list[Level]:
+        """The choices that are not clearly worse than the best; all where nothing differs."""
+        return [
+            level
+            for level, worse in zip(self.choice.levels, self.is_worse[situation], strict=True)
+            if not worse
+        ]
+
+
+def choice_map(study: Mapping[str, Any], view: StudyView) -> ChoiceMap | None:
+    """Read the map of a study; None where it declares none, or a cell has no run yet.
+
+    Args:
+        study: As the manifest holds it.
+        view: How the study is read.
+    """
+    declared = study.get("map")
+    if not declared or view.line is None or view.over is None:
+        return None
+    models = next((f for f in view.part.factors if f.name == declared["models"]), None)
+    if models is None:
+        return None
+    axes = (view.over, view.line, models)
+    cells = _cells(view.part, view.part.grid(view.measure), axes)  # (g, c, m, persons, trials)
+    mean = nan_mean(nan_mean(cells, axis=-1), axis=-1)
+    if not np.isfinite(mean).all():
+        return None
+    smallest = view.smallest_effect or 0.0
+    best = mean.argmin(axis=1)
+    return ChoiceMap(
+        measure=view.measure,
+        choice=view.line,
+        given=view.over,
+        models=models,
+        mean=mean,
+        regret=mean - mean.min(axis=1, keepdims=True),
+        is_clear=_clear(cells, best, smallest),
+        smallest=smallest,
+        most=view.possible[1],
+        outside=_outside(view, axes),
+        notes=dict(declared.get("notes") or {}),
+    )
+
+
+def _cells(part: RunGrid, grid: NDArray[Any], axes: tuple[Factor, ...]) -> NDArray[Any]:
+    """A grid with the three factors first, in this order; other factors must have one level."""
+    names = [factor.name for factor in part.factors]
+    order = [names.index(factor.name) for factor in axes]
+    rest = [n for n in range(grid.ndim) if n not in order]
+    moved = np.transpose(grid, [*order, *rest])
+    others = len(names) - len(axes)
+    return np.asarray(moved.reshape(*moved.shape[:3], *moved.shape[3 + others :]))
+
+
+def _clear(cells: Floats, best: NDArray[np.intp], smallest: float) -> NDArray[np.bool_]:
+    clear = np.zeros(cells.shape[:3], dtype=bool)
+    for g, c, m in np.ndindex(clear.shape):
+        found = interval_of(cells[g, c, m] - cells[g, best[g, m], m])
+        clear[g, c, m] = found is not None and found.low > 0.0 and found.mean > smallest
+    return clear
+
+
+def _outside(view: StudyView, axes: tuple[Factor, ...]) -> NDArray[np.bool_]:
+    shape = tuple(len(factor.levels) for factor in axes)
+    if view.outside is None:
+        return np.zeros(shape, dtype=bool)
+    return _cells(view.part, view.outside, axes).reshape(shape)

@@ -1,0 +1,86 @@
+"""The map of a study as a table and in sentences: which choice is best in which situation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dva_sim.experiments.analysis.choice_map import ChoiceMap
+from dva_sim.experiments.report.cell_table import CellTable
+from dva_sim.experiments.report.prose import note
+from dva_sim.kernel.wording import listing, quantity
+from dva_sim.simulation.labels import factor_name, level_name
+
+_NEVER = "never done"
+
+
+def choice_table(found: ChoiceMap, part: str) -> CellTable:
+    """A row for each situation: the best choices, and what each other one costs beyond them."""
+    choices = found.choice.levels
+    heads = [
+        factor_name(found.given.name),
+        "best",
+        *(level_name(found.choice.name, level, short=True) for level in choices),
+        *(["by assumption"] if found.notes else []),
+    ]
+    rows = []
+    for g, situation in enumerate(found.given.levels):
+        name = situation_name(found, g)
+        cells = [regret_text(found, g, c) for c in range(len(choices))]
+        notes = [found.notes.get(str(situation), "")] if found.notes else []
+        rows.append([name, _best(found, g), *cells, *notes])
+    told = note("map", unit=found.unit, has_outside=bool(found.outside.any()), models=found.models)
+    return CellTable(part, heads, 2, rows, note=told)
+
+
+def regret_text(found: ChoiceMap, situation: int, choice: int) -> str:
+    """`3 to 69`, over the models of persons; `=` where it is as good as the best."""
+    if not found.is_worse[situation, choice]:
+        return "="
+    if (found.mean[situation, choice] >= found.most).all():
+        return _NEVER
+    low, high = found.least[situation, choice], found.worst[situation, choice]
+    ends = dict.fromkeys((_short(float(low)), _short(float(high))))
+    return " to ".join(ends)
+
+
+def situation_name(found: ChoiceMap, situation: int) -> str:
+    """A situation, marked where it is beyond what people were watched at."""
+    name = level_name(found.given.name, found.given.levels[situation])
+    return f"{name} †" if found.outside[situation].any() else name
+
+
+def lead_of(found: ChoiceMap) -> str:
+    """Say whether one choice is best everywhere, and which has the least regret."""
+    names = [level_name(found.choice.name, level) for level in found.choice.levels]
+    best = [name for name, worse in zip(names, found.is_worse.T, strict=True) if not worse.any()]
+    given = factor_name(found.given.name)
+    if len(best) == len(names):
+        return f"No choice differs from another by more than matters, on any {given} tried."
+    if best:
+        return f"On every {given} tried, none is better than {listing(best)}."
+    order = np.argsort(found.overall, kind="stable").tolist()
+    costs = [f"{names[c]} up to {_cost(found, c)}" for c in order]
+    return (
+        f"No choice is best on every {given} tried. Beyond the best one for the same {given} and "
+        f"persons they cost: {listing(costs)}."
+    )
+
+
+def _cost(found: ChoiceMap, choice: int) -> str:
+    worst = float(found.overall[choice])
+    where = int(np.argmax(found.worst[:, choice]))
+    place = level_name(found.given.name, found.given.levels[where])
+    if (found.mean[where, choice] >= found.most).any():
+        return f"not arriving at all ({place})"
+    return f"{quantity(worst, found.unit)} ({place})"
+
+
+def _best(found: ChoiceMap, situation: int) -> str:
+    best = found.best_of(situation)
+    if len(best) == len(found.choice.levels):
+        return "nothing differs"
+    return listing([level_name(found.choice.name, level, short=True) for level in best])
+
+
+def _short(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

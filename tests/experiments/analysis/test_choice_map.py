@@ -1,0 +1,161 @@
+"""Which choice is best in which situation, over models of persons whose losses are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.studies.synthetic_results import columns
+
+from dva_sim.experiments.analysis.choice_map import choice_map
+from dva_sim.experiments.analysis.study_view import view_of
+from dva_sim.experiments.report.choice_table import choice_table, lead_of
+from dva_sim.experiments.study.loading import load_study
+from dva_sim.kernel.errors import ConfigError
+
+LINKS, MODELS, CHOICES = ("near", "far", "narrow"), ("steer", "wait"), ("ask", "tell", "pace")
+HORIZON_S = 600.0
+LOSSES = {  # mean over persons, by situation and choice: under `steer`, and under `wait`
+    ("near", "ask"): (40.0, 60.0),
+    ("near", "tell"): (40.0, 60.0),
+    ("near", "pace"): (40.0, 60.0),
+    ("far", "ask"): (70.0, 150.0),
+    ("far", "tell"): (50.0, 80.0),
+    ("far", "pace"): (55.0, 80.5),
+    ("narrow", "ask"): (50.0, 70.0),
+    ("narrow", "tell"): (600.0, 600.0),
+    ("narrow", "pace"): (58.0, 69.0),
+}
+STUDY = {
+    "factors": {"link": list(LINKS), "messaging": list(CHOICES), "steering": list(MODELS)},
+    "parts": {"drive": {"scenario": "drive-to-event"}},
+    "answer": {
+        "part": "drive",
+        "measure": "drive_time_s",
+        "factor": "messaging",
+        "contrast": ["ask", "tell"],
+        "over": "link",
+        "within": {"steering": "steer"},
+        "smallest_effect_s": 2.0,
+    },
+    "map": {"models": "steering", "notes": {"far": "nobody was watched"}},
+}
+
+
+def read(study=STUDY, losses=LOSSES, persons=6):
+    rng = np.random.default_rng(1)
+    skills = rng.normal(0.0, 5.0, persons)
+
+    def loss(mean, person, link):
+        if mean >= HORIZON_S:
+            return HORIZON_S
+        return mean + skills[person] + rng.normal(0.0, 0.2) * (link != "near")
+
+    rows = [
+        {"part": "drive", "person": person, "trial": 0, "seed": person, "is_reference": False}
+        | {"link": link, "messaging": choice, "steering": model}
+        | {"drive_time_s": loss(mean, person, link)}
+        for (link, choice), means in losses.items()
+        for model, mean in zip(MODELS, means, strict=True)
+        for person in range(persons)
+    ]
+    view = view_of(study, columns(rows))
+    assert view is not None
+    return choice_map(study, replace(view, possible=(0.0, HORIZON_S)))
+
+
+def test_regret_is_the_loss_beyond_the_best_for_the_same_persons():
+    found = read()
+    far = found.given.levels.index("far")
+    ask = found.choice.levels.index("ask")
+    assert found.regret[far, ask] == pytest.approx([20.0, 70.0], abs=0.5)
+    assert found.least[far, ask] == pytest.approx(20.0, abs=0.5)
+    assert found.worst[far, ask] == pytest.approx(70.0, abs=0.5)
+    assert (found.regret.min(axis=1) == 0.0).all()
+
+
+def test_every_mix_of_models_costs_no_more_than_the_worse_model():
+    found = read()
+    for share in np.linspace(0.0, 1.0, 11):
+        mixed = (1 - share) * found.mean[..., 0] + share * found.mean[..., 1]
+        assert (mixed - mixed.min(axis=1, keepdims=True) <= found.worst + 1e-9).all()
+
+
+def test_what_differs_by_less_than_matters_is_as_good_as_the_best():
+    found = read()
+    assert found.best_of(0) == list(CHOICES)
+    assert found.best_of(1) == ["tell"]  # `pace` costs 5 s under one of the models
+    assert found.best_of(2) == ["ask"]
+
+
+def test_the_choice_that_costs_least_where_it_costs_most_is_advised():
+    found = read()
+    assert found.advised == "pace"
+    lead = lead_of(found)
+    assert lead.index("pace up to 8") < lead.index("ask up to 70") < lead.index("tell up to")
+
+
+def test_a_choice_that_is_best_everywhere_leads():
+    same = dict.fromkeys(LOSSES, (40.0, 60.0))
+    assert "No choice differs" in lead_of(read(losses=same))
+    assert "none is better than pace" in lead_of(
+        read(losses={key: (50.0 - 9 * (key[1] == "pace"),) * 2 for key in LOSSES})
+    )
+
+
+def test_the_table_says_what_never_arrives_and_what_rests_on_an_assumption():
+    table = choice_table(read(), "drive")
+    narrow = next(row for row in table.rows if row[0].startswith("narrow"))
+    assert narrow[table.heads.index("tell")] == "never done"
+    far = next(row for row in table.rows if row[0].startswith("far"))
+    assert far[-1] == "nobody was watched"
+
+
+def test_without_a_run_in_each_cell_there_is_no_map_yet():
+    some = {key: value for key, value in LOSSES.items() if key != ("far", "pace")}
+    assert read(losses=some) is None
+
+
+FILE = """
+question: Which?
+factors:
+  pattern: [req-rep, latest-wins]
+  link.delay_s: [0, 0.5]
+  operator.strategy: [pursuit, move_and_wait]
+parts: {drive: {scenario: drive-to-event}}
+answer:
+  part: drive
+  measure: drive_time_s
+  factor: pattern
+  contrast: [req-rep, latest-wins]
+  over: link.delay_s
+  within: {operator.strategy: pursuit}
+map: {models: operator.strategy}
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ("models: operator.strategy", "models: operator.strategi", "is not a factor"),
+        ("models: operator.strategy", "models: pattern", "compares or runs over"),
+        ("  over: link.delay_s\n", "  within: {link.delay_s: 0}\n", "runs over a factor"),
+        ("parts:", "  robot.count: [1, 2]\nparts:", "no room for the factor 'robot.count'"),
+        ("strategy}\n", "strategy, notes: {far: guessed}}\n", "'far'"),
+    ],
+)
+def test_a_map_that_cannot_be_drawn_is_refused(tmp_path, before, after, told):
+    file = tmp_path / "which.yaml"
+    file.write_text(FILE)
+    load_study(file)
+    head, _, tail = FILE.rpartition(before)
+    text = head + after + tail
+    if "within: {link.delay_s: 0}" in after:
+        text = text.replace("  within: {operator.strategy: pursuit}\n", "", 1).replace(
+            "{link.delay_s: 0}", "{link.delay_s: 0, operator.strategy: pursuit}"
+        )
+    if "robot.count" in after:
+        text = text.replace("strategy: pursuit}", "strategy: pursuit, robot.count: 1}")
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=r".") as caught:
+        load_study(file)
+    assert told in str(caught.value)
