@@ -105,3 +105,15 @@ def test_advice_that_an_environment_was_not_made_for_is_refused():
     with pytest.raises(ValueError, match="auctions=True"):
         play(env, load_policy("auction"), seed=1)
     env.close()
+
+
+def test_the_learnt_policy_lets_events_wait_less_than_min_eta_on_shifts_it_has_not_seen():
+    env = made("min_eta", intensity=6.9)
+    learnt = load_policy("linear.py:Linear")
+    unseen = range(30_000, 30_004)
+    ours, theirs = (
+        [play(env, policy, seed)["return"] for seed in unseen]
+        for policy in (learnt, load_policy("min_eta"))
+    )
+    env.close()
+    assert np.mean(ours) > np.mean(theirs)
