@@ -10,7 +10,6 @@ have one; `make same-bytes AGAINST=COMMIT` does this with the environment of the
 
 import argparse
 import hashlib
-import json
 import os
 import sys
 import tempfile
@@ -22,28 +21,16 @@ from helpers.paths import ROOT
 from helpers.processes.other_version import end_with_signals, output, version
 
 import dva_sim
-from dva_sim.experiments.execution.scheduling import run_job
-from dva_sim.experiments.study.cell_grid import cells, jobs
+from dva_sim.experiments.execution.sampled_runs import digest_of_run, sampled_jobs
 from dva_sim.experiments.study.loading import load_study
-from dva_sim.experiments.study.plan import StudyPlan
 
 RECORDED = ("drive-to-event", "fire-drill")
 
 
-def chosen_jobs(study):
-    """The first run of three configurations of each part."""
-    first = [j for j in jobs(study, cells(study)) if j.person == 0 and j.trial == 0]
-    for part in dict.fromkeys(job.part for job in first):
-        of_part = [job for job in first if job.part == part]
-        for index in sorted({0, len(of_part) // 2, len(of_part) - 1}):
-            yield index, of_part[index]
-
-
-def digest_of_run(name, index, job):
+def told_of_run(name, index, job):
     """One line: which run, its configuration and seed, and the hash of all rows of its tables."""
-    rows = json.dumps(run_job(job), sort_keys=True, default=str).encode()
-    sha = hashlib.sha256(rows).hexdigest()
-    return f"{name} {job.part} {index}: config {job.config}, seed {job.seed}, tables {sha}"
+    where = f"{name} {job.part} {index}: config {job.config}, seed {job.seed}"
+    return f"{where}, tables {digest_of_run(job)}"
 
 
 def digest_of_recording(name):
@@ -59,10 +46,9 @@ def digests():
     with ProcessPoolExecutor(mp_context=get_context("forkserver")) as pool:
         told = [pool.submit(digest_of_recording, name) for name in RECORDED]
         for file in sorted((ROOT / "experiments").glob("*.yaml")):
-            study = load_study(file)
-            if StudyPlan.of(study).is_real_time:
-                continue  # what is measured differs each time
-            told += [pool.submit(digest_of_run, file.stem, *run) for run in chosen_jobs(study)]
+            told += [
+                pool.submit(told_of_run, file.stem, *run) for run in sampled_jobs(load_study(file))
+            ]
         for line in told:
             yield line.result()
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NoReturn
 import typer
 
 from dva_sim import __version__
-from dva_sim.cli import files, link, results, runs, site, storm, studies
+from dva_sim.cli import answers, files, link, results, runs, site, storm, studies
 from dva_sim.cli.commands import Command, PanelGroup, Panels, name_of, typer_of
 from dva_sim.cli.plain_output import replace_what_cannot_be_shown
 from dva_sim.kernel import early_stop
@@ -99,7 +99,9 @@ class DvaSimProgram(PanelGroup):
         "Studies": _named(
             studies.demo, studies.run, studies.new, studies.register, studies.tune, studies.screen
         ),
-        "Results": _named(results.report, results.show, results.export, results.compare),
+        "Results": _named(
+            results.report, results.show, results.export, results.compare, answers.answers
+        ),
         "Single runs": {
             **_named(runs.episode, runs.replay, runs.live, runs.console),
             **_named(runs.robot, link.link, runs.keys),

@@ -1,0 +1,110 @@
+"""The command `answers`: what published studies answered, and whether it is still given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from dva_sim import __version__
+from dva_sim.cli.options import Jobs, argument, asks, flag, several
+from dva_sim.kernel.errors import ConfigError, ExitCode
+from dva_sim.kernel.suggestions import hint
+
+if TYPE_CHECKING:
+    from dva_sim.experiments.report.kept_answers import KeptAnswer
+
+
+@asks(
+    studies=(argument("Only these studies.", "STUDY", of=list[str]), ()),
+    keep=(several("Keep the answer of a results folder.", "FOLDER", "--keep"), ()),
+    page=(flag("--page", "Print all kept answers as the page docs/results.md."), False),
+    mark=(flag("--mark", "Mark answers that are no longer given."), False),
+    jobs=(Jobs, None),
+)
+def answers(studies: list[str], keep: list[str], page: bool, mark: bool, jobs: int | None) -> None:
+    """Tell which published answers the program still gives.
+
+    A few runs of each study are made again and compared with what is kept beside the studies.
+
+    Examples:
+        dva-sim answers  # all of them: a minute or two
+        dva-sim answers --keep results/filters  # keep what a study has answered
+        dva-sim answers --page > docs/results.md  # write the page
+    """
+    from dva_sim.experiments.report import answer_pages, kept_answers  # late: start-up
+
+    folder = _folder()
+    if page:
+        print(answer_pages.answers_page(kept_answers.all_kept(folder)), end="")
+        return
+    for name in keep:
+        _keep(Path(name), folder, jobs)
+    if not keep:
+        raise typer.Exit(_compare(folder, studies, mark, jobs))
+
+
+def _folder() -> Path:
+    """Where answers are kept: beside the shipped studies."""
+    from dva_sim.experiments.report.kept_answers import FOLDER  # late: start-up
+    from dva_sim.experiments.study.study import FOLDER as STUDIES  # late: start-up
+    from dva_sim.kernel import resources  # late: start-up
+
+    return next(root / STUDIES / FOLDER for root in resources.roots() if (root / STUDIES).is_dir())
+
+
+def _keep(results: Path, folder: Path, jobs: int | None) -> None:
+    from dva_sim.experiments.report import kept_answers  # late: start-up
+
+    answer, manifest = kept_answers.answer_in(results)
+    sampled = _sampled([answer.study], jobs)[answer.study]
+    print(f"Kept in {kept_answers.keep(replace(answer, sampled=sampled), manifest, folder)}")
+
+
+def _compare(folder: Path, studies: list[str], mark: bool, jobs: int | None) -> ExitCode:
+    """Say of each kept answer whether it is still given; a gate fails if an unmarked one is not."""
+    from dva_sim.experiments.report import kept_answers  # late: start-up
+
+    kept = [a for a in kept_answers.all_kept(folder) if not studies or a.study in studies]
+    if missing := [name for name in studies if name not in {answer.study for answer in kept}]:
+        known = [answer.study for answer in kept_answers.all_kept(folder)]
+        raise ConfigError(f"no answer of {missing[0]!r} is kept; {hint(missing[0], known, 'kept')}")
+    now = _sampled([answer.study for answer in kept if answer.sampled], jobs)
+    code = ExitCode.OK
+    for answer in kept:
+        told, is_stale = _told(answer, now.get(answer.study, {}))
+        print(f"{answer.study}: {told}")
+        if is_stale and not answer.stale_since:
+            if mark:
+                _mark(answer, folder)
+            else:
+                code = ExitCode.GATE_FAILED
+    return code
+
+
+def _told(answer: KeptAnswer, now: dict[str, str]) -> tuple[str, bool]:
+    """Whether an answer is still given, in words, and whether it is not."""
+    dated = f"{answer.status}, {answer.version}, {answer.date}"
+    if not answer.sampled:
+        return f"measured in real time, so not compared ({dated})", False
+    same = sum(answer.sampled.get(key) == digest for key, digest in now.items())
+    if same == len(answer.sampled) == len(now):
+        return f"still given ({dated})", False
+    since = f", marked since {answer.stale_since}" if answer.stale_since else ""
+    return f"no longer given: {same} of {len(now)} runs are the same ({dated}{since})", True
+
+
+def _mark(answer: KeptAnswer, folder: Path) -> None:
+    from dva_sim.experiments.report import kept_answers  # late: start-up
+
+    kept_answers.mark_stale(answer, __version__, folder)
+
+
+def _sampled(names: list[str], jobs: int | None) -> dict[str, dict[str, str]]:
+    from dva_sim.experiments.execution.executors import cores  # late: start-up
+    from dva_sim.experiments.execution.sampled_runs import sampled_digests  # late: start-up
+    from dva_sim.experiments.study.file_kinds import open_study  # late: start-up
+
+    return dict(sampled_digests({name: open_study(name) for name in names}, jobs or cores()))

@@ -1,0 +1,59 @@
+"""A few runs of a study, and their digests: enough to tell whether the program still gives them.
+
+Of each part the first, the middle and the last configuration are run, once, by the first person.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+from dva_sim.experiments.execution.scheduling import run_job
+from dva_sim.experiments.study.cell_grid import StudyJob, cells, jobs
+from dva_sim.experiments.study.plan import StudyPlan
+from dva_sim.experiments.study.study import Study
+
+Digests = dict[str, str]
+"""SHA-256 of all rows of a run's tables, by `PART/INDEX/CONFIG/SEED`."""
+
+
+def sampled_jobs(study: Study) -> Iterator[tuple[int, StudyJob]]:
+    """The few runs, each with its place in its part.
+
+    There are none of a study whose runs are measured in real time.
+    """
+    if StudyPlan.of(study).is_real_time:
+        return
+    first = [job for job in jobs(study, cells(study)) if job.person == 0 and job.trial == 0]
+    for part in dict.fromkeys(job.part for job in first):
+        of_part = [job for job in first if job.part == part]
+        for index in sorted({0, len(of_part) // 2, len(of_part) - 1}):
+            yield index, of_part[index]
+
+
+def digest_of_run(job: StudyJob) -> str:
+    """Run one, and digest the rows of its tables."""
+    rows = json.dumps(run_job(job), sort_keys=True, default=str).encode()
+    return hashlib.sha256(rows).hexdigest()
+
+
+def sampled_digests(studies: Mapping[str, Study], processes: int) -> Iterator[tuple[str, Digests]]:
+    """The digests of some studies by their names, in the order given, as they come.
+
+    Args:
+        studies: The studies.
+        processes: How many runs at a time.
+    """
+    with ProcessPoolExecutor(processes, mp_context=get_context("forkserver")) as pool:
+        asked = {
+            name: [
+                (f"{job.part}/{index}/{job.config}/{job.seed}", pool.submit(digest_of_run, job))
+                for index, job in sampled_jobs(study)
+            ]
+            for name, study in studies.items()
+        }
+        for name, runs in asked.items():
+            yield name, {key: run.result() for key, run in runs}

@@ -1,0 +1,208 @@
+"""Answers of published studies, kept beside them with the manifests that they came from.
+
+An answer is dated: it names the program, the seed, the size and the status it was found with, and
+holds digests of a few of its runs, by which any later program can tell whether it still gives them.
+An answer that is replaced moves to a table of history.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from dva_sim.experiments.analysis.predictions import judge_all
+from dva_sim.experiments.execution.checkpoint import load_so_far
+from dva_sim.experiments.execution.sampled_runs import Digests
+from dva_sim.experiments.report.summary import Reading
+from dva_sim.experiments.results.manifest import status_of
+from dva_sim.kernel.errors import ConfigError
+from dva_sim.kernel.whole_files import write_whole
+
+FOLDER, HISTORY = "answers", "history.csv"
+_MANIFEST = ".manifest.json"
+
+
+@dataclass(frozen=True)
+class AnswerRow:
+    """The contrast at one level: first minus second, with the edges of its 95 % band."""
+
+    level: str | float | bool | None
+    mean: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class KeptAnswer:
+    """What a study answered once.
+
+    Attributes:
+        study: Name of the study.
+        question: As the study asks it.
+        answer: The answer in words.
+        measure: Column that was compared; empty without a contrast.
+        contrast: Its two levels in words.
+        over: Factor that the rows run over.
+        rows: The contrast at each level.
+        predictions: What was expected before, with what became of it.
+        hypotheses: Names of hypotheses with their verdicts.
+        status: `declared`, `confirmatory` or `exploratory`.
+        version: Version of the program.
+        commit: Its commit.
+        date: When the run began, as `YYYY-MM-DD`.
+        seed: The study's.
+        persons: How many were simulated.
+        runs: How many runs were made.
+        cpu_s: What they cost [CPU s].
+        tables: SHA-256 of each table of results.
+        sampled: Digests of a few runs; empty where runs are measured in real time.
+        stale_since: Version that first gave something else; empty while it is still given.
+    """
+
+    study: str
+    question: str
+    answer: str
+    measure: str
+    contrast: tuple[str, str] | None
+    over: str
+    rows: tuple[AnswerRow, ...]
+    predictions: tuple[tuple[str, str], ...]
+    hypotheses: tuple[tuple[str, str], ...]
+    status: str
+    version: str
+    commit: str
+    date: str
+    seed: int
+    persons: int
+    runs: int
+    cpu_s: float
+    tables: Mapping[str, str]
+    sampled: Digests = field(default_factory=dict)
+    stale_since: str = ""
+
+
+def answer_in(folder: Path) -> tuple[KeptAnswer, dict[str, Any]]:
+    """The answer that a results folder gives, without digests of runs, and its manifest.
+
+    Raises:
+        ConfigError: the folder holds no results, or a study that is not finished or has failed
+            runs, or one that was run with settings or in another size than its file has.
+    """
+    reading = Reading(load_so_far(folder))
+    manifest, study = dict(reading.manifest), reading.study
+    if reading.results.partial or manifest.get("failures"):
+        raise ConfigError(f"{folder}: only a study that is finished without failed runs is kept")
+    if manifest.get("set"):
+        raise ConfigError(f"{folder}: was run with --set {' '.join(manifest['set'])}")
+    machine = json.loads((folder / "machine.json").read_text(encoding="utf-8"))
+    versions, finding = manifest["versions"], reading.finding
+    if versions.get("dirty"):
+        raise ConfigError(f"{folder}: was run by a program with changes that are not committed")
+    kept = KeptAnswer(
+        study=str(manifest["usual"]["name"]),
+        question=str(manifest["question"]),
+        answer=reading.answer.lead,
+        measure=finding.measure if finding else "",
+        contrast=(str(finding.first), str(finding.second)) if finding else None,
+        over=finding.over if finding else "",
+        rows=_rows(reading),
+        predictions=tuple((p.text, p.verdict) for p in judge_all(study, reading.view)),
+        hypotheses=tuple((t.name, t.verdict) for t in reading.judgement.tested),
+        status=status_of(manifest).kind,
+        version=str(versions["dva-sim"]),
+        commit=str(versions.get("commit") or ""),
+        date=str(machine["started"])[:10],
+        seed=int(manifest["seeds"]["study"]),
+        persons=reading.persons,
+        runs=int(manifest["runs"]),
+        cpu_s=float(machine["cpu_s"]),
+        tables=dict(manifest["tables"]),
+    )
+    return kept, manifest
+
+
+def _rows(reading: Reading) -> tuple[AnswerRow, ...]:
+    found = reading.finding
+    if found is None:
+        return ()
+    columns = (found.mean.tolist(), found.low.tolist(), found.high.tolist())
+    levels = found.levels if found.over else (None,)
+    return tuple(AnswerRow(*row) for row in zip(levels, *columns, strict=True))
+
+
+def keep(answer: KeptAnswer, manifest: Mapping[str, Any], folder: Path) -> Path:
+    """Write an answer and its manifest; the one that was kept before becomes history.
+
+    Args:
+        answer: The answer.
+        manifest: Of its results.
+        folder: Where answers are kept.
+
+    Returns:
+        The answer's file.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"{answer.study}.json"
+    if file.exists() and (before := read(file)) != answer:
+        _append(before, folder / HISTORY)
+    write_whole(folder / f"{answer.study}{_MANIFEST}", _text(manifest))
+    write_whole(file, _text(asdict(answer)))
+    return file
+
+
+def _text(data: Mapping[str, Any]) -> str:
+    return json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+
+
+_COLUMNS = ("study", "version", "date", "status", "level", "mean", "low", "high", "stale_since")
+
+
+def _append(answer: KeptAnswer, file: Path) -> None:
+    """Add a line for each level of an answer that is replaced."""
+    before = file.read_text(encoding="utf-8") if file.exists() else ",".join(_COLUMNS) + "\n"
+    text = io.StringIO()
+    writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n", extrasaction="ignore")
+    writer.writerows(asdict(answer) | _rounded(row) for row in answer.rows)
+    write_whole(file, before + text.getvalue())
+
+
+def _rounded(row: AnswerRow) -> dict[str, Any]:
+    return {
+        key: f"{value:.4g}" if isinstance(value, float) else value
+        for key, value in asdict(row).items()
+    }
+
+
+def read(file: Path) -> KeptAnswer:
+    """Read an answer.
+
+    Raises:
+        ConfigError: the file cannot be read, or is no answer.
+    """
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        rows = tuple(AnswerRow(**row) for row in data["rows"])
+        pairs = {key: tuple(map(tuple, data[key])) for key in ("predictions", "hypotheses")}
+        contrast = tuple(data["contrast"]) if data["contrast"] else None
+        return KeptAnswer(**data | {"rows": rows, "contrast": contrast} | pairs)
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
+    except (ValueError, TypeError, KeyError) as error:
+        raise ConfigError(f"{file} is no kept answer: {error}") from None
+
+
+def mark_stale(answer: KeptAnswer, version: str, folder: Path) -> None:
+    """Note that a version no longer gives an answer."""
+    marked = replace(answer, stale_since=version)
+    write_whole(folder / f"{answer.study}.json", _text(asdict(marked)))
+
+
+def all_kept(folder: Path) -> list[KeptAnswer]:
+    """Every answer that is kept in a folder, in the order of the studies' names."""
+    files = [file for file in sorted(folder.glob("*.json")) if not file.name.endswith(_MANIFEST)]
+    return [read(file) for file in files]

@@ -1,0 +1,116 @@
+"""Answers that are kept: what a results folder answered, and whether it is still given."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from helpers.studies.small_study import cheap, study_in
+from helpers.wording import unnamed
+
+from dva_sim.cli import answers as command
+from dva_sim.experiments.execution.runner import run_study
+from dva_sim.experiments.report import kept_answers
+from dva_sim.experiments.report.answer_pages import answers_page
+from dva_sim.kernel.errors import ConfigError, ExitCode
+
+
+def finished(folder, *settings, is_dirty=False):
+    """The results of a small study, by a program without changes unless it has some."""
+    folder.mkdir()
+    out = run_study(study_in(folder, *settings), folder / "results", episode=cheap, jobs=1)
+    manifest = json.loads((out / "manifest.json").read_text())
+    manifest["versions"]["dirty"] = is_dirty
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    return out
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The answer of a small study, and its manifest."""
+    return kept_answers.answer_in(finished(tmp_path_factory.mktemp("study") / "r"))
+
+
+@pytest.fixture
+def kept(found, tmp_path):
+    """The same, and a folder to keep it in."""
+    return *found, tmp_path / "answers"
+
+
+def test_an_answer_is_read_as_it_was_kept(kept):
+    answer, manifest, folder = kept
+    file = kept_answers.keep(answer, manifest, folder)
+    assert kept_answers.read(file) == answer
+    assert kept_answers.all_kept(folder) == [answer]
+    assert [row.level for row in answer.rows] == [0, 0.25]
+    assert all(row.low <= row.mean <= row.high for row in answer.rows)
+    assert (answer.seed, answer.persons, answer.status) == (3, 3, "declared")
+
+
+def test_an_answer_that_is_replaced_becomes_history(kept):
+    answer, manifest, folder = kept
+    kept_answers.keep(replace(answer, version="0.1.0"), manifest, folder)
+    kept_answers.keep(answer, manifest, folder)
+    kept_answers.keep(answer, manifest, folder)  # the same again is no history
+    lines = (folder / kept_answers.HISTORY).read_text().splitlines()
+    assert len(lines) == 1 + len(answer.rows)
+    assert all(
+        line.startswith(f"{answer.study},0.1.0,{answer.date},declared") for line in lines[1:]
+    )
+
+
+@pytest.mark.parametrize(
+    ("sampled", "now", "words", "is_stale"),
+    [
+        ({"a": "1", "b": "2"}, {"a": "1", "b": "2"}, "still given", False),
+        ({"a": "1", "b": "2"}, {"a": "1", "b": "3"}, "1 of 2", True),
+        ({"a": "1"}, {"b": "1"}, "0 of 1", True),  # its seeds or configurations are others
+        ({}, {}, "real time", False),
+    ],
+)
+def test_whether_an_answer_is_still_given_is_told_by_its_runs(kept, sampled, now, words, is_stale):
+    told, found = command._told(replace(kept[0], sampled=sampled), now)
+    assert words in told
+    assert found is is_stale
+
+
+def test_an_answer_that_is_no_longer_given_fails_the_gate_until_it_is_marked(kept, monkeypatch):
+    answer, manifest, folder = kept
+    kept_answers.keep(replace(answer, sampled={"drive/0": "1"}), manifest, folder)
+    monkeypatch.setattr(command, "_sampled", lambda names, jobs: {answer.study: {"drive/0": "2"}})
+    assert command._compare(folder, [], False, 1) == ExitCode.GATE_FAILED
+    assert command._compare(folder, [], True, 1) == ExitCode.OK
+    assert command._compare(folder, [], False, 1) == ExitCode.OK
+    assert kept_answers.all_kept(folder)[0].stale_since
+
+
+def test_a_study_that_has_no_kept_answer_is_named(kept):
+    answer, manifest, folder = kept
+    kept_answers.keep(answer, manifest, folder)
+    with pytest.raises(ConfigError, match=r".") as caught:
+        command._compare(folder, [f"{answer.study}s"], False, 1)
+    assert unnamed(str(caught.value), repr(f"{answer.study}s"), repr(answer.study)) == []
+
+
+def test_only_a_whole_study_as_its_file_has_it_is_kept(tmp_path):
+    changed = finished(tmp_path / "r", "persons=2")
+    with pytest.raises(ConfigError, match="persons=2"):
+        kept_answers.answer_in(changed)
+    with pytest.raises(ConfigError, match="not committed"):
+        kept_answers.answer_in(finished(tmp_path / "dirty", is_dirty=True))
+    with pytest.raises(ConfigError, match=r"."):
+        kept_answers.answer_in(tmp_path)
+
+
+def test_the_page_dates_each_answer(kept):
+    answer = replace(kept[0], stale_since="9.9.9")
+    page = answers_page([answer])
+    assert page.count(f"## {answer.study}") == 1
+    assert unnamed(page, answer.question, answer.answer, answer.date, "since 9.9.9", "seed 3") == []
+
+
+def test_a_file_that_is_no_answer_is_named(tmp_path):
+    for text in ("{", "[]", '{"study": "x"}'):
+        file = tmp_path / "x.json"
+        file.write_text(text)
+        with pytest.raises(ConfigError, match=r"x\.json"):
+            kept_answers.read(file)
