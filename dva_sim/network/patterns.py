@@ -120,6 +120,9 @@ class Pattern(ABC):
     def offer(self, command: Command) -> None:
         """The app has made a command: send it, keep it for later, or supersede it."""
 
+    def end(self) -> None:  # noqa: B027 (most patterns send nothing by themselves)
+        """Stop sending: the drive is over."""
+
 
 class Requested(Pattern):
     """Requests: the next command goes when one of those under way has been answered.

@@ -141,6 +141,8 @@ class TriedDrive:
 
     def end(self) -> None:
         """The app sends nothing more."""
+        if self._on:
+            self.pattern.end()
         self._on = False
         if self._requester is not None:
             self._requester.close()

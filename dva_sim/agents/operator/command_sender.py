@@ -94,6 +94,8 @@ class CommandSender:
 
     def stop(self) -> None:
         """Send nothing more and close the socket."""
+        if self._on:
+            self._let(self._pattern.end)
         self._on = False
         if self._holder is not None:
             self._holder.close()
