@@ -79,8 +79,9 @@ class RequestWindow:
         """
         self.unanswered -= 1
         self._trips.append(round_trip)
-        # A rate needs two answers, and a round those of all requests that began before it.
-        if number >= self._last_of_round and len(self._trips) > 1:
+        # A rate needs two answers and time, a round the answers to all that was sent before it.
+        is_over = number >= self._last_of_round and len(self._trips) > 1
+        if is_over and now != self._round_began:
             self._end_round(now)
 
     def _end_round(self, now: float) -> None:

@@ -39,6 +39,7 @@ class Shape:
         trials: Of each.
         missing: Share of the values that are not there.
         is_constant: Whether all values of a column are the same.
+        models: Factor of models of persons over which the study declares a map; none if empty.
     """
 
     factors: Mapping[str, tuple[Level, ...]] = field(default_factory=dict)
@@ -48,6 +49,7 @@ class Shape:
     trials: int = 2
     missing: float = 0.0
     is_constant: bool = False
+    models: str = ""
 
 
 def _contrast(
@@ -76,6 +78,7 @@ _CARRIERS: Final[Mapping[str, tuple[Level, ...]]] = {"transport": ("udp", "tcp")
 
 SHAPES: Final[Mapping[str, Shape]] = {
     "lines along a delay, in three panels": Shape(_GRID, _ALONG),
+    "a map over models of persons": Shape(_GRID, _ALONG, models="profile"),
     "two words": Shape(
         {"control": ("direct", "supervised")},
         _contrast("control", ("direct", "supervised"), measure="drive_time_s"),
@@ -138,6 +141,7 @@ def _manifest(shape: Shape, runs: int) -> dict[str, Any]:
         "factors": {name: list(levels) for name, levels in shape.factors.items()},
         "parts": {PART: {"scenario": "made-up"}},
         "answer": dict(shape.answer) or None,
+        "map": {"models": shape.models} if shape.models else None,
     }
     scenarios = {PART: {"model": shape.model, "horizon_s": HORIZON_S}}
     versions = {"dva-sim": "made up"}

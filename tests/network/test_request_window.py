@@ -70,3 +70,12 @@ def test_a_window_that_is_full_is_closed_until_an_answer():
     assert not window.is_open
     window.answered(numbers[0], 0.1, 0.1)
     assert window.is_open
+
+
+def test_answers_that_all_come_at_once_are_taken_in():
+    window = RequestWindow(10.0)
+    for _ in range(5):
+        numbers = [window.sent() for _ in range(4)]
+        for number in numbers:
+            window.answered(number, 1.0, 1.0)
+    assert 1 <= window.size <= MOST
