@@ -70,14 +70,14 @@ def episode(
         set: Change a key. Or several: a mapping, or `key=value` pairs.
         video: Write a film: `.gif` or `.mp4`.
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
-        strip: Draw several moments in one figure, likewise.
+        strip: Draw several moments in one figure: .png, .pdf or .svg.
         at: Moment of the still, or moments of the strip: 10,20,30. In seconds, also as numbers.
         panels: How many moments a strip has.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
         side_by_side: Run the same seed under two patterns. The episode is that of the first.
-        record: Keep the run as a file: `.mcap`, for replay and viewers.
-        overwrite: Replace what is there.
+        record: Record the run in a file: `.mcap`, for replay and viewers.
+        overwrite: Overwrite existing files.
 
     Raises:
         ConfigError: there is none, it is not valid with these changes, or it cannot be drawn so.
@@ -110,16 +110,16 @@ def replay(
     """A recorded run from its file alone, drawn or taken to ROS 2 if asked to.
 
     Args:
-        file: A recording: `.mcap`, or `.mcap.part` as a run that was killed left it.
+        file: A recording: `.mcap`, or the `.mcap.part` that a killed run left.
         video: Write a film: `.gif` or `.mp4`.
         still: Draw one moment: `.png`, `.pdf` or `.svg`.
-        strip: Draw several moments in one figure, likewise.
+        strip: Draw several moments in one figure: .png, .pdf or .svg.
         at: Moment of the still, or moments of the strip: 10,20,30. In seconds, also as numbers.
         panels: How many moments a strip has.
         camera: The still shows what this robot's camera sees.
         inset: Show in the film what a robot's camera sees.
-        ros2: Write a ROS 2 bag; the folder is new.
-        mcap: Write a whole recording of an `.mcap.part`; the file is new.
+        ros2: Write a ROS 2 bag to a new folder.
+        mcap: Turn an `.mcap.part` into a complete recording in a new file.
 
     Raises:
         ConfigError: not a recording, or what is asked for is not in it.
@@ -152,10 +152,10 @@ def run(
     progress: Callable[[int, int], object] | None = None,
     report: bool = True,
 ) -> Results:
-    """Run a study, or go on with one that was interrupted, and write its report.
+    """Run or resume a study and write its report.
 
     Args:
-        study: A study by name or path.
+        study: A study, by name or path.
         out: Results folder; default: `results/STUDY`.
         set: Change a key. Or several: a mapping, or `key=value` pairs.
         seed: Random seed of the whole study. In place of its own.
@@ -164,7 +164,7 @@ def run(
         limit_s: A run that takes longer has failed. By the wall clock [s].
         quick: The study's small version.
         full: The study's larger version.
-        pilot: Only so many persons, with a random seed of their own. The study never uses it.
+        pilot: Run only this many persons, with a random seed of their own. The study never uses it.
         progress: Called with the number of runs done and of all runs, as they finish.
         report: Whether to write the report.
 
@@ -247,9 +247,9 @@ def register(study: str | Path, *, full: bool = False, again: bool = False) -> P
     """Fix a study's hypotheses and size before it is run; the run then confirms or refutes them.
 
     Args:
-        study: A study by name or path.
+        study: A study, by name or path.
         full: The study's larger version.
-        again: In place of an earlier registration; the report will say so.
+        again: Replace an earlier registration; the report will say so.
 
     Raises:
         DvaSimError: nothing to register, a size left open, or a registration that is there.
@@ -274,7 +274,7 @@ def tune(
     """Choose what a study has tuned, on persons who take no part in it, and keep it beside it.
 
     Args:
-        study: A study by name or path.
+        study: A study, by name or path.
         out: Folder of the trials; default: `results/STUDY-tuning`.
         jobs: How many processes; default: one for each core.
         progress: Called with the number of trials done and of all trials, as they finish.
@@ -298,8 +298,8 @@ def report(folder: Folder, *, pdf: bool = False, figure: str | Sequence[str] = (
 
     Args:
         folder: A results folder.
-        pdf: Print it as PDF too, by Chromium. Or by Chrome; no other browser is looked for.
-        figure: With a figure of one's own. Such as `mine.py:Mine`, or several.
+        pdf: Also print it as PDF, using Chromium. Chrome works too; no other browser is tried.
+        figure: Add a figure of your own. Such as `mine.py:Mine`, or several.
 
     Raises:
         DvaSimError: no results there, no such figure, no browser that prints, or a disk that cannot
@@ -323,7 +323,7 @@ def show(
         folder: A results folder.
         table: Show the rows of a table.
         rows: How many of them.
-        columns: Say what the columns mean, of one table or all.
+        columns: Explain the columns of one table or all.
 
     Raises:
         ConfigError: no results there, or no such table.
@@ -350,7 +350,7 @@ def export(
         out: `X.csv` or `X.parquet` for one table, or a folder.
         table: Only this one. Or these.
         format: In a folder; default: csv. Or `parquet`.
-        overwrite: Replace what is there.
+        overwrite: Overwrite existing files.
 
     Raises:
         DvaSimError: no such table or format, a file that is there, or one that cannot be written.
@@ -380,7 +380,7 @@ def compare(first: Folder, second: Folder) -> Comparison:
 
     Args:
         first: A results folder.
-        second: What is compared with it.
+        second: The results folder to compare with it.
 
     Raises:
         ConfigError: one is no results folder, or they have no configuration in common.

@@ -27,7 +27,7 @@ class CameraService:
     """Serves the pictures of a run's robots.
 
     Args:
-        host: Address of this machine to listen on.
+        host: Address to listen on.
         port: Which; if it is taken, or 0, any that is free.
         clock: Clock of the run.
         tell: Takes a line for the story of the run.

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     jobs=(Jobs, None),
 )
 def answers(studies: list[str], keep: list[str], page: bool, mark: bool, jobs: int | None) -> None:
-    """Tell which published answers the program still gives.
+    """Check which published answers this version still gives.
 
-    A few runs of each study are made again and compared with what is kept beside the studies.
+    A few runs of each study are repeated and compared with the answers kept beside the studies.
 
     Examples:
         dva-sim answers  # all of them: a minute or two

@@ -98,7 +98,7 @@ class PanelGroup(TyperGroup):
         """As ever; of a command that there is not, the nearest is named."""
         name = args[0]
         if not ctx.resilient_parsing and self.get_command(ctx, name) is None and name[0] != "-":
-            ctx.fail(f"{name!r} is no command; {hint(name, self.list_commands(ctx))}")
+            ctx.fail(f"{name!r} is not a command; {hint(name, self.list_commands(ctx))}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:

@@ -16,7 +16,7 @@ _LABEL = re.compile(r"(robot|guard|operator|detector|control-room)-([1-9][0-9]{0
 
 
 def make_keys(folder: Path, names: Iterable[str]) -> str:
-    """Make a pair of keys for each device that has none.
+    """Create a key pair for each device that has none.
 
     Args:
         folder: Where keys are kept.
@@ -46,5 +46,7 @@ def _ids(name: str) -> Iterator[str]:
         try:
             scenario = build(load(name))
         except ConfigError as error:
-            raise ConfigError(f"{name!r} is no device (dva, robot-1) and no scenario") from error
+            raise ConfigError(
+                f"{name!r} is neither a device (dva, robot-1) nor a scenario"
+            ) from error
         yield from team_of(scenario)

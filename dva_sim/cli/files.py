@@ -48,9 +48,9 @@ def _listed(incomplete: str) -> list[str]:
 
 @asks(kind=(argument("Only this kind, such as studies.", "KIND", _listed, str | None), None))
 def list_(kind: str | None, as_json: Json = False) -> None:
-    """Name all studies, scenarios, sites, agents and policies.
+    """List all studies, scenarios, sites, agents and policies.
 
-    There is a line for each name, with what it is.
+    Prints one line per name, with a description.
 
     Examples:
         dva-sim list  # all of them
@@ -66,10 +66,10 @@ def list_(kind: str | None, as_json: Json = False) -> None:
 
 
 def plugins(as_json: Json = False) -> None:
-    """Say what can be added to the program, and how.
+    """Show what can be added to the program, and how.
 
-    Policies, operators, filters and others are classes in a file of yours, or offered by an
-    installed package; it says which there are, and how one is named.
+    Policies, operators, filters and other plug-ins are classes in your own files or in installed
+    packages. Shows the kinds, what is available, and how to name one.
 
     Examples:
         dva-sim plugins  # all kinds
@@ -85,9 +85,9 @@ def plugins(as_json: Json = False) -> None:
 
 @asks(page=(flag("--page", "Print them as the page docs/assumptions.md."), False))
 def assumed(page: bool, as_json: Json = False) -> None:
-    """List all numbers about people that were assumed.
+    """List all assumed numbers about people and phones.
 
-    Each is a key of a scenario, and may be a factor of a study.
+    Each is a scenario key that a study can vary as a factor.
 
     Examples:
         dva-sim assumed  # key, default, band and reason
@@ -106,20 +106,20 @@ def assumed(page: bool, as_json: Json = False) -> None:
 
 @asks(
     files=(argument(_FILES, "FILE...", of=list[str]), REQUIRED),
-    set_=(several("An option of what is tried.", "KEY=VALUE", "--set"), ()),
+    set_=(several("An option of the plug-in under test.", "KEY=VALUE", "--set"), ()),
 )
 def check(files: list[str], set_: list[str]) -> None:
-    """Tell of each file whether it is valid, and if not, where and why.
+    """Check files and point to each error in them.
 
-    Of what users bring, such as a policy or a robot: whether it keeps its promises. Of the emulated
-    link: whether real packets cross it as it is told.
+    Plug-ins such as policies and robots are tested against the promises of their kind. The emulated
+    link is tested with real packets.
 
     Examples:
         dva-sim check message.xml my-study.yaml worlds/*.yaml  # files of any kind
         dva-sim check - < message.xml  # a message from a pipe
-        dva-sim check run.mcap  # is all of it valid, and would it be decided so again?
+        dva-sim check run.mcap  # is it valid, and are its decisions reproduced?
         dva-sim check policy agents/policies/patrol.py:Patrol  # does it keep its promises?
-        dva-sim check link  # does the emulated link do what it is told?
+        dva-sim check link  # does the emulated link behave as configured?
     """
     from dva_sim.cli import checks  # late: start-up
 
@@ -128,9 +128,12 @@ def check(files: list[str], set_: list[str]) -> None:
 
 @asks(
     file=(argument("Of a phone's motion.", "FILE", of=Path), REQUIRED),
-    commands=(flag("--commands", "Print the commands that its app made of it."), False),
+    commands=(flag("--commands", "Print the commands that the app would send."), False),
     rate=(Annotated[float, Option(metavar="HZ", min=0.1, max=100.0, help=_RATE)], 10.0),
-    part=(file("Write an accelerometer part that measures so.", "--part", metavar="OUT"), None),
+    part=(
+        file("Write an accelerometer part with these properties.", "--part", metavar="OUT"),
+        None,
+    ),
     unit=(Annotated[Literal["m/s2", "g"] | None, Option(help=_UNIT)], None),
 )
 def phone_log(
@@ -141,10 +144,10 @@ def phone_log(
     unit: Literal["m/s2", "g"] | None,
     as_json: Json = False,
 ) -> None:
-    """Say how even and how noisy a phone's samples are, or replay them.
+    """Analyse or replay a log of a phone's motion sensor.
 
-    FILE is written by a console that keeps the motion of phones whose person agrees, or exported
-    by a logger app: a table of time and acceleration with gravity along x, y and z.
+    FILE comes from a console with --keep-motion, or from a logger app: a table of time and of
+    acceleration including gravity along x, y and z.
 
     Examples:
         dva-sim phone-log motion-1.csv  # rate, jitter, gaps, noise at rest
@@ -168,9 +171,9 @@ def phone_log(
     )
 )
 def schema(kind: str) -> None:
-    """Print the schema of a kind of file.
+    """Print the schema of a file type.
 
-    It is XSD for messages, and JSON Schema for all others.
+    The schema is XSD for messages and JSON Schema for everything else.
 
     Examples:
         dva-sim schema scenario > scenario.schema.json  # for an editor
@@ -184,15 +187,18 @@ def schema(kind: str) -> None:
     what=(argument("dispatch, operators or network.", "WHAT", one_of(*_EVIDENCE)), "dispatch"),
     out=(folder("Write tables, figures and a page there.", "-o", "--out"), None),
     cases=(file("A file of cases, by name or path; not for operators.", of=str | None), None),
-    strategy=(text("How operators drive; operators only."), None),
-    quick=(flag("--quick", "Fewer runs, wider errors."), False),
+    strategy=(text("Driving strategy of the operators; operators only."), None),
+    quick=(flag("--quick", "Run fewer cases, with wider error bounds."), False),
     jobs=(Jobs, None),
     seed=(count("Random seed.", "--seed"), 1),
-    ablate=(flag("--ablate", "Leave mechanisms out one by one; network only."), False),
+    ablate=(flag("--ablate", "Remove mechanisms one by one; network only."), False),
     live=(flag("--live", "Measure real sockets now; network only."), False),
-    measure=(file("Measure the whole design, or go on with it; network only."), None),
+    measure=(file("Measure the whole design, or resume it; network only."), None),
     beside=(
-        text("Results of a middleware study beside predictions; network only.", metavar="FOLDER"),
+        text(
+            "Compare the results of a middleware study with predictions; network only.",
+            metavar="FOLDER",
+        ),
         None,
     ),
 )
@@ -201,7 +207,7 @@ def validate(
 ) -> None:
     """Compare the models with theory, people and sockets.
 
-    It plays what the answer is known of, and ends with 4 if a prediction misses.
+    Runs cases with known answers. The exit code is 4 if a prediction misses.
 
     Examples:
         dva-sim validate dispatch --quick  # against queueing theory and geometry

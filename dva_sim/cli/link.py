@@ -13,10 +13,10 @@ from typer import Argument
 from dva_sim.cli.options import RUN, SCENARIOS, Overwrite, Quiet, asks, count, file, text
 from dva_sim.kernel.errors import ConfigError
 
-_FILE = "Keys of a link, or a scenario, whose link is taken; default: a fast one."
+_FILE = "Keys of a link, or a scenario with a link; default: a fast link."
 _KEYS = Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)]
-_PUBLISH = "Port at the near end that 127.0.0.1 of this machine leads to, as for a page."
-_OUT = "Keep the counts: X.csv, or a folder for link.csv."
+_PUBLISH = "Make a port of the near end available on 127.0.0.1 of this computer."
+_OUT = "Save the counts: X.csv, or a folder for link.csv."
 
 
 @asks(
@@ -24,7 +24,10 @@ _OUT = "Keep the counts: X.csv, or a folder for link.csv."
         Annotated[str | None, Argument(metavar="LINK.yaml", autocompletion=SCENARIOS, help=_FILE)],
         None,
     ),
-    near=(text("Command at one end; when it ends, all ends.", metavar="CMD", of=str), ""),
+    near=(
+        text("Command at one end; when it ends, the other is stopped.", metavar="CMD", of=str),
+        "",
+    ),
     far=(text("Command at the other end.", metavar="CMD", of=str), ""),
     publish=(count(_PUBLISH, metavar="PORT", least=1, most=65_535, of=list[int] | None), None),
     **RUN,
@@ -44,25 +47,25 @@ def link(
 ) -> None:
     """Run any two programs over a link you choose.
 
-    Each command runs in the shell, in a network of its own. The two networks are joined by an
-    emulated link, and by nothing else: no internet, no name server, and not this machine, but for
-    ports at the near end that are published. Both commands find the addresses of the two ends in
-    DVA_LINK_NEAR and DVA_LINK_FAR. What they print passes through.
+    Each command runs in the shell, in its own network namespace. An emulated link is the only
+    connection between the two: there is no internet, no name server and no access to this computer,
+    except for published ports at the near end. Both commands find the addresses of the two ends in
+    DVA_LINK_NEAR and DVA_LINK_FAR. Their output is passed through.
 
     The link has the keys of a scenario's link: delay_s, jitter_s, loss, bursts, rate_bps,
     queue_packets, outages, trace_up and others. `up` holds what is different from near to far,
-    `down` from far to near. The same seed loses and delays the same packets, counted from the
-    first; bursts, outages and recordings go by the time since the start.
+    `down` from far to near. The same seed drops and delays the same packets, counted from the
+    first. Bursts, outages and recordings follow the time since the start.
 
-    The exit code is that of the near command. At its end, or with Ctrl-C, everything that either
-    command has started is ended. Then standard error tells how many packets passed, were lost and
-    waited, and how late the emulator itself was: a run that it disturbed is marked.
+    The exit code is that of the near command. When it ends, or on Ctrl-C, everything that either
+    command started is ended. Standard error then shows how many packets passed, were lost and were
+    queued, and how late the emulator itself was. Runs disturbed by the emulator are marked.
 
     It needs Linux, /dev/net/tun, and root or user namespaces.
 
     Examples:
         dva-sim link --set delay_s=0.1 --near 'ping $DVA_LINK_FAR' --far 'sleep 9'  # a slow link
-        dva-sim link bad.yaml --near ./client.py --far ./server.py -o run.csv  # keep the counts
+        dva-sim link bad.yaml --near ./client.py --far ./server.py -o run.csv  # save the counts
         dva-sim link --set up.loss=0.1 --near ./client.py --far ./server.py  # losses one way
     """
     from dva_sim.cli import link_counts  # late: start-up

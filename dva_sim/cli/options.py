@@ -140,30 +140,33 @@ Sets = Annotated[
     list[str] | None,
     Option("--set", metavar="KEY=VALUE", help="Change a key; may be given again."),
 ]
-Overwrite = Annotated[bool, Option("--overwrite", help="Replace what is there.")]
+Overwrite = Annotated[bool, Option("--overwrite", help="Overwrite existing files.")]
 Json = Annotated[bool, Option("--json", help="Print JSON, for other programs.")]
-Quiet = Annotated[bool, Option("-q", "--quiet", help="Print mistakes alone.")]
-Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more than usual.")]
+Quiet = Annotated[bool, Option("-q", "--quiet", help="Print only errors.")]
+Verbose = Annotated[bool, Option("-v", "--verbose", help="Print more detail.")]
 
 REQUIRED: Any = Parameter.empty
 PAGE: dict[str, tuple[Any, Any]] = {
-    "host": (text("Address of this machine to listen on.", metavar="HOST", of=str), "127.0.0.1"),
-    "port": (count("Port of the page; 0: any that is free.", metavar="PORT", most=65_535), 8765),
-    "no_open": (flag("--no-open", "Open no browser."), False),
-    "no_token": (flag("--no-token", "Let everybody in who reaches the page."), False),
+    "host": (text("Address to listen on.", metavar="HOST", of=str), "127.0.0.1"),
+    "port": (count("Port of the page; 0: any free port.", metavar="PORT", most=65_535), 8765),
+    "no_open": (flag("--no-open", "Do not open a browser."), False),
+    "no_token": (
+        flag("--no-token", "Disable the access token: anyone who can reach the page gets in."),
+        False,
+    ),
 }
 """Options of commands that serve a page, with their defaults."""
 RUN: dict[str, tuple[Any, Any]] = {"seed": (RunSeed, 1), "set_": (Sets, None)}
 """Options of commands that run a scenario in real time."""
 
-_PILOT = "Only so many persons, with a random seed of their own."
+_PILOT = "Run only this many persons, with a random seed of their own."
 OPTIONS: dict[str, Any] = {
-    "again": flag("--again", "In place of an earlier registration; the report will say so."),
+    "again": flag("--again", "Replace an earlier registration; the report will say so."),
     "at": text("Moment of the still, or moments of the strip: 10,20,30.", metavar="SECONDS"),
     "camera": text("The still shows what this robot's camera sees.", metavar="ROBOT"),
-    "columns": flag("--columns", "Say what the columns mean, of one table or all."),
-    "figure": several("With a figure of one's own; may be given again.", metavar="FILE:CLASS"),
-    "file": argument("A recording: .mcap, or .mcap.part as a run that was killed left it.", "FILE"),
+    "columns": flag("--columns", "Explain the columns of one table or all."),
+    "figure": several("Add a figure of your own; may be given again.", metavar="FILE:CLASS"),
+    "file": argument("A recording: .mcap, or the .mcap.part that a killed run left.", "FILE"),
     "first": argument("A results folder.", "A"),
     "folder": argument("A results folder.", "FOLDER"),
     "format": text("In a folder; default: csv.", metavar="csv|parquet"),
@@ -171,25 +174,25 @@ OPTIONS: dict[str, Any] = {
     "inset": flag("--inset", "Show in the film what a robot's camera sees."),
     "jobs": Jobs,
     "limit_s": seconds("A run that takes longer has failed.", "--limit", of=float),
-    "mcap": text("Write a whole recording of an .mcap.part; the file is new.", metavar="FILE"),
+    "mcap": text("Turn an .mcap.part into a complete recording in a new file.", metavar="FILE"),
     "name": argument("Name or path of the new study.", "NAME"),
     "overwrite": Overwrite,
     "panels": count("How many moments a strip has.", least=1, most=24),
-    "pdf": flag("--pdf", "Print it as PDF too, by Chromium."),
+    "pdf": flag("--pdf", "Also print it as PDF, using Chromium."),
     "pilot": count(_PILOT, metavar="PERSONS", least=1, of=int | None),
     "quick": flag("--quick", "The study's small version."),
-    "record": text("Keep the run as a file: .mcap, for replay and viewers.", metavar="FILE"),
-    "ros2": text("Write a ROS 2 bag; the folder is new.", metavar="FOLDER"),
+    "record": text("Record the run in a file: .mcap, for replay and viewers.", metavar="FILE"),
+    "ros2": text("Write a ROS 2 bag to a new folder.", metavar="FOLDER"),
     "rows": count("How many of them.", least=1),
     "scenario": ScenarioName,
     "scheduler": text("Use a dask.distributed cluster instead.", metavar="tcp://HOST:PORT"),
-    "second": argument("What is compared with it.", "B"),
+    "second": argument("The results folder to compare with it.", "B"),
     "seed": RunSeed,
     "set": Sets,
     "side_by_side": text("Run the same seed under two patterns.", metavar="PATTERN,PATTERN"),
     "still": text("Draw one moment: .png, .pdf or .svg.", metavar="FILE"),
-    "strip": text("Draw several moments in one figure, likewise.", metavar="FILE"),
-    "study": argument("A study by name or path.", "STUDY", STUDIES),
+    "strip": text("Draw several moments in one figure: .png, .pdf or .svg.", metavar="FILE"),
+    "study": argument("A study, by name or path.", "STUDY", STUDIES),
     "table": text("Show the rows of a table."),
     "video": text("Write a film: .gif or .mp4.", metavar="FILE"),
     # What is another option in one command.

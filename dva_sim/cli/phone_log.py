@@ -78,7 +78,7 @@ def write_part(path: Path, out: Path, unit: Unit | None) -> None:
         with out.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise ConfigError("is there already", out) from None
+        raise ConfigError("already exists", out) from None
     except OSError as error:
         raise ConfigError(f"cannot be written: {error.strerror}", out) from None
     print(f"{out} written: name it as phone.accelerometer")

@@ -18,13 +18,13 @@ def report(
 ) -> None:
     """Make the report of a results folder again.
 
-    It is a page, its figures, and the numbers in them. Of a study that still runs, the page
-    says what is known so far. Figures of one's own, which a study names in its file, are drawn
-    when it is run; afterwards they are drawn where --figure names them.
+    A report is a page, its figures and the numbers behind them. While a study is running, the page
+    shows the results so far. Your own figures, named in the study's file, are drawn when the study
+    is run; later they are drawn only if --figure names them.
 
     Examples:
         dva-sim report results/req-rep-vs-pub-sub --pdf  # and report.pdf for print
-        dva-sim report small --figure risk.py:Risk  # with a figure of one's own
+        dva-sim report small --figure risk.py:Risk  # with a figure of your own
     """
     with loudness(quiet, verbose):
         page = api.report(folder, pdf=pdf, **asked)
@@ -36,8 +36,8 @@ def report(
 def show(folder: str, table: str | None, rows: int, columns: bool, as_json: Json = False) -> None:
     """Show a results folder in the terminal.
 
-    It shows the answer and every cell, or a table, or what the columns mean. Of a study that
-    still runs it shows what is known so far.
+    Shows the answer and every cell, or a table, or the meaning of the columns. While a study is
+    running, it shows the results so far.
 
     Examples:
         dva-sim show small  # the answer and every cell
@@ -82,7 +82,12 @@ def export(**asked: Any) -> None:
         several("NAME or TABLE.NAME; default: the answer's. May be given again.", "MEASURE"),
         (),
     ),
-    by=(several("Its levels in place of cells; may be given again.", "FACTOR"), ()),
+    by=(
+        several(
+            "Compare by the levels of this factor instead of by cell; may be given again.", "FACTOR"
+        ),
+        (),
+    ),
     fail_if=(several("Exit with 4 if it holds; may be given again.", "CONDITION"), ()),
 )
 def compare(

@@ -36,17 +36,20 @@ from dva_sim.kernel.errors import ConfigError
 _PORT: Any = {"metavar": "PORT", "most": 64_999}  # of the first of two
 LINKS = "modelled", "real"
 _ADDRESS = "HOST:PORT"
-_LISTEN = "Address of this machine to listen on."
-_FOR = "How long; default: to the scenario's horizon, or until stopped with --only dva."
-_PICTURES = "Port of the robots' pictures (HTTP); default: 8764, with --keys none. 0: any."
-_SCENARIO = "A scenario by name or path; hands-on if none is named."
+_LISTEN = "Address to listen on."
+_FOR = "How long to run; default: until the scenario's horizon, or until stopped with --only dva."
+_PICTURES = (
+    "Port of the robots' camera pictures (HTTP); default: 8764, or none with --keys. 0: any free "
+    "port."
+)
+_SCENARIO = "A scenario by name or path; default: hands-on."
 _LINK = (
-    "Emulate a link to the robots: its keys, or a file of them; may be given again. "
-    "scenario: that of the scenario."
+    "Emulate a link to the robots, given by keys or a file of keys; may be given again. 'scenario' "
+    "uses the scenario's link."
 )
 _TRANSPORT: Any = (
     text(
-        "What carries messages, and options of MQTT: broker=near|far, qos=0|1.",
+        "Transport of the messages, and options of MQTT: broker=near|far, qos=0|1.",
         metavar="zeromq|mqtt|KEY=VALUE",
         of=list[str] | None,
     ),
@@ -90,7 +93,7 @@ def replay(
     verbose: Verbose = False,
     **pictures: Any,
 ) -> None:
-    """Tell and draw a recorded run from its file alone.
+    """Tell and draw a recorded run from its file.
 
     Examples:
         dva-sim replay drill.mcap --console  # play, pause, jump, on a page in the browser
@@ -123,17 +126,23 @@ def _show_replay(**asked: Any) -> None:
 
 @asks(
     scenario=(ScenarioName, REQUIRED),
-    only=(choice("dva", "world", "operator", help="Run one part alone.", of=str | None), None),
-    number=(count("Which operator, with --only operator.", "--number", least=1), 1),
+    only=(choice("dva", "world", "operator", help="Run only this part.", of=str | None), None),
+    number=(count("Number of the operator, with --only operator.", "--number", least=1), 1),
     operators=(choice("simulated", "scripted", help="Who drives."), "simulated"),
-    dva=(text("Where the DVA listens; 127.0.0.1:5600 with --only.", metavar=_ADDRESS), None),
+    dva=(
+        text("Address of the DVA; with --only: 127.0.0.1:5600 by default.", metavar=_ADDRESS),
+        None,
+    ),
     host=(PAGE["host"][0], "127.0.0.1"),
-    port=(count("First port, two for each device; default: free ones.", **_PORT), 0),
-    keys=(folder("Folder of keys: CURVE is on."), None),
+    port=(count("First of two ports per device; default: free ports.", **_PORT), 0),
+    keys=(folder("Folder of keys; turns on CURVE encryption."), None),
     camera_port=(count(_PICTURES, metavar="PORT", most=65_535, of=int | None), None),
-    record=(file("A recording (.mcap); or a folder of traces.", metavar="FILE|FOLDER"), None),
+    record=(
+        file("Record to a file (.mcap), or write traces to a folder.", metavar="FILE|FOLDER"),
+        None,
+    ),
     overwrite=(Overwrite, False),
-    state=(file("File that lets a killed DVA go on where it was."), None),
+    state=(file("File from which a DVA that was killed resumes."), None),
     duration=(seconds(_FOR, "--for"), None),
     link=(text(_LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
     transport=_TRANSPORT,
@@ -151,7 +160,8 @@ def live(
 ) -> None:
     """Run a scenario in real time, over sockets.
 
-    The DVA, the world and each operator are processes that talk by ZeroMQ, or by MQTT.
+    The DVA, the world and each operator are separate processes that communicate over ZeroMQ or
+    MQTT.
 
     Examples:
         dva-sim live drive-to-event  # a simulated person drives
@@ -189,30 +199,38 @@ def live(
     port=PAGE["port"],
     host=PAGE["host"],
     links=(
-        choice(*LINKS, help="As the scenario models them, or sockets that others join."),
+        choice(
+            *LINKS, help="Use simulated links, or real sockets that external programs can join."
+        ),
         "modelled",
     ),
-    dva_port=(count("With real links: port of the DVA; 0: any.", **_PORT), 0),
+    dva_port=(count("With --links real: port of the DVA; 0: any free port.", **_PORT), 0),
     transport=_TRANSPORT,
     link=(text("With --links real: " + _LINK, metavar="KEY=VALUE|FILE", of=list[str] | None), None),
-    dva=(text("Show what runs at this DVA; SCENARIO gives the plan.", metavar=_ADDRESS), None),
-    keys=(folder("With --dva: keys, one of a control room, from `dva-sim keys`."), None),
-    phones=(flag("--phones", "An address for phones, by https, with a QR code."), False),
+    dva=(text("Show the system of this DVA; SCENARIO provides the map.", metavar=_ADDRESS), None),
+    keys=(
+        folder("With --dva: folder of keys, including one of a control room; see `dva-sim keys`."),
+        None,
+    ),
+    phones=(flag("--phones", "Serve phones over HTTPS, and print a QR code."), False),
     phones_host=(
-        text("Address of this machine to listen on for phones.", metavar="HOST", of=str),
+        text("Address to listen on for phones.", metavar="HOST", of=str),
         "0.0.0.0",
     ),
     phones_port=(
-        count("Port for phones; 0: any that is free.", metavar="PORT", most=65_535),
+        count("Port for phones; 0: any free port.", metavar="PORT", most=65_535),
         8766,
     ),
     no_open=PAGE["no_open"],
     no_token=PAGE["no_token"],
-    results=(folder("Show the recordings of a study, worst first, and its report."), None),
-    record=(file("Keep the run as a file: .mcap, for replay."), None),
-    audit=(file("Keep who did what: .sqlite; an existing log is appended to."), None),
-    out=(folder("Keep tables of what people did there.", "-o", "--out"), None),
-    keep_motion=(folder("Keep the motion of phones there whose person agrees."), None),
+    results=(folder("Show the recordings of a study, worst first, with its report."), None),
+    record=(file("Record the run in a file: .mcap, for replay."), None),
+    audit=(
+        file("Keep an audit log of all actions: .sqlite; an existing log is appended to."),
+        None,
+    ),
+    out=(folder("Save tables of what people did in this folder.", "-o", "--out"), None),
+    keep_motion=(folder("Save motion data of phones whose users agree in this folder."), None),
     overwrite=(Overwrite, False),
     **RUN,
 )
@@ -235,14 +253,14 @@ def console(
 
     Examples:
         dva-sim console  # two robots, two guards, a fire and a leak
-        dva-sim console fire-drill --set link.delay_s=0.5  # any scenario, over a slower link
+        dva-sim console fire-drill --set link.delay_s=0.5  # another scenario, over a slower link
         dva-sim console --record run.mcap  # for `dva-sim replay` and `check`
-        dva-sim console --audit audit.sqlite  # who decided what, for `check`
+        dva-sim console --audit audit.sqlite  # who decided what, verifiable with `check`
         dva-sim console -o results/mine  # tables of the drives, for `show` and `report`
-        dva-sim console --links real  # over sockets, which other devices may join
+        dva-sim console --links real  # over sockets that other devices can join
         dva-sim console --links real --link delay_s=0.3  # robots behind an emulated link
-        dva-sim console --dva 127.0.0.1:5600  # what a `dva-sim live` does, here or elsewhere
-        dva-sim console --phones  # prints an address to be scanned by a phone
+        dva-sim console --dva 127.0.0.1:5600  # show a running `dva-sim live`
+        dva-sim console --phones  # print an address for a phone to scan
         dva-sim console --results results/mine  # recordings of a study, the worst first
     """
     host, carried_by = asked["host"], tuple(transport or ())
@@ -301,14 +319,17 @@ def console(
 @asks(
     profile=(argument("A robot by name or path.", "PROFILE", ROBOTS), "servrobot"),
     dva=(
-        text("Register there at once, and listen; else from the page.", metavar=_ADDRESS),
+        text(
+            "Register with this DVA and listen at once, rather than from the page.",
+            metavar=_ADDRESS,
+        ),
         None,
     ),
-    number=(count("Which robot it is, which says its id and label.", least=1, most=1000), 1),
-    listen=(count("Port at which it takes requests; 0: any.", **_PORT), 0),
+    number=(count("Number of the robot, which gives its id and label.", least=1, most=1000), 1),
+    listen=(count("Port for requests; 0: any free port.", **_PORT), 0),
     port=PAGE["port"],
     host=PAGE["host"],
-    keys=(folder("Keys of the devices, as by `dva-sim keys`."), None),
+    keys=(folder("Folder of keys; see `dva-sim keys`."), None),
     no_open=PAGE["no_open"],
     no_token=PAGE["no_token"],
     **RUN,
@@ -321,9 +342,9 @@ def robot(
     verbose: Verbose = False,
     **asked: Any,
 ) -> None:
-    """Run one simulated robot over sockets, with its windows.
+    """Run one simulated robot over sockets, with its own page.
 
-    It begins off: it is registered at any DVA, and its port opened, from its page.
+    The robot starts switched off. Register it with a DVA and open its port from its page.
 
     Examples:
         dva-sim robot  # the service robot; register it and open its port on the page
@@ -350,11 +371,11 @@ def _say_at_once(line: str) -> None:
 
 
 @asks(
-    folder=(argument("Where to put them.", "FOLDER", of=Path), REQUIRED),
+    folder=(argument("Folder for the keys.", "FOLDER", of=Path), REQUIRED),
     names=(argument("Devices (robot-1, an id), or scenarios.", "NAME...", of=list[str]), REQUIRED),
 )
 def keys(folder: Path, names: list[str]) -> None:
-    """Make a pair of keys for each device that has none.
+    """Create a key pair for each device that has none.
 
     Existing keys are kept. `dva-sim live --keys FOLDER` uses them.
 

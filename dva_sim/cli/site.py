@@ -20,11 +20,11 @@ _CHANGES = several("An option of a generated site.", "KEY=VALUE", "--set"), ()
     name=_NAME,
     out=(file("Picture; default: NAME.png.", "-o", "--out"), None),
     set_=_CHANGES,
-    coverage=(flag("--coverage", "Show where Wi-Fi is not good."), False),
+    coverage=(flag("--coverage", "Shade areas with weak Wi-Fi."), False),
     width=(count("Of the picture.", metavar="PIXELS", least=200, most=8000), 1650),
 )
 def show(name: str, out: Path | None, set_: list[str], coverage: bool, width: int) -> None:
-    """Draw a site and say in a line what it is.
+    """Draw a site and describe it in one line.
 
     Examples:
         dva-sim site show campus --coverage  # writes campus.png
@@ -44,7 +44,7 @@ def show(name: str, out: Path | None, set_: list[str], coverage: bool, width: in
     set_=_CHANGES,
 )
 def export(name: str, out: Path, set_: list[str]) -> None:
-    """Write a site as YAML and GeoJSON, to go on drawing.
+    """Export a site as YAML and GeoJSON for editing.
 
     Examples:
         dva-sim site export caparica -o mine  # into the folder mine

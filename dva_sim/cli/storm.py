@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 OUT = Path("results/storms")
 AROUND = 20.0  # of a breach, in its story [s]
 _PLAN = "Plan of one storm, as a failure leaves it: play that alone."
-_HOURS = "Go on with the next seeds until so many hours of a team have passed in all."
+_HOURS = "Continue with further seeds until this many fleet-hours are reached in total."
 
 
 @asks(
@@ -29,7 +29,7 @@ _HOURS = "Go on with the next seeds until so many hours of a team have passed in
     seeds=(text("Seeds of the storms, from and to.", metavar="FIRST:LAST", of=str), "1:16"),
     hours=(Annotated[float | None, Option(metavar="H", parser=number(), help=_HOURS)], None),
     profile=(text("Kinds of faults: all, messages, nodes, people or none.", of=str), "all"),
-    mutants=(text("Hunt planted bugs: all, or one by name.", metavar="NAME", of=str), ""),
+    mutants=(text("Look for planted bugs: all, or one by name.", metavar="NAME", of=str), ""),
     jobs=(Jobs, None),
     out=(folder("Folder for the journal and for failures.", "-o", "--out"), OUT),
 )
@@ -43,25 +43,25 @@ def storm(
     out: Path,
     quiet: Quiet = False,
 ) -> None:
-    """Let faulty hours pass, and look whether any safety rule breaks.
+    """Simulate hours of faults and check the safety rules.
 
-    Each seed draws a team, a site, a link, people, events and up to sixty faults: messages that are
-    lost, late, doubled or altered, devices that hang, restart or vanish, a DVA that is killed
-    between two writes, revocations and emergencies at the worst moment, intruders, wrong clocks.
-    Fourteen minutes pass in virtual time. Rules S1 to S8, S10 and S11 are judged by checkers that
-    ask no agent anything; two minutes after the last fault everything has to work again.
+    Each seed draws a team, a site, a link, people, events and up to sixty faults: lost, late,
+    duplicated or corrupted messages; devices that hang, restart or vanish; a DVA killed between two
+    writes; revocations and emergencies at the worst moment; intruders; wrong clocks. A storm lasts
+    fourteen minutes of virtual time. Rules S1 to S8, S10 and S11 are checked by observers that rely
+    on no agent. Two minutes after the last fault, everything must work again.
 
-    A storm that breaks a rule is cut down to the faults that matter. Its plan and its story are
-    kept in the folder, and the plan can be played again. The same seed is the same storm. Storms
-    that were played before are counted, and not played again.
+    A storm that breaks a rule is reduced to the faults that matter. Its plan and timeline are saved
+    in the folder, and the plan can be replayed. The same seed gives the same storm. Storms already
+    in the folder are counted, not repeated.
 
     The exit code is 1 if a rule was broken, or with --mutants, if a planted bug was not found.
 
     Examples:
         dva-sim storm --seeds 1:256  # 60 hours of a team
-        dva-sim storm --hours 100  # go on with further seeds, until it is 100 hours in all
-        dva-sim storm results/storms/found/all-7.yaml  # play a failure again
-        dva-sim storm --mutants all --seeds 1:32  # how soon planted bugs are found
+        dva-sim storm --hours 100  # continue with further seeds until 100 fleet-hours are reached
+        dva-sim storm results/storms/found/all-7.yaml  # replay a failure
+        dva-sim storm --mutants all --seeds 1:32  # how many storms it takes to find planted bugs
     """
     from dva_sim.experiments.execution.executors import local  # late: start-up
     from dva_sim.storms.campaign import Journal, StormTally, outcomes  # late: start-up

@@ -21,7 +21,7 @@ from dva_sim.cli.verbosity import loudness
     jobs=(Jobs, None),
 )
 def demo(out: Path, jobs: int | None) -> None:
-    """See in about a minute what delay and a messaging pattern do.
+    """See in a minute what delay and messaging do to driving.
 
     It shows one drive under two patterns, as a picture, a story and a film, then runs the small
     version of the main study and writes its report.
@@ -35,11 +35,11 @@ def demo(out: Path, jobs: int | None) -> None:
 
 
 @takes(api.run, but=("progress", "report"))
-@asks(dry_run=(flag("--dry-run", "Only say what would run."), False))
+@asks(dry_run=(flag("--dry-run", "Show what would run, and run nothing."), False))
 def run(dry_run: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
-    """Run a study, or go on with it, and write its report.
+    """Run or resume a study and write its report.
 
-    A study that was interrupted goes on where it stopped: finished runs are kept in its folder.
+    An interrupted study resumes where it stopped: finished runs are kept in its folder.
 
     Examples:
         dva-sim run req-rep-vs-pub-sub --dry-run  # what would run, and how long it would take
@@ -61,9 +61,9 @@ def run(dry_run: bool, quiet: Quiet = False, verbose: Verbose = False, **asked: 
 
 @takes(api.new)
 def new(name: str) -> None:
-    """Write a study to begin with, which runs as it stands.
+    """Write a new study that runs as it is, to be edited.
 
-    Comments in it say what can be changed.
+    Its comments explain what can be changed.
 
     Examples:
         dva-sim new mine  # writes mine.yaml here
@@ -73,7 +73,7 @@ def new(name: str) -> None:
 
 @takes(api.register)
 def register(study: str, full: bool, again: bool) -> None:
-    """Fix a study's hypotheses and size before it is run.
+    """Fix a study's hypotheses and size before running it.
 
     The run then confirms or refutes the hypotheses.
 
@@ -88,9 +88,10 @@ def register(study: str, full: bool, again: bool) -> None:
 
 @takes(api.tune, but=("progress",))
 def tune(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
-    """Choose the values that a study has tuned.
+    """Choose the values of a study's tuned key.
 
-    They are tried on persons who take no part in the study, and kept beside it.
+    Candidates are tried on persons who take no part in the study. The chosen values are saved
+    beside it.
 
     Examples:
         dva-sim tune filters  # writes tuned/filters.yaml beside it
@@ -103,13 +104,13 @@ def tune(quiet: Quiet = False, verbose: Verbose = False, **asked: Any) -> None:
 
 
 @asks(
-    study=(argument("A study by name or path.", "STUDY"), REQUIRED),
+    study=(argument("A study, by name or path.", "STUDY"), REQUIRED),
     out=(
         file("Results folder; default: results/STUDY-screening.", "-o", "--out", metavar="FOLDER"),
         None,
     ),
     jobs=(Jobs, None),
-    dry_run=(flag("--dry-run", "Only say what would run."), False),
+    dry_run=(flag("--dry-run", "Show what would run, and run nothing."), False),
 )
 def screen(
     study: str,
@@ -121,7 +122,7 @@ def screen(
 ) -> None:
     """Find the assumed numbers that move an answer most.
 
-    Each is varied within its band; one that was interrupted goes on where it stopped.
+    Each is varied within its band. An interrupted screening resumes where it stopped.
 
     Examples:
         dva-sim screen req-rep-vs-pub-sub --dry-run  # how many runs, and how long they take

@@ -211,7 +211,7 @@ def _recorded(request: RunRequest, plan: StudyPlan) -> int:
 def _stopped(how: KeyboardInterrupt) -> ExitCode:
     """Say what was done, and the command that goes on."""
     say(f"Stopped: {how}" if str(how) else "Stopped.")
-    say(f"To go on: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
+    say(f"To resume: {escape(shlex.join(['dva-sim', *sys.argv[1:]]))}")
     return ExitCode.INTERRUPTED
 
 

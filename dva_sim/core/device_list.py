@@ -23,7 +23,7 @@ class DeviceLister:
     _made: tuple[int, m.DeviceList] = field(default=(-1, m.DeviceList(())))
 
     def listed(self) -> m.DeviceList:
-        """The list; made anew when somebody has come or gone."""
+        """The list; replaced when somebody has come or gone."""
         if self._made[0] != self.registry.version:
             self._made = self.registry.version, m.DeviceList(tuple(self._as_many_as_fit()))
         return self._made[1]

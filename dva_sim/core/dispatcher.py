@@ -294,7 +294,7 @@ def _check_form(advice: Iterable[Advice], situation: Situation) -> None:
     stations = len(situation.cover.stations) if situation.cover else 0
     for piece in advice:
         if not isinstance(piece, Advice):
-            raise TypeError(f"{piece!r} is no advice")
+            raise TypeError(f"{piece!r} is not a valid Advice")
         if not isinstance(piece, Relocation):
             _check_place("task", piece.task, tasks)
         if not isinstance(piece, Announcement):

@@ -91,7 +91,7 @@ class DriveEnv(gymnasium.Env[Vector, Vector]):
         seen = self.drive.begin().observation
         points = self.drive.run.stage.planner.path((seen.x, seen.y), self.drive.goal)
         if points is None:
-            raise ConfigError("there is no way from the robot to the event")
+            raise ConfigError("there is no path from the robot to the event")
         self._route = Route(points)
         self._asked = 0.0, 0.0
         self._left = self._route.length

@@ -139,7 +139,7 @@ def _place_in(node: Any, name: str, above: str, key: str) -> str | int:
     if isinstance(node, dict):
         return name
     if not isinstance(node, list):
-        raise ConfigError(f"unknown key {key!r}: {above!r} holds no keys")
+        raise ConfigError(f"unknown key {key!r}: {above!r} has no keys")
     if not name.isdigit() or int(name) >= len(node):
         raise ConfigError(f"unknown key {key!r}: {above!r} has items 0 to {len(node) - 1}")
     return int(name)

@@ -25,7 +25,7 @@ _WORDS: Final = (
     Slip(r"found character '(.)' that cannot start any token",
          "a value cannot begin with {0}; put it in quotes"),
     Slip(r"found unexpected (?:end of stream|document separator)", "a quote is not closed", True),
-    Slip(r"found duplicate key \"?(.*?)\"? with value", "key {0!r} stands twice"),
+    Slip(r"found duplicate key \"?(.*?)\"? with value", "key {0!r} appears twice"),
     Slip(r"found undefined alias '(.*)'", "*{0} refers to nothing; quote text that begins with *"),
     Slip(r"could not find expected ':'", "a key without a colon and a value", True),
     Slip(r"found unknown escape character '(.)'",

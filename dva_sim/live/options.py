@@ -41,7 +41,7 @@ class LiveOptions:
         changes: Keys of the scenario with new values, `KEY=VALUE`.
         seed: Decides all luck but that of the real network.
         operators: `simulated` people, or `scripted`.
-        host: Address of this machine to listen on.
+        host: Address to listen on.
         dva: Address of the DVA, `HOST:PORT`.
         port: First port of the devices of this run, or part; each takes two. 0 for free ones.
         keys: Folder with the keys of the devices; None to run without.
@@ -171,7 +171,7 @@ class LiveOptions:
         try:
             record.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ConfigError(f"is no folder for traces: {error.strerror}", record) from error
+            raise ConfigError(f"cannot be a folder for traces: {error.strerror}", record) from error
         refuse_to_replace(sorted(record.glob(trace_of(TRACED.get(part, "")))), self.overwrite)
         try_to_write(record)
 

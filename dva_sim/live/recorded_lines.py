@@ -159,7 +159,7 @@ class ToldRun:
         except OSError as error:
             raise ConfigError(f"cannot be read: {error.strerror}", part) from error
         except (ValueError, LookupError, TypeError, AttributeError) as error:
-            raise ConfigError(f"holds no lines of a live run: {error}", part) from error
+            raise ConfigError(f"contains no lines of a live run: {error}", part) from error
 
     def playback(self) -> Playback:
         """Return the run for telling and drawing."""

@@ -253,7 +253,7 @@ def _lock(file: IO[bytes], path: Path) -> None:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        raise ConfigError("belongs to a run that still goes on", path) from error
+        raise ConfigError("belongs to a run that is still in progress", path) from error
 
 
 def _emptied(path: Path) -> IO[bytes]:

@@ -20,6 +20,7 @@ from zmq.utils import z85
 from dva_sim.kernel.errors import ConfigError
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9:._-]{0,63}")
+_NO_KEYS = "contains no keys: there is no public/*.key"
 _KEY_LENGTH = 40  # 32 bytes in the letters of Z85
 _PUBLIC_NOTE = "Public key of a device: give it to every machine."
 _SECRET_NOTE = "SECRET key of a device: it stays on the machine that runs the device."
@@ -52,7 +53,7 @@ class KeyRing:
             self._files[file] = _read_public(file)
             self._add(file)
         if not self._public:
-            raise ConfigError("holds no keys: there is no public/*.key", self.folder)
+            raise ConfigError(_NO_KEYS, self.folder)
 
     def refresh(self) -> set[str]:
         """Read the public keys again if files have changed.
@@ -97,7 +98,7 @@ class KeyRing:
                     found[folder / entry.name] = about.st_mtime_ns, about.st_size
         except FileNotFoundError as error:
             if Path(error.filename or folder) == folder:
-                raise ConfigError("holds no keys: there is no public/*.key", self.folder) from None
+                raise ConfigError(_NO_KEYS, self.folder) from None
         except OSError as error:
             raise ConfigError(f"cannot be read: {error.strerror}", folder) from error
         return found
@@ -135,7 +136,7 @@ class KeyRing:
                 raise ConfigError(f"is the key of {id_}, not of {device}", file)
             if other_public != public:
                 where = f"public/{_stem(device)}.key"
-                raise ConfigError(f"is no pair with {where}: one of them is outdated", file)
+                raise ConfigError(f"does not match {where}: one of them is outdated", file)
             self._pairs[device] = public, secret
         return self._pairs[device]
 
@@ -147,7 +148,7 @@ class KeyRing:
     def _add(self, file: Path) -> None:
         device, public = self._files[file]
         if device in self._public:
-            raise ConfigError(f"is a second key of {device}", file)
+            raise ConfigError(f"is another key of {device}, which already has one", file)
         if public in self._owners:
             raise ConfigError(f"{device} and {self._owners[public]} have the same key", file)
         self._public[device] = public
@@ -214,7 +215,7 @@ def _text(note: str, device: str, public: bytes, secret: bytes | None = None) ->
 def _read_public(file: Path) -> tuple[str, bytes]:
     fields = _fields(file)
     if "secret-key" in fields:
-        raise ConfigError("holds a secret key, but public files are given away", file)
+        raise ConfigError("contains a secret key, but public files are shared", file)
     return _field(fields, "id", file), _key(fields, "public-key", file)
 
 
@@ -222,7 +223,7 @@ def _read_secret(file: Path) -> tuple[str, bytes, bytes]:
     fields = _fields(file)
     public, secret = _key(fields, "public-key", file), _key(fields, "secret-key", file)
     if zmq.curve_public(secret) != public:
-        raise ConfigError("is broken: its public-key and secret-key are no pair", file)
+        raise ConfigError("is broken: its public-key and secret-key do not match", file)
     return _field(fields, "id", file), public, secret
 
 

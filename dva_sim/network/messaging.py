@@ -57,7 +57,7 @@ class Subscription(Protocol):
 
 
 class Wire(Protocol):
-    """A connection to the service of a peer, made anew by closing it and opening another."""
+    """A connection to the service of a peer, replaced by closing it and opening another."""
 
     def send(self, tag: int, data: bytes) -> None:
         """Send a request as soon as the connection is open; its reply comes with the tag."""

@@ -71,7 +71,7 @@ class RealNetwork(ABC):
 
         Args:
             node: The node.
-            host: Address of this machine to listen on.
+            host: Address to listen on.
             port: Of requests; 0 for any that is free.
 
         Returns:

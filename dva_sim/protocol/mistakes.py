@@ -180,9 +180,9 @@ def _explain(element: etree._Element, entry: Any) -> str:
     _, _, expected = entry.message.rstrip(". ").partition(" Expected is ")
     right = expected.removeprefix("one of").strip("() ").replace(", ", " or ")
     if kind == "SCHEMAV_CVC_ELT_1":
-        return f"{name} is no message; the root should be msg"
+        return f"{name} is not a message; the root should be msg"
     if "Missing child" in entry.message:
-        return f"{name} is not complete; should go on with {right}"
+        return f"{name} is not complete; should continue with {right}"
     if kind == "SCHEMAV_ELEMENT_CONTENT":
         return f"{name} does not belong here; should be " + (
             right or "the end of what is around it"

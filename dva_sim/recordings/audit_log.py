@@ -141,7 +141,7 @@ class AuditLog:
         found = verify(self.path)
         if found.problem is not None:
             told = f"row {found.problem.number} {found.problem.text}"
-            raise ConfigError(f"is no audit log to go on with: {told}", self.path)
+            raise ConfigError(f"is not an audit log that can be appended to: {told}", self.path)
         self.number, self.head = found.rows, found.head
 
     def append(self, entries: Sequence[AuditEntry]) -> list[AuditRow]:
@@ -266,13 +266,13 @@ def verify(path: Path) -> Verified:
         try:
             return _followed(file)
         except sqlite3.Error as error:
-            return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is no audit log: {error}"))
+            return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is not an audit log: {error}"))
 
 
 def _followed(file: sqlite3.Connection) -> Verified:
     kept = dict(file.execute("SELECT name, value FROM about"))
     if kept.get("format") != str(FORMAT):
-        return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is no audit log of format {FORMAT}"))
+        return Verified(0, NOTHING_BEFORE, FirstWrong(1, f"is not an audit log of format {FORMAT}"))
     number, head, last = 0, NOTHING_BEFORE, ""
     for values in file.execute(f"{_SELECT} ORDER BY number"):
         if wrong := _wrong(values, number + 1, head):

@@ -146,11 +146,11 @@ def read_motion(path: Path) -> PhoneMotion:
     try:
         with path.open(encoding="utf-8") as file:
             if file.readline().rstrip("\n") != FIRST_LINE:
-                raise NoMotionOfOursError("is no motion of a phone", path, 1, 1)
+                raise NoMotionOfOursError("is not a motion log of a phone", path, 1, 1)
             for number, line in enumerate(file, 2):
                 _take(motion, line.rstrip("\n"), path, number)
     except UnicodeDecodeError:
-        raise ConfigError("is no text", path) from None
+        raise ConfigError("is not text", path) from None
     except OSError as error:
         raise ConfigError(f"cannot be read: {error.strerror}", path) from None
     return motion

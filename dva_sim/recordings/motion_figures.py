@@ -54,7 +54,7 @@ def figures_of(motion: PhoneMotion, path: Path) -> MotionFigures:
     """
     samples = motion.samples
     if len(samples) < LEAST:
-        raise ConfigError(f"holds {len(samples)} samples; {LEAST} are needed", path)
+        raise ConfigError(f"contains {len(samples)} samples; at least {LEAST} are needed", path)
     steps = [b.told - a.told for a, b in pairwise(samples) if b.told > a.told]
     usual = median(steps)
     even = [step for step in steps if step <= GAP * usual]

@@ -46,7 +46,7 @@ def write_bag(playback: Playback, folder: Path) -> None:
     except ImportError:
         raise ConfigError("ROS 2 bags need rosbags: pip install 'dva-sim[ros2]'") from None
     if folder.exists():
-        raise ConfigError("is there already; give a new folder for the bag", folder)
+        raise ConfigError("already exists; give a new folder for the bag", folder)
     store = get_typestore(Stores.ROS2_HUMBLE)
     entries = sorted(_entries(playback, store.types), key=lambda entry: entry[0])
     connections: dict[str, Any] = {}

@@ -71,7 +71,7 @@ def read_sensor_log(path: Path, unit: Unit | None = None) -> list[MotionSample]:
     for number, (time, x, y, z) in found:
         told = (time - times[0]) * second
         if samples and told < samples[-1].told:
-            raise ConfigError("its time goes back", path, number, 1)
+            raise ConfigError("time goes backwards here", path, number, 1)
         xyz = (x * metre, y * metre, z * metre)
         samples.append(MotionSample(told, math.nan, math.nan, xyz, 0))
     return samples

@@ -185,7 +185,7 @@ def write_recording(
         ValueError: the run was made without `keep_traffic`.
     """
     if playback.recorder.traffic is None:
-        raise ValueError("a recording needs a run made with keep_traffic")
+        raise ValueError("a recording needs a run with keep_traffic")
     with whole_file(path) as file:
         decided = [*channels.decided(traces or {}), *channels.audited(audit)]
         _write(playback, file, tables, dict(about or {}), decided)

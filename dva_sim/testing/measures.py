@@ -101,7 +101,7 @@ class _Trial:
                 yield from self._of_run(model, runs, f"of {scenario}, seed {SEED}")
 
     def _of_run(self, model: Model[Any], runs: list[Any], where: str) -> Iterator[Case]:
-        """What it says of a run, of the same once more, and of the same run made anew."""
+        """What it says of a run, of the same once more, and of the same run replaced."""
         before = repr(model.rows(runs[0], with_tracks=True))  # in which missing numbers are alike
         first = self._ask(self._used, runs[0])
         if not _is_answer(first):

@@ -292,7 +292,7 @@ PHONES = ("--phones", "--phones-host", "127.0.0.1", "--phones-port", "0")
 def test_phones_get_an_address_by_https_and_a_code(programs, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     console = running(programs, *PHONES)
-    console.wait_to_say("A phone has to trust this machine once: https://127.0.0.1:")
+    console.wait_to_say("Each phone must trust this computer once: https://127.0.0.1:")
     address = re.search(r"^Phone: (https://127\.0\.0\.1:\d+/\?token=\S{32})$", console.said, re.M)
     assert address
     assert "█▀" in console.said

@@ -69,7 +69,7 @@ def test_derived_seeds_tell_parts_apart():
         ("name: a\ninner:\n  delay_ms: 3\n", "3:3", "'inner.delay_ms'; did you mean 'delay_s'?"),
         ("name: a\ninner: {delay_s: fast}\n", "2:9", "inner.delay_s"),
         ("inner: {}\n", "1:1", "missing key 'name'"),
-        ("name: a\nname: b\n", "2:1", "'name' stands twice"),
+        ("name: a\nname: b\n", "2:1", "'name' appears twice"),
         ("name: [a\n", "1:7", "] is missing"),
         ("name: a\nitems: [{delay_s: 1}, {delay_s: x}]\n", "2:24", "items.1.delay_s"),
         ("- 1\n", "1:1", "mapping"),

@@ -158,7 +158,7 @@ class PersonAgent:
         """Say what was found where the order has led: `confirmed` or `refuted`."""
         order = self.order
         if order is None:
-            said(False, "there is no order in hand")
+            said(False, "You have no order.")
             return
 
         def answered(reply: m.Reply) -> None:
@@ -180,7 +180,7 @@ class PersonAgent:
     def decline(self, said: Said) -> None:
         """Give the order back."""
         if self.order is None:
-            said(False, "there is no order in hand")
+            said(False, "You have no order.")
             return
         number = self.order.event_id
         self._put_down("declined")

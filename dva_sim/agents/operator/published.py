@@ -56,7 +56,7 @@ class LineConfig(Config):
                 raise ValueError("a line beside the others has a target and no band")
             return self
         if self.low is None and self.high is None:
-            raise ValueError("a line needs low or high, or anything would pass")
+            raise ValueError("a line needs low or high; otherwise anything would pass")
         if self.low is not None and self.high is not None and self.low > self.high:
             raise ValueError("low should not be above high")
         return self
@@ -326,7 +326,7 @@ def _complete(checks: Mapping[str, CheckConfig], kinds: Mapping[str, LineKind]) 
     if missing := [name for name in checks if name not in kinds]:
         raise ConfigError(f"the split does not say what {', '.join(missing)} is for")
     if unknown := [name for name in kinds if name not in checks]:
-        raise ConfigError(f"the split names {', '.join(unknown)}, which are no checks")
+        raise ConfigError(f"the split names {', '.join(unknown)}, which are not checks")
     for name, check in checks.items():
         if "M" in check.tag.split(",") and kinds[name] != "remembered":
             raise ConfigError(f"{name} is known from memory: it cannot be {kinds[name]}")

@@ -219,7 +219,7 @@ def draw_places(
         if all(math.dist(first, other) >= APART for other in taken):
             break
     else:
-        raise ConfigError(f"site {site.name!r} has no place left for another bystander")
+        raise ConfigError(f"site {site.name!r} has no room for another bystander")
     return [first, *(_draw(site, rng, rooms, areas) for _ in range(count - 1))]
 
 

@@ -127,7 +127,7 @@ class PersonGuard(OnFoot):
         """Accept the order, or decline it."""
         order = self.order
         if order is None:
-            said(False, "there is no order in hand")
+            said(False, "You have no order.")
         elif accepts:
             self.answered = True
             self.device.progress(order.event_id, "accepted")
@@ -146,7 +146,7 @@ class PersonGuard(OnFoot):
             self._publish_status()
             said(True, f"the DVA is told that you {now}")
         elif order is None:
-            said(False, "there is no order in hand")
+            said(False, "You have no order.")
         elif what in FINDINGS:
             self._find(order, what, said)
         else:

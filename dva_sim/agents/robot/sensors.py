@@ -376,7 +376,7 @@ def make_ports(
     for config in configs:
         name = config.name
         if name in ports:
-            raise ConfigError(f"sensor {name!r} is there twice")
+            raise ConfigError(f"sensor {name!r} appears twice")
         sensor = RobotSensor(config, sources[name], _own(luck, name))
         lags = sensor.kind.lag > 0.0
         ports[name] = SensorPort(sensor.kind.unit, sensor.read, config.rate_hz, lags)

@@ -65,7 +65,7 @@ class AccelerometerPart(Config):
             raise ValueError(f"noise should be given as {wanted}")
         for key in self.assumed:
             if key not in type(self).model_fields:
-                raise ValueError(f"assumed names {key!r}, which is no key of a part")
+                raise ValueError(f"assumed names {key!r}, which is not a key of a part")
         return self
 
     @property

@@ -49,7 +49,7 @@ class Audited:
         if isinstance(action.audit, str):
             return said
         if self.keeper.problem and not action.stops:
-            raise Refused(f"{self.keeper.problem}; nothing is done until it can be")
+            raise Refused(f"{self.keeper.problem}; nothing can be done until this is fixed")
 
         def told(ok: bool, text: str, /, **more: Unpack[Answered]) -> None:
             if self.is_noted(action):

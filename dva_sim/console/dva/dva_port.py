@@ -54,7 +54,7 @@ class DvaPort:
             Refused: it does not listen.
         """
         if not self.listens:
-            raise Refused("the server is stopped already")
+            raise Refused("The server is already stopped.")
         self._network.leave(DVA)
         self._run.dva.silence(True)
         self.listens = False
@@ -67,7 +67,7 @@ class DvaPort:
             Refused: it listens already, or the port cannot be had.
         """
         if self.listens:
-            raise Refused(f"the server listens on {self.address} already")
+            raise Refused(f"The server is already listening on {self.address}.")
         host = split_address(self.address)[0]
         if self._sockets is None:
             self._network.come_back(DVA)

@@ -55,7 +55,7 @@ class FakeDevices:
             Refused: it cannot be.
         """
         if len(self.devices) >= MOST:
-            raise Refused(f"there are {MOST} fake devices already: remove one first")
+            raise Refused(f"There are already {MOST} fake devices. Remove one first.")
         id_tag, address = self._identity(line)
         device = self._make(id_tag, line["label"], line["type"], address)
         self.devices[id_tag] = device
@@ -86,7 +86,7 @@ class FakeDevices:
         """
         device = self.devices.get(id_tag)
         if device is None:
-            raise Refused(f"no fake device is called {id_tag}")
+            raise Refused(f"There is no fake device {id_tag}.")
         self._drop(device)
         return device.label
 

@@ -150,7 +150,7 @@ class AlarmDesk:
         """
         found = self.alarms.members(str(key))
         if not found:
-            raise Refused("that alarm is none any more")
+            raise Refused("That alarm is over.")
         return found
 
     def by_event(self, keys: Iterable[str]) -> Mapping[str, int]:

@@ -32,7 +32,7 @@ class GuardActions:
     def _guard(self, client: str) -> PersonGuard:
         guard = self._guards.by_client.get(client)
         if guard is None:
-            raise Refused("say first which guard you are")
+            raise Refused("Choose which guard you are first.")
         return guard
 
     @does("guard_join")
@@ -40,12 +40,12 @@ class GuardActions:
         label = line["guard"]
         guard = self._guards.named(label)
         if guard is None:
-            raise Refused(f"there is no guard {label!r} for people to play")
+            raise Refused(f"There is no guard {label!r} that a person can play.")
         if self._guards.by_client.get(client) is guard:
             said(True, f"you are {label} already")
             return
         if guard.attended:
-            raise Refused(f"somebody else is {label}")
+            raise Refused(f"Somebody else is already {label}.")
         self._guards.leave(client)
         self._guards.join(client, guard)
         said(True, f"you are {label}")

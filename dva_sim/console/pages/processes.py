@@ -204,7 +204,7 @@ class ConsoleProcesses:
             if (sys.stdout.encoding or "").lower().replace("-", "") == "utf8":
                 self._say(half_blocks(address, sys.stdout.isatty()))
             trust = address.partition("?")[0].removesuffix("phone")
-            self._say(f"A phone has to trust this machine once: {trust}trust says how.")
+            self._say(f"Each phone must trust this computer once: {trust}trust says how.")
 
     def _open_browser(self, address: str) -> None:
         """Where there is one; never where nobody could see it."""

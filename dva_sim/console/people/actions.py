@@ -95,7 +95,7 @@ class Actions:
         robots = self._robots(line)
         number = self._seats.sit(client, self._world.seat_of_order(robots))
         if number is None:
-            raise Refused("all seats are taken")
+            raise Refused("All seats are taken.")
         person = self._world.person(number)
         self._world.client_of[number] = client
         person.sit_down()
@@ -164,7 +164,7 @@ class Actions:
         if given == "all":
             return list(self._world.run.field.robots)
         if not given:
-            raise Refused("no robot is named")
+            raise Refused("No robot was named.")
         return list(dict.fromkeys(self._robot(one) for one in given))
 
     def _robot(self, given: Any) -> str:
@@ -291,7 +291,7 @@ class Actions:
             return
         free = [p for p in self._world.persons if p.order is not None and not p.attended]
         if not free:
-            raise Refused("there is no order in hand")
+            raise Refused("You have no order.")
         free[0].decline(said)
 
     # --- what can be changed ---------------------------------------------------------------
@@ -317,7 +317,7 @@ class Actions:
     def _pace(self, _: str, line: PaceChange, said: Said) -> None:
         factor, paused = line.get("factor"), line.get("paused")
         if self._world.run.is_real:
-            raise Refused("the links are real: time goes by as it does outside")
+            raise Refused("The simulation runs in real time because its links are real sockets.")
         if factor is not None and factor < 1.0:
             raise Refused(f"factor should be a number from 1 to {FASTEST:g}")
         if paused:

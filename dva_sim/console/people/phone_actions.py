@@ -102,12 +102,12 @@ class PhoneActions:
         address = f"{line['server'].strip()}:{line['port']}"
         seat = self._seats.taken.get(client)
         if seat is not None and not self.sits(client):
-            raise Refused("this page has a seat of the console: release it first")
+            raise Refused("This page is driving as a console operator. Release control first.")
         phone = self._phone(client)
         self._retire(client, phone)
         number = self._phones.new_person(phone, label, kind, address)
         if number is None:
-            raise Refused("too many phones have come and gone: try again in two minutes")
+            raise Refused("Too many phones have connected recently. Try again in two minutes.")
         person = phone.person
         assert person is not None
         self._world.let_in(number, person)
@@ -140,7 +140,7 @@ class PhoneActions:
     def _phone(self, client: str) -> PhoneSeat:
         phone = self._phones.seat(client)
         if phone is None:
-            raise Refused("there are as many phones as there may be")
+            raise Refused("The limit of connected phones is reached.")
         return phone
 
     def _retire(self, client: str, phone: PhoneSeat) -> None:
@@ -156,7 +156,7 @@ class PhoneActions:
     def _device(self, client: str) -> tuple[PhoneSeat, PersonAgent]:
         phone = self._phones.by_client.get(client)
         if phone is None or phone.person is None or not phone.registered:
-            raise Refused("this phone is not registered yet")
+            raise Refused("Register this phone first.")
         return phone, phone.person
 
     # --- what it asks of the DVA ---------------------------------------------------------------

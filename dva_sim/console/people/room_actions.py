@@ -150,7 +150,7 @@ class RoomActions:
         def begin(room: ConsoleRoom, told: Said) -> None:
             number = self._seats.sit(client)
             if number is None:
-                told(False, "all seats are taken")
+                told(False, "All seats are taken.")
                 return
             seat = self._world.person(number)
             label = self._world.run.stage.labels[robot]

@@ -254,7 +254,7 @@ class Player:
     @does("open_recording")
     def _open(self, _: str, line: RecordingAsked, said: Said) -> None:
         if self.shelf is None:
-            raise Refused("there are no other recordings")
+            raise Refused("There are no other recordings.")
         path = self.shelf.find(line["name"])
         self.run = RecordedRun(read_recording(path), path.name)
         self._watched.clear()

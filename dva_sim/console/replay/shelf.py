@@ -50,7 +50,7 @@ class Shelf:
         paths = sorted(where.glob(f"*{SUFFIX}"))[:MOST]
         if not paths:
             hint = "; a study keeps some with `record: worst`" if results is not None else ""
-            raise ConfigError(f"holds no recordings{hint}", folder)
+            raise ConfigError(f"contains no recordings{hint}", folder)
         page = folder / PAGE
         self.report = page if page.is_file() else None
         rows = {} if results is None else _rows_by_name(results)

@@ -72,7 +72,7 @@ class RobotActions:
         if why := self._why_not():
             raise Refused(why)
         if (state := window.station.line()["state"]) != "listening":
-            raise Refused(f"it is {state}: it has to be registered and listening first")
+            raise Refused(f"The robot is {state}. It must be registered and listening first.")
         mine = self._hands.get(client)
         if mine is not None and mine.robot != robot:
             self._let_go(client, mine)

@@ -26,7 +26,7 @@ class OwnStation:
     Args:
         robot: Which.
         network: Its sockets.
-        host: Address of this machine to listen on.
+        host: Address to listen on.
         port: Of requests; publications have the next one. 0: any two that are free.
 
     Attributes:
@@ -102,13 +102,13 @@ class OwnStation:
             Refused: it is not registered, or listens already, or the port is taken.
         """
         if self.state != REGISTERED:
-            raise Refused(f"it is {self.state}: it has to be registered first")
+            raise Refused(f"The robot is {self.state}. It must be registered first.")
         device = self._robot.device
         host, _, port = device.address.rpartition(":")
         try:
             self._network.join(device.id_tag, host, int(port))
         except NetworkError as error:
-            self._problem = f"{error}; switch it off and register it anew"
+            self._problem = f"{error}; switch it off and register it again"
             raise Refused(self._problem) from None
         self.state, self._problem = LISTENING, ""
         device.tell(f"listens on {device.address}", "link")

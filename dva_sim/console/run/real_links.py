@@ -86,7 +86,7 @@ class ConsoleSockets:
         scenario: Says what is set on the sockets.
         clock: Waits for them.
         recorder: Told what goes wrong, and of each message.
-        host: Address of this machine to listen on.
+        host: Address to listen on.
         port: Of the DVA's requests; its publications have the next one. 0: any two that are free.
         ring: Keys of the devices; None to run without.
         carrier: What carries the messages; None: ZeroMQ.

@@ -58,7 +58,7 @@ class RobotWorld:
         seed: Decides all luck.
         clock: Its time; real time.
         ring: Keys of the devices; None to run without.
-        host: Address of this machine to listen on.
+        host: Address to listen on.
         port: Of requests; 0: any two that are free.
 
     Attributes:

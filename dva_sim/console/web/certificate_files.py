@@ -97,13 +97,13 @@ def _read(path: Path, told: list[str]) -> Signed | None:
     try:
         return Signed.read(data)
     except (ValueError, TypeError):
-        told.append(f"{path.name} is broken, and made anew")
+        told.append(f"{path.name} is broken, and replaced")
         return None
 
 
 def _renewed(what: str, fault: str, told: list[str], more: str = "") -> None:
     if fault:
-        told.append(f"the {what} for phones is made anew: {fault}{'; ' + more if more else ''}")
+        told.append(f"the {what} for phones is replaced: {fault}{'; ' + more if more else ''}")
 
 
 def _write(path: Path, signed: Signed) -> None:

@@ -222,7 +222,7 @@ class Checkpoint:
             raise DvaSimError(f"{self.path}: {_remedy(str(error))}") from None
         except (sqlite3.DatabaseError, TypeError) as error:
             raise ConfigError(
-                f"is not the journal of a study, or damaged ({error}); move it away to begin anew",
+                f"is not the journal of a study, or damaged ({error}); move it away to start over",
                 self.path,
             ) from None
 

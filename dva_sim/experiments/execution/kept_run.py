@@ -225,7 +225,7 @@ def _read(
             grown = db.execute("SELECT line FROM grown ORDER BY number").fetchall()
     except (sqlite3.Error, TypeError) as error:
         raise ConfigError(
-            f"is not the journal of a run, or damaged ({error}); move it away to begin anew", path
+            f"is not the journal of a run, or damaged ({error}); move it away to start over", path
         ) from None
     told = json.loads(scenario)
     if not own_code and OWN_CODE in json.dumps(told["events"]):
@@ -243,7 +243,7 @@ def _tables(
     try:
         recording = recording_of(scenario, seed, lines)
     except ValueError as error:
-        raise ConfigError(f"holds no lines of a run: {error}", folder / KEPT_RUN) from None
+        raise ConfigError(f"contains no lines of a run: {error}", folder / KEPT_RUN) from None
     return tables_of(recording) | drive_tables(recording), recording.duration
 
 

@@ -161,7 +161,7 @@ class _Session:
     @contextmanager
     def told(self) -> Iterator[None]:
         """Say with a Ctrl-C, or when all workers are lost, how far it had come."""
-        go_on = "the same command goes on from there"
+        go_on = "run the same command again to resume"
         try:
             yield
         except WorkersLost as lost:

@@ -193,7 +193,7 @@ def read(file: Path) -> KeptAnswer:
     except OSError as error:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from None
     except (ValueError, TypeError, KeyError) as error:
-        raise ConfigError(f"{file} is no kept answer: {error}") from None
+        raise ConfigError(f"{file} is not a kept answer: {error}") from None
 
 
 def mark_stale(answer: KeptAnswer, version: str, folder: Path) -> None:

@@ -45,5 +45,5 @@ def tuning_warning(manifest: Mapping[str, Any]) -> str:
         return ""
     return (
         f"The {factor_name(tuned.tuning.key)} was tuned with other {others} than the study was run "
-        f"with: 'dva-sim tune {tuned.study}' chooses anew."
+        f"with: 'dva-sim tune {tuned.study}' chooses again."
     )

@@ -47,7 +47,7 @@ def export(
         DvaSimError: the disk is full or refuses to be written.
     """
     if not str(out).isprintable():
-        raise ConfigError(f"{str(out)!r} cannot be the name of a file that others read")
+        raise ConfigError(f"{str(out)!r} cannot be a file name")
     files = _files(results, out, tables, form)
     refuse_to_replace(files, overwrite)
     for path, write in files.items():

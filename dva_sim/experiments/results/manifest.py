@@ -126,7 +126,7 @@ def status_of(manifest: Mapping[str, Any]) -> Status:
     """What the result may be called; results that do not say are judged by what was set.
 
     A confirmation has all the runs that were registered. Runs that took too long are others on
-    another machine. Verdicts are made anew whenever they are told, by the program as it is then.
+    another machine. Verdicts are replaced whenever they are told, by the program as it is then.
     """
     if "status" in manifest:
         status = Status.model_validate(manifest["status"])

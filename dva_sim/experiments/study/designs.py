@@ -295,7 +295,7 @@ def _header(path: Path, number: int, starts: list[int], cells: list[str]) -> lis
         if not key:
             raise ConfigError("a factor without a name", path, number, start)
         if key in keys[:index]:
-            raise ConfigError(f"factor {key!r} stands twice", path, number, start)
+            raise ConfigError(f"factor {key!r} appears twice", path, number, start)
         if ";" in key:
             raise ConfigError("cells are separated by commas, not by ;", path, number, start)
         try:

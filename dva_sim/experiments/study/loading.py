@@ -108,7 +108,7 @@ def _path(data: Any, key: str, kind: Any) -> tuple[str, ...]:
             has_keys = get_origin(kind) is dict or isinstance(kind, type(BaseModel))
             step = _entry(there, key) if has_keys else key
         else:
-            raise ConfigError(f"{'.'.join(path)!r} holds no keys, so no {key!r}")
+            raise ConfigError(f"{'.'.join(path)!r} has no keys, so no {key!r}")
         path, key, data = (*path, step), key[len(step) + 1 :], there.get(step)
     return path
 
@@ -168,7 +168,7 @@ def _plain(value: Any) -> Any:
         return str(value)
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no number, word, list or mapping")
+    raise TypeError(f"{type(value).__name__} is not a number, word, list or mapping")
 
 
 TEMPLATE = Path(__file__).parent / "templates" / "study.yaml"
@@ -189,13 +189,13 @@ def write_study(name: str) -> Path:
     """
     plain = name.removesuffix(".yaml").removesuffix(".yml")
     if not Path(plain).name.strip("."):
-        raise ConfigError(f"{name!r} is no name for a study; give one such as 'mine'")
+        raise ConfigError(f"{name!r} cannot be the name of a study; give a name such as 'mine'")
     path = Path(name if name != plain else f"{name}.yaml")
     try:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(TEMPLATE.read_text(encoding="utf-8"))
     except FileExistsError:
-        raise ConfigError(f"{path} is there already; give another name") from None
+        raise ConfigError(f"{path} already exists; give another name") from None
     except OSError as error:
         raise DvaSimError(f"{path} cannot be written: {error.strerror}") from None
     return path

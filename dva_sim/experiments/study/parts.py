@@ -25,7 +25,7 @@ Direction = Literal["above", "below", "same"]
 
 def _distinct(levels: tuple[Level, ...]) -> tuple[Level, ...]:
     for level in (level for at, level in enumerate(levels) if level in levels[:at]):
-        raise ValueError(f"level {level!r} stands twice")
+        raise ValueError(f"level {level!r} appears twice")
     return levels
 
 

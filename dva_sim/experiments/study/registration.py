@@ -103,7 +103,7 @@ def register(study: Study, again: bool = False) -> str:
     path = study.folder / f"{study.file.stem}{REGISTRATION}"
     found = registration_of(study)
     if found is not None and not again:
-        raise ConfigError(f"{path} is there already; --again replaces it, and that will be told")
+        raise ConfigError(f"{path} already exists; --again replaces it, and the report will say so")
     made = Preregistration(
         study=study.file.stem,
         question=study.question,

@@ -57,7 +57,7 @@ def _faults_of_zip(study: Study, names: Sequence[str]) -> Iterator[Problem]:
         if name not in study.factors:
             yield f"{name!r} is not a factor; {hint(name, study.factors, 'factors')}", path
         elif name in names[:index]:
-            yield f"{name!r} stands twice", path
+            yield f"{name!r} appears twice", path
         elif names[0] in study.factors:
             wanted, count = len(study.factors[names[0]]), len(study.factors[name])
             if count != wanted:

@@ -67,7 +67,7 @@ def run_pair(
         LinkEnded: the link has ended by itself; so have both commands.
     """
     if shutil.which("sh") is None:
-        raise EmulatorError("the commands need a shell: there is no `sh` on the PATH")
+        raise EmulatorError("a shell is needed: there is no `sh` on the PATH")
     with ExitStack() as at_end:
         signals = at_end.enter_context(_caught_signals())
         if published:

@@ -139,7 +139,7 @@ class LinkProcess:
         except OSError:
             said = b""
         if not said:
-            raise EmulatorError("the process of the emulated link has ended before it stood")
+            raise EmulatorError("the process of the emulated link ended before it was ready")
         problem = json.loads(said).get("problem")
         if problem is not None:
             raise EmulatorError(f"the emulated link {NEEDS}; here {problem}")

@@ -55,7 +55,7 @@ def read_trace(path: str) -> Floats:
             raise ConfigError(f"{text} ms comes after {times[-1]} ms", path, number, 1)
         times.append(int(text))
     if not times or times[-1] <= 0:
-        raise ConfigError("holds no packet opportunity after 0 ms", path)
+        raise ConfigError("contains no packet opportunity after 0 ms", path)
     return np.array(times, dtype=np.float64) / 1000.0
 
 
@@ -87,7 +87,7 @@ def read_delays(path: str) -> tuple[float, ...]:
     lines = _lines(path, "file of delays")
     delays = tuple(_delay(text, path, number) for number, text in lines if text[0] != "#")
     if not delays:
-        raise ConfigError("holds no delay", path)
+        raise ConfigError("contains no delay", path)
     return delays
 
 
@@ -109,7 +109,7 @@ def read_delay_log(path: str) -> DelayLog:
     if len(log.times) < 2 or log.times[-1] <= log.times[0]:
         raise ConfigError("needs probes of at least two moments", path)
     if np.isnan(log.delays).all():
-        raise ConfigError("holds lost probes only", path)
+        raise ConfigError("contains only lost probes", path)
     return log
 
 
@@ -149,7 +149,7 @@ def _ping_output(path: str, lines: list[tuple[int, str]]) -> DelayLog:
             delay = _delay(reply[3], path, number)
             replies.setdefault(last, (float(reply[1]) - delay, delay))
     if not replies:
-        raise ConfigError("holds no reply", path)
+        raise ConfigError("contains no reply", path)
     return _with_lost(replies, newest)
 
 

@@ -51,9 +51,9 @@ class MqttTransport(CommandTransport):
         broker: Side = "far",
     ) -> None:
         if qos not in (0, 1, 2):
-            raise ConfigError(f"qos {qos!r} is none of 0, 1, 2")
+            raise ConfigError(f"qos {qos!r} should be one of 0, 1, 2")
         if broker not in SIDES:
-            raise ConfigError(f"broker {broker!r} is none of {', '.join(SIDES)}")
+            raise ConfigError(f"broker {broker!r} should be one of {', '.join(SIDES)}")
         self.qos, self.nodelay, self.expiry_s, self.broker = qos, nodelay, expiry_s, broker
 
     @override

@@ -45,7 +45,7 @@ class ZenohTransport(CommandTransport):
             ("congestion", congestion, ("drop", "block")),
         ):
             if value not in known:
-                raise ConfigError(f"{key} {value!r} is none of {', '.join(known)}")
+                raise ConfigError(f"{key} {value!r} should be one of {', '.join(known)}")
         self.carrier, self.congestion = carrier, congestion
         self.reliable, self.express = reliable, express
 

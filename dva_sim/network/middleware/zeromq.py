@@ -48,7 +48,7 @@ class ZeroMqTransport(CommandTransport):
         high_water_mark: int = HIGH_WATER_MARK,
     ) -> None:
         if pattern not in _SOCKETS:
-            raise ConfigError(f"pattern {pattern!r} is none of {', '.join(_SOCKETS)}")
+            raise ConfigError(f"pattern {pattern!r} should be one of {', '.join(_SOCKETS)}")
         self.pattern, self.timeout_s, self.high_water_mark = pattern, timeout_s, high_water_mark
 
     @override

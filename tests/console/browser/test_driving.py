@@ -234,7 +234,7 @@ def test_a_gamepad_steers_while_its_shoulder_button_is_held(page):
 
     page.evaluate(PADS, None)
     assert becomes(lambda: "gone" in actions(page))
-    expect(page.locator(".hint")).to_contain_text("The gamepad is gone.")
+    expect(page.locator(".hint")).to_contain_text("The gamepad was disconnected.")
 
 
 def test_input_comes_25_times_a_second_while_something_is_held(page):

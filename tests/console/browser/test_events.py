@@ -112,7 +112,7 @@ def test_an_alarm_is_seen_and_one_is_shelved_and_comes_back(both):
     expect(alarms.get_by_text("Shelved (1)")).to_be_visible()
     expect(other.get_by_role("region", name="Alarms").get_by_text("Shelved (1)")).to_be_visible()
     alarms.get_by_text("Shelved (1)").click()
-    alarms.get_by_role("button", name="Take from the shelf").click()
+    alarms.get_by_role("button", name="Unshelve").click()
     expect(alarms.get_by_text("Shelved (1)")).to_have_count(0)
 
 
@@ -147,7 +147,7 @@ def test_what_needs_words_asks_for_them_and_does_nothing_without(both):
     number = raised(page)
     choose(page, number)
     page.get_by_role("button", name="False alarm").click()
-    expect(page.get_by_text("Say first in words why, or what.")).to_be_visible()
+    expect(page.get_by_text("Enter a reason or note first.")).to_be_visible()
     expect(page.get_by_label("Reason or note")).to_be_focused()
 
     page.get_by_label("Reason or note").fill("burnt toast")

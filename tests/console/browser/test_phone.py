@@ -39,7 +39,7 @@ def test_eight_taps_lead_from_the_scan_to_a_robot_that_moves(hand):
     hand.tap("Go on: Calibration", "link")
     hand.tap("Calibrate")
     expect(hand.status("Calibration")).to_have_text("Calibrated.")
-    hand.tap("Go on: Teleoperation", "link")
+    hand.tap("Continue: Teleoperation", "link")
     hand.swipe(-200)  # the eighth
     hand.tilt(FORWARDS)
     hand.speed("0.20")
@@ -340,7 +340,7 @@ window.addEventListener = function (kind, ...rest) {
 def test_a_sensor_that_may_not_be_read_is_told_with_the_way_out(world, visits):
     hand = Hand(visits(**SCREEN), world.phone, sensor=False, script=DENIED)
     hand.go("Calibration")
-    hand.tap("Switch the sensor on")
+    hand.tap("Turn on the sensor")
     hand.alert("no sensor: this page has no permission to read it")
     hand.alert("steer by the stick")
 
@@ -431,7 +431,7 @@ def test_a_wrong_token_leads_to_a_page_of_words(world, visits):
 def test_the_consoles_page_shows_the_code_to_who_may_drive(world, visits):
     page = visits().open(world.drive)
     page.get_by_role("button", name="Phone").click()
-    code = page.get_by_role("img", name="Code of the address for phones")
+    code = page.get_by_role("img", name="QR code of the address for phones")
     expect(code).to_be_visible()
     assert becomes(lambda: code.evaluate("image => image.naturalWidth") > 100)
     expect(page.get_by_role("dialog")).to_contain_text(world.phones)

@@ -224,7 +224,7 @@ def test_a_fault_is_switched_on_and_off_and_what_it_does_is_seen(opened):
     expect(page.locator(".picture-age")).to_have_class(re.compile("hatched"))
     knobs.get_by_label("Stuck: smoke").check()
     expect(page.get_by_role("region", name="Sensors")).to_contain_text("stuck")
-    expect(knobs).to_contain_text("something is made to go wrong")
+    expect(knobs).to_contain_text("active")
     knobs.get_by_label("Lose the camera").uncheck()
     knobs.get_by_label("Stuck: smoke").uncheck()
     expect(knobs).to_contain_text("none")

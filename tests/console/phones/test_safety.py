@@ -98,7 +98,7 @@ def test_an_emergency_names_a_robot_or_is_for_ones_own(page):
     assert page.register()["ok"]
     done, text = page.do("emergency")
     assert not done
-    assert "no robot is named" in text
+    assert "No robot was named." in text
 
 
 def test_without_registration_there_are_neither_lists_nor_permissions(page):

@@ -169,7 +169,7 @@ def test_a_measure_that_no_run_has_is_refused(tmp_path):
         ("at: {link.delay_s: 0.25}", "at: {link.delay_s: 1}", "1 is not a level"),
         ("[untuned, tuned]", "[untuned, better]", "'better' is not a level of 'tuning'"),
         ("levels: [1, 2, 4, 8]", "levels: [0, 1]", "above 0"),
-        ("levels: [1, 2, 4, 8]", "levels: [2, 2]", "stands twice"),
+        ("levels: [1, 2, 4, 8]", "levels: [2, 2]", "appears twice"),
         ("part: drive\n", "part: drove\n", "tuning.part 'drove' is not a part"),
     ],
 )

@@ -135,10 +135,10 @@ def test_a_log_begins_at_a_seeded_moment_the_same_in_both_directions(tmp_path):
         ("2 2\n1 2\n", r":2:1: 1 s comes after 2 s"),
         ("1 2\n", "needs probes of at least two moments"),
         ("1 2\n1 3\n", "needs probes of at least two moments"),
-        ("1 -\n2 -\n", "holds lost probes only"),
+        ("1 -\n2 -\n", "contains only lost probes"),
         ("", "needs probes of at least two moments"),
         ("PING h (1) 56(84) bytes\n64 bytes from h: icmp_seq=1 ttl=9 time=1 ms\n", r":2:1: .*ping"),
-        ("PING h (1) 56(84) bytes\n[1.5] no answer yet for icmp_seq=1\n", "holds no reply"),
+        ("PING h (1) 56(84) bytes\n[1.5] no answer yet for icmp_seq=1\n", "contains no reply"),
         (None, r"no\.log: "),
     ],
 )

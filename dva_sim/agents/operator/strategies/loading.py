@@ -32,7 +32,7 @@ STRATEGIES: Final[dict[str, Callable[..., Driver]]] = {
 def _guarded(made: Driver) -> Driver:
     """One of a user's, kept within the limits; its class may make something else of itself."""
     if not isinstance(made, Strategy):
-        raise ConfigError(f"makes no operator, but {type(made).__name__}")
+        raise ConfigError(f"returns {type(made).__name__}, not an operator")
     return GuardedStrategy(made)
 
 

@@ -371,7 +371,9 @@ def measure_now(
         EmulatorError: nothing can be measured here.
     """
     if path.exists():
-        raise ConfigError("is there already; --live measures afresh: remove it first", str(path))
+        raise ConfigError(
+            "already exists; --live starts a new measurement, so remove it first", str(path)
+        )
     problems: list[str] = []
     for block in blocks:
         conditions = shortened(block) if quick else conditions_of(block)

@@ -40,7 +40,7 @@ export function AuditPage() {
     <${State} check=${check} problem=${problem} look=${look} />
     ${measures && html`<${Measures} measures=${measures} />`}
     <div class="audit-tools">
-      <${Field} name="Filter" value=${filter} onInput=${setFilter} hint="Words that stand in the row" />
+      <${Field} name="Filter" value=${filter} onInput=${setFilter} hint="Words to find in a row" />
       <a class="button" href="/api/audit.csv" download>Export as CSV</a>
       <a class="button" href="/api/audit.json" download>Export as JSON</a>
     </div>
@@ -91,20 +91,20 @@ function fits(row, filter) {
 function State({ check, problem, look }) {
   const writing = audit.value?.problem;
   const wrong = check?.problem;
-  const text = problem || (check ? stateText(check) : 'The log is being read …');
+  const text = problem || (check ? stateText(check) : 'Reading the log …');
   return html`<section class=${`panel audit-state ${wrong || problem ? 'broken' : ''}`} aria-label="Verification">
     <p role="status" aria-label="Verification">${text}</p>
     ${check && !wrong && html`<p class="soft">The last hash is <code>${check.hash}</code>.</p>`}
     ${check?.doubts.map((doubt) => html`<p class="soft">Odd: ${doubt}.</p>`)}
     ${writing && html`<p class="warning" role="alert">${writing}. Nothing new is done until it can be written.</p>`}
-    <p class="soft">${audit.value?.lasting ? `It is kept in ${audit.value.file}.` : 'It ends with the console; --audit FILE.sqlite keeps it.'}</p>
+    <p class="soft">${audit.value?.lasting ? `Saved in ${audit.value.file}.` : 'It is lost when the console ends. Start the console with --audit FILE.sqlite to keep it.'}</p>
     <button type="button" onClick=${look}>Verify</button></section>`;
 }
 
 /** @param {AuditCheck} check */
 function stateText(check) {
   if (check.problem) return `Broken: row ${check.problem.row} ${check.problem.text}.`;
-  return `The chain holds: ${check.rows} ${check.rows === 1 ? 'row' : 'rows'}, none changed, removed or moved.`;
+  return `Verified: ${check.rows} ${check.rows === 1 ? 'row' : 'rows'}, none changed, removed or moved.`;
 }
 
 /** @param {{measures: AuditMeasures}} props */
@@ -113,7 +113,7 @@ function Measures({ measures }) {
   return html`<section class="measures" aria-label="Measures"><dl>
     <div><dt>Time to acknowledge</dt><dd>${times(acknowledge)}</dd></div>
     <div><dt>Time to assign</dt><dd>${times(assign)}</dd></div>
-    <div><dt>Sent by people, by the policy</dt><dd>${measures.assigned_by_people}, ${measures.assigned_by_policy}</dd></div>
+    <div><dt>Assigned by people, by the policy</dt><dd>${measures.assigned_by_people}, ${measures.assigned_by_policy}</dd></div>
     <div><dt>Overrides of the policy</dt><dd>${measures.overrides}${
       measures.lost_s === null ? '' : `, expected ${Math.abs(measures.lost_s)} s ${measures.lost_s < 0 ? 'earlier' : 'later'} (median)`
     }</dd></div></dl>

@@ -25,7 +25,7 @@ export function FakeForm({ onDone }) {
     <${Field} name="Id" value=${device.id_tag} wrong=${wrong.id} most=${17} hint="left empty: the next free one" onInput=${(/** @type {string} */ id) => set({ id_tag: id })} />
     <div class="buttons"><button type="submit" class="go">Add</button>
       <button type="button" onClick=${onDone}>Cancel</button></div>
-    <p class="soft">It registers by messages as others do, and never answers: whoever contacts it has a time-out.</p>
+    <p class="soft">It registers like any other device but never replies, so requests to it time out.</p>
   </form>`;
 }
 
@@ -34,6 +34,6 @@ function mistakes({ label, id_tag: id }) {
   /** @type {Record<string, string>} */
   const found = {};
   if (!label.trim()) found.label = 'A label is needed.';
-  if (id.trim() && !ID.test(id.trim())) found.id = 'Six pairs of 0 to 9 and A to F are needed, with colons.';
+  if (id.trim() && !ID.test(id.trim())) found.id = 'Enter six pairs of hexadecimal digits, separated by colons.';
   return found;
 }

@@ -74,25 +74,25 @@ function Mode(/** @type {{robots: Thing[]}} */ { robots }) {
 
 const PHASES = /** @type {Record<string, string>} */ ({
   asking: 'Asking for control …',
-  held: 'You hold control. Start, then hold to drive.',
+  held: 'You have control. Press Start, then hold to drive.',
   driving: 'Driving: hold a key, the stick or a slider.',
   stopping: 'Stopping …',
 });
 
 /** What to do next, or why nothing moves. @param {{holds: boolean}} props */
 function Hint({ holds }) {
-  if (connection.value !== 'open') return 'There is no connection to the world: nothing can be driven.';
-  if (!mayDrive.value) return 'This address may only look. The address for driving is printed where the console was started.';
-  if (!maySteer.value) return 'The connection for driving is being opened …';
-  if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
-  if (clock.value.paused) return 'The world is paused.';
+  if (connection.value !== 'open') return 'Not connected to the simulation. You cannot drive.';
+  if (!mayDrive.value) return 'This address is view-only. The address for driving is printed in the terminal where the console was started.';
+  if (!maySteer.value) return 'Connecting …';
+  if (clock.value.held_by_lag) return 'Stopped: the simulation is behind real time.';
+  if (clock.value.paused) return 'The simulation is paused.';
   if (interrupted.value) return `${interrupted.value} The robot was stopped: press Start, then take hold again.`;
   if (!holds) return heldByOther() || 'Take control of the robot first.';
   const phase = seat.value?.phase ?? 'free';
   const wait = Math.round(floorMs.value);
-  if (phase === 'starting') return `Starting: the robot answers after ${2 * wait} ms at the earliest.`;
-  if (isOnItsWay()) return `Your hand is on its way: the robot hears of it after ${wait} ms at the earliest.`;
-  if (held.value && phase === 'held') return 'Let go and press Start, then take hold again: the robot does not listen yet.';
+  if (phase === 'starting') return `Starting: the robot’s reply takes at least ${2 * wait} ms.`;
+  if (isOnItsWay()) return `Your command takes at least ${wait} ms to reach the robot.`;
+  if (held.value && phase === 'held') return 'Let go, press Start, then hold again: the robot is not accepting commands yet.';
   return PHASES[phase] ?? '';
 }
 

@@ -22,7 +22,7 @@ export function driveByGamepad() {
   const look = () => {
     frame = requestAnimationFrame(look);
     const pad = navigator.getGamepads?.().find((one) => one?.connected);
-    if (!pad && holds) interrupt('The gamepad is gone.');
+    if (!pad && holds) interrupt('The gamepad was disconnected.');
     gamepad.value = pad?.id ?? '';
     const pressed = Boolean(pad) && DEAD_MAN.some((n) => pad?.buttons[n]?.pressed);
     if (!pressed) spent = false;

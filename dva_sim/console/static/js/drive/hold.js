@@ -152,13 +152,13 @@ function sayGone() {
 
 /** Whatever interrupts. @returns {() => void} how to end that */
 export function watchInterruptions() {
-  const blur = () => interrupt('The window lost the focus.');
+  const blur = () => interrupt('The window lost focus.');
   const hide = () => document.hidden && interrupt('The page was hidden.');
   const leave = () => {
     if (held.value || engaged.value) sayGone();
     interrupt('The page was left.');
   };
-  const turned = () => interrupt('The screen was turned.');
+  const turned = () => interrupt('The screen was rotated.');
   window.addEventListener('blur', blur);
   window.addEventListener('pagehide', leave);
   document.addEventListener('visibilitychange', hide);

@@ -21,7 +21,7 @@ export async function play(url, show, tell, signal) {
       if (!answer.ok || !answer.body) throw new Error(`the server answered ${answer.status}`);
       tell('');
       await readParts(answer.body.getReader(), show, signal);
-      tell('The stream has ended; asking again.');
+      tell('The stream ended. Reconnecting …');
     } catch (error) {
       if (signal.aborted) return;
       tell(`No picture: ${error instanceof Error ? error.message : error}`);

@@ -14,8 +14,8 @@ export function RobotHead({ robot, place }) {
     <${RobotSelect} robot=${robot} place=${place} />
     <${PatternSelect} robot=${robot} />
     ${place === 0 && driven.value.length < 2 && html`<${BesideButton} robot=${robot} />`}
-    ${place > 0 && html`<button type="button" class="plain" aria-label=${`Take ${robot.label} off the page`}
-      title=${`Take ${robot.label} off the page`} disabled=${isHeld()}
+    ${place > 0 && html`<button type="button" class="plain" aria-label=${`Remove ${robot.label} from this page`}
+      title=${`Remove ${robot.label} from this page`} disabled=${isHeld()}
       onClick=${() => chooseRobots([driven.peek()[0].label])}>×</button>`}
     <${Watchdog} robot=${robot} /><${Stands} robot=${robot} />
   </div>`;
@@ -45,7 +45,7 @@ function BesideButton({ robot }) {
   const other = robots.value.find((one) => one.i !== robot.i);
   if (!other) return null;
   return html`<button type="button" class="beside" disabled=${isHeld()}
-    title="Drive two robots with the same hand, each under its own pattern"
+    title="Drive two robots with the same input, each with its own messaging pattern"
     onClick=${() => chooseRobots([robot.label, other.label])}>+ ${other.label} beside it</button>`;
 }
 
@@ -60,7 +60,7 @@ function Watchdog({ robot }) {
   const told = rowOf(robot.i)?.watchdog_left_s;
   if (told === null || told === undefined) return html`<span class="watchdog off">watchdog off</span>`;
   const left = Math.max(0, told - Math.min(0.5, (performance.now() - heardAt) / 1000));
-  return html`<span class=${left < 1 ? 'watchdog low' : 'watchdog'} title="The robot stops by itself when it hears no command for so long">
+  return html`<span class=${left < 1 ? 'watchdog low' : 'watchdog'} title="The robot stops by itself if no command arrives for this long">
     <meter min="0" max="3" value=${left} aria-label=${`Watchdog of ${robot.label}`}></meter>watchdog ${left.toFixed(1)} s</span>`;
 }
 
@@ -69,7 +69,7 @@ function Stands({ robot }) {
   const row = rowOf(robot.i);
   const drive = driveOf(robot.i);
   const speed = row?.set_speed_mps ?? 0;
-  const text = row?.stands ? `Stands: ${row.stands}` : `Set point ${speed.toFixed(2)} m/s`;
+  const text = row?.stands ? `Stopped: ${row.stands}` : `Set point ${speed.toFixed(2)} m/s`;
   const counts = drive ? `${drive.sent} sent, ${drive.refused} refused, ${drive.timeouts} timed out` : '';
   return html`<span class="stands">${text} <span class="soft">${counts}</span></span>`;
 }

@@ -19,7 +19,7 @@ export function AlarmList() {
   return html`<section class="alarms-panel" aria-label="Alarms">
     <h2>Alarms <span class="count">${unseen ? `${unseen} not seen` : 'all seen'}</span></h2>
     ${flood && html`<p class="flood" role="status">${rate} alarms in 10 minutes: alike ones are folded.</p>`}
-    ${!alarms.length && html`<p class="none">Nothing needs anybody.</p>`}
+    ${!alarms.length && html`<p class="none">No alarms.</p>`}
     <ul class="rows">${alarms.map((alarm) => html`<${Row} key=${alarm.key} alarm=${alarm} />`)}</ul>
     ${shelved.length > 0 &&
     html`<details><summary>Shelved (${shelved.length})</summary>
@@ -49,7 +49,7 @@ function Row({ alarm }) {
       html`<button type="button" disabled=${busy} aria-label=${`Seen: ${alarm.text}`}
         onClick=${() => ask('alarm_acknowledge')}>Seen</button>`}
       <button type="button" disabled=${busy} aria-label=${`Shelve for 15 minutes: ${alarm.text}`}
-        title="Out of the list for 15 minutes"
+        title="Hide it for 15 minutes"
         onClick=${() => ask('alarm_shelve', { for_s: SHELF_S })}>Shelve</button></span>`}
   </li>`;
 }
@@ -61,6 +61,6 @@ function Shelved({ alarm }) {
     <span class="text">${alarm.text}</span>
     <span class="soft">by ${alarm.shelved_by}, for another ${ageText(1000 * (alarm.left_s ?? 0))}</span>
     ${mayDispatch.value &&
-    html`<button type="button" aria-label=${`Take from the shelf: ${alarm.text}`} onClick=${back}>Unshelve</button>`}
+    html`<button type="button" aria-label=${`Unshelve: ${alarm.text}`} onClick=${back}>Unshelve</button>`}
   </li>`;
 }

@@ -59,7 +59,7 @@ function Doing({ event }) {
   const withWords = (/** @type {() => void} */ then) => () => {
     if (words) then();
     else {
-      tell('Say first in words why, or what.');
+      tell('Enter a reason or note first.');
       field.current?.focus();
     }
   };
@@ -105,9 +105,9 @@ function Sending({ event, off, tell }) {
     const done = await act('mission', { robot, event: event.number });
     tell(done.ok ? done.text : '');
   };
-  return html`<button type="button" disabled=${off || !guard} title=${guard ? `Sends ${guard}` : 'No guard can go'}
+  return html`<button type="button" disabled=${off || !guard} title=${guard ? `Sends ${guard}` : 'No guard is available'}
       onClick=${send}>Send a guard</button>
-    <button type="button" disabled=${off || !robot} title=${robot ? `${robot} goes there by itself` : 'No robot can go'}
+    <button type="button" disabled=${off || !robot} title=${robot ? `${robot} goes there by itself` : 'No robot is available'}
       onClick=${mission}>Send a robot on a mission</button>`;
 }
 
@@ -127,7 +127,7 @@ function TakeOver({ off, words, event, tell }) {
     selection.value = null;
     chooseRobots([label]);
   };
-  const hint = isAttached.value ? 'From whoever holds it: it goes by itself where it was sent to' : 'Into your own hands';
+  const hint = isAttached.value ? 'Takes the robot from its driver; it then goes to its order by itself' : 'You drive it yourself';
   return html`<div class="take-over"><label for="take-over">Robot</label>
     <select id="take-over" value=${label} onInput=${(/** @type {any} */ event) => pick(event.currentTarget.value)}>
       ${robots.value.map((robot) => html`<option value=${robot.label} selected=${robot.label === label}>

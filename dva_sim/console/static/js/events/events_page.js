@@ -55,7 +55,7 @@ function Head() {
   const asked = control.value?.dispatch;
   return html`<section class="events-head" aria-label="You">
     <${Field} name="Your name" value=${ownName.value} onInput=${rename}
-      hint=${me ? `The log calls you ${me.label}` : 'As it stands in the log'} />
+      hint=${me ? `The log shows you as ${me.label}` : 'As shown in the log'} />
     <button type="button" onClick=${join}>Use this name</button>
     ${asked && html`<${Choice} name="Who decides" value=${mode.value} options=${MODES}
       disabled=${!maySupervise.value} onInput=${(/** @type {string} */ to) => act('dispatch_mode', { mode: to })} />`}

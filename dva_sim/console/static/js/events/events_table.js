@@ -55,6 +55,6 @@ function Steps({ event }) {
   const seen = Boolean(event.acknowledged);
   return html`<button type="button" disabled=${seen || !maySteer.value}
       onClick=${() => act('event_acknowledge', { event: event.number })}>Acknowledge</button>
-    <button type="button" disabled=${!whom || !maySteer.value} title=${whom ? `Sends ${whom}` : 'Nobody can go'}
+    <button type="button" disabled=${!whom || !maySteer.value} title=${whom ? `Sends ${whom}` : 'Nobody is available'}
       onClick=${() => assignTo(event, whom)}>Assign</button>`;
 }

@@ -55,14 +55,14 @@ export function ProposalPanel({ event }) {
   useEffect(() => keepAsking(event), [event.number, event.decisions, event.state, connection.value]);
   if (!isOpen(event)) return null;
   const proposal = known.value?.event === event.number ? known.value : null;
-  if (!proposal) return html`<p class="none">The policy is being asked …</p>`;
+  if (!proposal) return html`<p class="none">Asking the policy …</p>`;
   const rival = proposal.candidates.find((who) => who.free && who.label !== proposal.label);
   return html`<section class="proposal" aria-label="Proposal">
     <p><b>${proposal.label ? `${proposal.label}, ${timeText(proposal.arrival_s)}` : 'nobody'}</b>
       ${rival ? ` (${rival.label}: ${timeText(rival.arrival_s)}, ${rival.reason})` : ''}
       <small>${proposal.policy}: ${proposal.reason}</small></p>
     ${proposal.decide_within_s !== null &&
-    html`<p class="ask" role="status">The policy asks: it does so by itself in ${secondsText(proposal.decide_within_s)}.</p>`}
+    html`<p class="ask" role="status">The policy sends them by itself in ${secondsText(proposal.decide_within_s)} unless you decide.</p>`}
     <fieldset><legend>Whom to send</legend>
       ${proposal.candidates.map((who) => html`<${Candidate} key=${who.label} who=${who} />`)}
     </fieldset></section>`;

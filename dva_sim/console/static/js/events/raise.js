@@ -69,7 +69,7 @@ function Form() {
     <${Field} name="y, m" mode="decimal" value=${shown(y)} wrong=${wrong[1]} onInput=${set(1)} />
     <button type="button" class="wide" disabled=${!maySteer.value || Boolean(wrong[0] || wrong[1])}
       onClick=${raise}>Raise event</button>
-    <p class="soft">${wrong[0] || wrong[1] ? '' : `It will be ${placeOf({ x_m: x, y_m: y })}.`}</p>
+    <p class="soft">${wrong[0] || wrong[1] ? '' : `Location: ${placeOf({ x_m: x, y_m: y })}.`}</p>
     <p role="status" aria-label="Raised">${told}</p></div>`;
 }
 

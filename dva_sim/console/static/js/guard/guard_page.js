@@ -38,7 +38,7 @@ function Leave() {
 
 function Alerts() {
   const lost = connection.value !== 'open' && connection.value !== 'connecting';
-  const over = lost && connection.value !== 'lost' ? `The world has ended: ${connection.value}` : '';
+  const over = lost && connection.value !== 'lost' ? `The simulation has ended: ${connection.value}` : '';
   const texts = [lost && (over || 'link lost: the console cannot be reached. Trying again …'), guard.value?.alert];
   return html`<div class="alerts" role="alert">
     ${texts.filter(Boolean).map((text) => html`<p class="warning" key=${text}>${text}</p>`)}
@@ -101,7 +101,7 @@ const ways = () => (guard.peek()?.order?.way_m ? [/** @type {any} */ (guard.peek
 function Own({ me }) {
   useEvery(1000);
   const at = tracks.last(me.guard);
-  return html`<p>${at ? `You are ${placeOf({ x_m: at.x, y_m: at.y })}.` : 'Your position is not known.'}</p>`;
+  return html`<p>${at ? `You are ${placeOf({ x_m: at.x, y_m: at.y })}.` : 'Your position is unknown.'}</p>`;
 }
 
 /** Beyond this an arrival is asked about once more: the event can hardly be seen from there [m]. */
@@ -144,7 +144,7 @@ function OrderCard({ me }) {
         onClick=${() => answer(true)}>Accept</button>
       <button type="button" class="big" disabled=${off} aria-expanded=${declining}
         onClick=${() => (declining ? answer(false) : decline(true))}>Decline</button></div>
-      ${declining && html`<div class="field"><label for="why">Reason, then Decline once more</label>
+      ${declining && html`<div class="field"><label for="why">Enter a reason, then press Decline again</label>
         <input id="why" type="text" maxlength="200" value=${why}
           onInput=${(/** @type {any} */ event) => write(event.currentTarget.value)} /></div>`}`}
     ${order.answered &&

@@ -36,7 +36,7 @@ export function follow() {
     const [xmin, ymin, xmax, ymax] = site.extent_m;
     if (x < xmin - ROOM_M || x > xmax + ROOM_M || y < ymin - ROOM_M || y > ymax + ROOM_M) {
       locating.value = false;
-      notice.value = 'You are not at the site of this scenario: tap the map instead.';
+      notice.value = 'You are not at this scenario’s site. Tap the map instead.';
       return;
     }
     told = performance.now();

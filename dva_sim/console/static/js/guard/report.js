@@ -26,6 +26,6 @@ export function Report({ me }) {
     <div class="report"><${Choice} name="Kind" value=${kind} options=${KINDS} onInput=${setKind} />
       <${Choice} name="Severity" value=${severity} options=${SEVERITIES} onInput=${setSeverity} />
       <button type="button" class="big" disabled=${!maySteer.value || !tracks.last(me.guard)}
-        onClick=${report}>Report it where I am</button>
+        onClick=${report}>Report at my position</button>
       <p role="status" aria-label="Report">${told}</p></div></details></section>`;
 }

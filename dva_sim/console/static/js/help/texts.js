@@ -5,27 +5,27 @@ export const TEXTS = [
   {
     title: 'Map',
     lines: [
-      'Shows the plan in metres, north up, with everything that moves, what burns or leaks, and who is sent where.',
-      'A click chooses a robot, a person or an event; so does its line in the lists beside the map.',
-      'Arrow keys pan, plus and minus zoom. “Follow” goes along with whoever is chosen.',
+      'Shows the site in metres, north up: robots, people, hazards, and who has been sent where.',
+      'Click a robot, a person or an event to select it, on the map or in the lists beside it.',
+      'Arrow keys pan, plus and minus zoom. “Follow” keeps the selected robot or person in view.',
     ],
   },
   {
     title: 'Drive',
     lines: [
       'Take control, then Start, then hold an arrow key (or W, A, D), the stick, a slider, or a shoulder button of a gamepad. Letting go stops. There is no reverse.',
-      'Whatever interrupts you (another window, a lost connection) stops the robot; it moves again only when you take hold anew.',
-      'A robot that hears nothing for the time of its watchdog stops by itself.',
-      'The picture tells how old it is. Hatched means: too old to drive by.',
-      'With a second robot beside the first, both get the same input, each under its own pattern.',
+      'Any interruption (another window, a lost connection) stops the robot. Hold again to go on.',
+      'A robot stops by itself when no command arrives before its watchdog runs out.',
+      'The picture shows its age. If it is hatched, it is too old to drive by.',
+      'With a second robot beside the first, both get the same input, each through its own messaging pattern.',
     ],
   },
   {
     title: 'Network',
     lines: [
-      'The link between the console and the robots is modelled, as in a study: its delay, jitter, loss and bandwidth act on every message and on the pictures. The striped edge says so.',
-      'Delay is one way; a round trip takes twice as long and the robot’s processing time on top.',
-      'REQ/REP sends the next command only after the last was answered. Latest-wins sends on and drops what a newer command has overtaken.',
+      'The link between the console and the robots is simulated, as in a study: delay, jitter, loss and bandwidth affect every message and picture. A striped edge marks a simulated link.',
+      'The delay is one-way. A round trip takes twice as long, plus the robot’s processing time.',
+      'REQ/REP sends the next command only after the last one was answered. Latest-wins keeps sending, and the robot drops commands for which it has a newer one.',
     ],
   },
 ];
@@ -36,6 +36,6 @@ export const KEYS = [
   ['↑ or W', 'forward, while held'],
   ['← → or A D', 'turn, while held'],
   ['Shift', 'slowly, while held'],
-  ['Arrows, + −', 'pan and zoom the map, when it has the focus'],
+  ['Arrows, + −', 'pan and zoom the map, when it has focus'],
   ['?', 'this page'],
 ];

@@ -40,7 +40,7 @@ export async function act(what, more = {}) {
 export async function ask(what, more = {}, id = newId()) {
   if (ENDS.includes(what)) forget();
   if (!steer({ id, do: what, ...more })) {
-    return { ok: false, text: 'There is no connection to the world; nothing was sent.' };
+    return { ok: false, text: 'Not connected to the simulation. Nothing was sent.' };
   }
   const answer = new Promise((resolve) => waiting.set(id, resolve));
   const patience = PATIENCE_MS[what];
@@ -72,7 +72,7 @@ export function settle(id, done) {
 /** @param {boolean} unexpected */
 export function socketLost(unexpected) {
   for (const id of [...waiting.keys()]) {
-    settle(id, { ok: false, text: 'The connection was lost before the answer came.' });
+    settle(id, { ok: false, text: 'The connection was lost before the reply arrived.' });
   }
   if (unexpected) driveLost.value += 1;
 }

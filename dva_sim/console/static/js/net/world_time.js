@@ -46,7 +46,7 @@ export function worldNow() {
   return Number.isNaN(offset) ? newest : offset + pace * performance.now();
 }
 
-/** How old the newest word from the world is [s]. */
+/** Age of the latest update from the simulation [s]. */
 export function pageAge() {
   return Math.max(0, (performance.now() - heard) / 1000);
 }

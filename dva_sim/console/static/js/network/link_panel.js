@@ -23,19 +23,19 @@ const KNOBS = [
   { name: 'Jitter', key: 'jitter_s', unit: 1000, step: 5, limits: [0, 1], text: ms,
     hint: 'How much the delay varies' },
   {
-    name: 'Loss', key: 'loss', unit: 100, step: 0.5, limits: [0, 0.5], hint: 'Share of packets that are lost',
+    name: 'Loss', key: 'loss', unit: 100, step: 0.5, limits: [0, 0.5], hint: 'Share of packets lost',
     text: (value) => `${Number(value.toFixed(1))} %`,
   },
   {
     name: 'Processing time', key: 'processing_s', unit: 1000, step: 10, limits: [0, 3], text: ms,
-    hint: 'What the robot’s computer takes for each command',
+    hint: 'Time the robot’s computer needs for each command',
   },
 ]; // prettier-ignore
 
 /** @param {{heading?: string}} props */
 export function LinkPanel({ heading = 'The link you choose' }) {
   if (!isModelled.value) return html`<${RealLink} />`;
-  return html`<section class="panel link-panel" aria-label="What lies between">
+  return html`<section class="panel link-panel" aria-label="Link settings">
     <h2>${heading}</h2>
     <${Presets} />
     <div class="knobs">
@@ -48,10 +48,9 @@ export function LinkPanel({ heading = 'The link you choose' }) {
 /** Of sockets nothing can be chosen; the robots' computers are models all the same. */
 function RealLink() {
   const knob = KNOBS[KNOBS.length - 1];
-  return html`<section class="panel link-panel" aria-label="What lies between">
+  return html`<section class="panel link-panel" aria-label="Link settings">
     <h2>A real link</h2>
-    <p class="soft">Messages go through sockets, and time goes by as outside: delay, jitter and loss are
-      what the network makes them.</p>
+    <p class="soft">Messages use real sockets in real time. Delay, jitter and loss are those of the real network.</p>
     <div class="knobs"><${LinkSlider} knob=${knob} /></div>
   </section>`;
 }
@@ -106,7 +105,7 @@ function Bandwidth() {
   const trace = link.value?.rate_trace;
   const text = (/** @type {number} */ step) => (trace ? 'by the trace' : rateText(rateOf(step)));
   return html`<${Slider} name="Bandwidth" min=${0} max=${EACH} step=${1} value=${value}
-    text=${text} hint="Of the link, in each direction"
+    text=${text} hint="Link rate, in each direction"
     disabled=${!maySteer.value || Boolean(trace)} onInput=${set} />`;
 }
 
@@ -114,7 +113,7 @@ function TimeFactor() {
   const [value, set] = useOwn(clock.value.factor, (factor) => act('pace', { factor }));
   return html`<${Slider} name="Time factor" min=${1} max=${FASTEST} step=${1} value=${value}
     text=${(/** @type {number} */ factor) => `× ${Number(factor.toFixed(1))}`}
-    hint="How many times faster than real time the world runs" disabled=${!maySteer.value} onInput=${set} />`;
+    hint="Simulation speed, as a multiple of real time" disabled=${!maySteer.value} onInput=${set} />`;
 }
 
 const PRESETS = [0, 100, 250, 500, 1000];

@@ -65,7 +65,7 @@ function useFocusAfterMove(name) {
 
 function Waiting() {
   const lost = connection.value === 'lost';
-  return html`<p class="soft">${lost ? 'The console cannot be reached. Trying again …' : 'Waiting for the console …'}</p>`;
+  return html`<p class="soft">${lost ? 'The console cannot be reached. Retrying …' : 'Waiting for the console …'}</p>`;
 }
 
 /** What is wrong, and what follows from it. */
@@ -74,7 +74,7 @@ function Alerts() {
   const texts = [
     connection.value === 'lost' &&
       'link lost: the console cannot be reached. The robot stops by itself. Trying again …',
-    ended && `The world has ended: ${connection.value}`,
+    ended && `The simulation has ended: ${connection.value}`,
     seat.value?.alert,
     interrupted.value && `${interrupted.value} The robot was stopped; start again when you are ready.`,
   ];

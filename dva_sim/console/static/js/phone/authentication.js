@@ -68,9 +68,9 @@ function Register() {
   const [open, unfold] = useState(false);
   const { server, port, label, type } = choices.value;
   const wrong = {
-    server: HOST.test(server.trim()) ? '' : 'An address is needed, such as 127.0.0.1.',
-    port: isPort(port) ? '' : 'A whole number from 1 to 65535 is needed.',
-    label: label.trim() ? '' : 'Any words that describe this device are needed.',
+    server: HOST.test(server.trim()) ? '' : 'Enter an address such as 127.0.0.1.',
+    port: isPort(port) ? '' : 'Enter a whole number from 1 to 65535.',
+    label: label.trim() ? '' : 'Enter a few words that describe this device.',
   };
   const known = phone.value;
   const [asking, ask] = useState(false);
@@ -116,7 +116,7 @@ function AsOperator() {
   const [chosen, take] = useState(String(held ?? robots.value[0]?.i ?? ''));
   const options = /** @type {[string, string][]} */ (robots.value.map((one) => [String(one.i), one.label]));
   return html`<li class="step"><h2>Or drive as the console’s operator</h2>
-    <p>This address may drive as it is: no registration is needed.</p>
+    <p>This address may drive already. You need not register.</p>
     ${held === undefined
       ? html`<${Choice} name="Robot" value=${chosen} options=${options} onInput=${take} />
         <button type="button" class="big" disabled=${!maySteer.value}
@@ -140,7 +140,7 @@ function DeviceList({ devices, know, off }) {
   return html`<li class=${off ? 'step off' : 'step'}><h2>Choose a device</h2>
     <button type="button" class=${devices || off ? 'big' : 'big go'} disabled=${off || !maySteer.value}
       onClick=${ask}>Get device list</button>
-    ${devices?.length === 0 && html`<p>The DVA knows no devices.</p>`}
+    ${devices?.length === 0 && html`<p>No devices are registered.</p>`}
     <${Choice} name="Device" value=${options.length ? choices.value.device : ''} disabled=${off || !options.length}
       options=${options.length ? options : [['', 'not listed yet']]}
       onInput=${(/** @type {string} */ id) => choose({ device: id })} />
@@ -168,7 +168,7 @@ function Permission({ devices, off }) {
   };
   const held = phone.value?.device && holds.value;
   return html`<li class=${unlisted ? 'step off' : 'step'}><h2>Ask for permission</h2>
-    ${held && html`<p>Permission is held: ${phone.value?.level}.</p>`}
+    ${held && html`<p>You have permission: ${phone.value?.level}.</p>`}
     <${Choice} name="Permission level" value=${level} options=${LEVELS} disabled=${unlisted}
       onInput=${(/** @type {string} */ value) => choose({ level: value })} />
     <button type="button" class=${unlisted || held ? 'big' : 'big go'} disabled=${unlisted || !maySteer.value}

@@ -33,12 +33,12 @@ export function CalibrationScreen() {
     if (wrong.force || wrong.radius || wrong.delay) return;
     await ask();
     const held = tilts.peek() ? pose() : null;
-    if (tilts.peek() && !held) return tell('The sensor says nothing: nothing was calibrated.');
+    if (tilts.peek() && !held) return tell('No sensor data is arriving, so nothing was calibrated.');
     const comma = (/** @type {string} */ text) => text.replace(',', '.').trim();
     const numbers = { force: comma(force), radius: comma(radius), delay: comma(delay) };
     choose({ ...numbers, reference: held, calibrated: true });
     const done = await sendCalibration(true);
-    if (!isKnown.peek()) tell('Kept on this phone; it counts once you have registered.');
+    if (!isKnown.peek()) tell('Saved on this phone. It takes effect once you have registered.');
     else if (done?.ok) tell(choices.peek().keep ? `${capital(done.text)}.` : 'Calibrated.');
   };
   return html`<${Sensor} />
@@ -59,7 +59,7 @@ export function CalibrationScreen() {
     <div class="thumb"><p role="status" aria-label="Calibration">${told}</p>
       <button type="button" class=${told ? 'big' : 'big go'} disabled=${!maySteer.value || blind}
         onClick=${calibrate}>Calibrate</button>
-      ${calibrated && html`<a class=${told ? 'big go' : 'big'} href="#/teleoperation">Go on: Teleoperation</a>`}
+      ${calibrated && html`<a class=${told ? 'big go' : 'big'} href="#/teleoperation">Continue: Teleoperation</a>`}
     </div>`;
 }
 
@@ -81,7 +81,7 @@ function Sensor() {
   const bad = !['live', 'looking', 'tap'].includes(now);
   return html`<div role=${bad ? 'alert' : 'status'} aria-label="Sensor" class=${bad ? 'warning' : 'sensor'}>
     <span>${bad ? `no sensor: ${WORDS[now]}` : WORDS[now]}</span>
-    ${['tap', 'denied'].includes(now) && html`<button type="button" onClick=${ask}>Switch the sensor on</button>`}
+    ${['tap', 'denied'].includes(now) && html`<button type="button" onClick=${ask}>Turn on the sensor</button>`}
   </div>`;
 }
 

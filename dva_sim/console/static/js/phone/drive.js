@@ -50,7 +50,7 @@ const STRANGER = { i: -1, kind: 'robot', radius_m: 0, max_speed_mps: 0, max_turn
 export const whyNoEmergency = computed(() => {
   if (!isKnown.value) return 'No robot yet: register first.';
   if (!robot.value) return 'No robot yet: choose one first.';
-  return robot.value.i < 0 ? 'This device is no robot of this world: nothing of it moves.' : '';
+  return robot.value.i < 0 ? 'This device is not a robot of this simulation, so nothing will move.' : '';
 });
 
 /** Begin, if a robot is in hand. */
@@ -116,7 +116,7 @@ export function keepDriveInHand() {
     losses = driveLost.value;
   });
   effect(() => {
-    if (screen.value !== 'teleoperation') end('The screen was left.');
+    if (screen.value !== 'teleoperation') end('You left the driving screen.');
   });
   window.setInterval(watchSensor, LOOK_MS);
   feelDrive();
@@ -125,7 +125,7 @@ export function keepDriveInHand() {
 /** Who tilts a phone whose sensor says nothing steers nothing. */
 function watchSensor() {
   countSilence(LOOK_MS);
-  if (engaged.peek() && tilts.peek() && isSilent()) interrupt('The sensor was silent.');
+  if (engaged.peek() && tilts.peek() && isSilent()) interrupt('The motion sensor stopped sending.');
 }
 
 const isSilent = () => silentFor() > SILENT_MS;
@@ -138,7 +138,7 @@ const end = (why) => queueMicrotask(() => interrupt(why));
 export function press(down) {
   const was = thumb.peek();
   thumb.value = down;
-  if (was && !down && choices.peek().hold && tilts.peek()) interrupt('The thumb was lifted.');
+  if (was && !down && choices.peek().hold && tilts.peek()) interrupt('You lifted your thumb.');
 }
 
 /** A drive is felt: its start, its end, a contact, a lost link. */

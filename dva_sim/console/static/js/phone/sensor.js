@@ -143,7 +143,7 @@ export function gravity(beta, gamma) {
 export const WORDS = /** @type {Record<string, string>} */ ({
   looking: 'Looking for the motion sensor …',
   live: 'The motion sensor works.',
-  tap: 'This phone wants to be asked for its motion sensor: Calibrate and Start do so.',
+  tap: 'This phone asks before it shares its motion sensor. Tap Calibrate or Start.',
   denied:
     'this page has no permission to read it. Allow motion and orientation for this page in the ' +
     'settings of the browser and load it again, or steer by the stick.',

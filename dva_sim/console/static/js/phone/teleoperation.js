@@ -27,7 +27,7 @@ export function TeleoperationScreen() {
     return () => watch([]);
   }, [one?.i, held]);
   if (!one || !held) {
-    return html`<div role="alert" class="warning"><span>There is no permission to drive a robot yet:
+    return html`<div role="alert" class="warning"><span>You do not have permission to drive a robot yet:
       ${' '}<a href="#/authentication">Authentication</a> comes first.</span></div>`;
   }
   return html`<${Cockpit} one=${one} />`;
@@ -75,7 +75,7 @@ function Figures({ one }) {
 }
 
 const PHASES = /** @type {Record<string, string>} */ ({
-  asking: 'Asking for the robot …',
+  asking: 'Requesting the robot …',
   starting: 'Starting …',
   stopping: 'Stopping …',
 });
@@ -93,8 +93,8 @@ function Waiting({ what }) {
 /** What to do next, or why the robot stands. @param {{one: import('../lines.js').Thing}} props */
 function Hint({ one }) {
   void rows.value;
-  if (clock.value.paused) return 'The world is paused.';
-  if (clock.value.held_by_lag) return 'Held: the world is behind real time.';
+  if (clock.value.paused) return 'The simulation is paused.';
+  if (clock.value.held_by_lag) return 'Stopped: the simulation is behind real time.';
   if (PHASES[phase.value]) return html`<${Waiting} key=${phase.value} what=${PHASES[phase.value]} />`;
   const how = tilts.value ? 'tilt to drive' : 'hold the stick, a key or the gamepad';
   if (phase.value !== 'driving') {
@@ -106,7 +106,7 @@ function Hint({ one }) {
   const blind = Math.floor(pictureAge(one.i) / 1000);
   if (blind >= TELLING_S) return `No picture for ${blind} s: the link may be lost. The robot stops by itself.`;
   const why = rowOf(one.i)?.stands;
-  return why ? `It stands: ${why}.` : 'Driving. Swipe down to stop.';
+  return why ? `Stopped: ${why}.` : 'Driving. Swipe down to stop.';
 }
 
 /** The order in hand, and what the person saw there. */

@@ -11,7 +11,7 @@ export function StoryPage() {
   const later = (replay.value?.marks ?? []).filter((mark) => mark.t > last);
   return html`<main class="page story-page" id="main" tabindex="-1">
     <h1>Story</h1>
-    <p class="soft">Choose a line to go to its moment.</p>
+    <p class="soft">Select a line to jump to that moment.</p>
     <h2>Told so far</h2>
     <${Lines} name="Told so far" lines=${told} />
     <h2>Still to come</h2>

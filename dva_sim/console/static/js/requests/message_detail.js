@@ -18,9 +18,9 @@ export function MessageDetail({ log, row }) {
   }, [log, row?.n, row?.code, mayDrive.value]);
   return html`<section class="panel message" aria-label="Message">
     <h2>${row ? `Request ${row.n}` : 'Message'}</h2>
-    ${!row && html`<p class="soft">Choose a request to see its header, all of its XML, and the reply.</p>`}
-    ${row && !mayDrive.value && html`<p class="soft">Whole messages hold sessions, by which one drives:
-      they need the address for driving.</p>`}
+    ${!row && html`<p class="soft">Select a request to see its header, its XML and the reply.</p>`}
+    ${row && !mayDrive.value && html`<p class="soft">Complete messages contain session numbers, which allow driving. Open the address for driving
+      to see them.</p>`}
     ${found?.failed && html`<p class="wrong">${found.failed}</p>`}
     ${found?.header && html`<${Whole} found=${found} />`}
   </section>`;

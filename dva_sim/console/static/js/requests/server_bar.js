@@ -21,16 +21,16 @@ export function ServerBar() {
     ${server.own !== false &&
     html`<div class="server-controls">
       <${Field} name="Port" value=${shown} mode="numeric" most=${5} disabled=${listens || !maySteer.value}
-        wrong=${wrong && 'A port from 1 to 65534 is needed.'} onInput=${setPort} />
+        wrong=${wrong && 'Enter a port from 1 to 65534.'} onInput=${setPort} />
       <button type="button" disabled=${listens || Boolean(wrong) || !maySteer.value} onClick=${start}>Start server</button>
       <button type="button" disabled=${!listens || !maySteer.value} onClick=${() => act('server_stop')}>Stop server</button>
     </div>`}
-    ${modelled && html`<p class="soft">The links are modelled: no port of this machine is open.</p>`}
+    ${modelled && html`<p class="soft">Links are simulated: no port of this computer is open.</p>`}
   </section>`;
 }
 
 /** @param {{listens: boolean, address: string, own?: boolean}} server */
 function stateText({ listens, address, own }) {
   if (own === false) return listens ? `The DVA at ${address} answers` : `The DVA at ${address} does not answer`;
-  return listens ? `Listens on ${address}` : 'Stopped: nobody is answered';
+  return listens ? `Listening on ${address}` : 'Stopped: requests are not answered';
 }

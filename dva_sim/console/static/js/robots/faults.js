@@ -8,9 +8,9 @@ import { plain } from '../ui/words.js';
 import { windowOf } from './window.js';
 
 const KNOBS = /** @type {[string, string, string][]} */ ([
-  ['replies', 'Drop replies', 'It does what it is asked, and its answers are lost: whoever asks has a time-out.'],
-  ['freeze', 'Freeze', 'Its computer hangs: it hears and says nothing. Its watchdog stops it; it starts anew idle.'],
-  ['camera', 'Lose the camera', 'It takes no pictures.'],
+  ['replies', 'Drop replies', 'The robot obeys, but its replies are dropped, so callers time out.'],
+  ['freeze', 'Freeze', 'Its computer hangs: it receives and sends nothing. The watchdog stops it; then it restarts idle.'],
+  ['camera', 'Lose the camera', 'The camera takes no pictures.'],
 ]);
 
 /** @typedef {import('../lines.js').Thing} Thing */
@@ -21,12 +21,12 @@ export function Faults({ robot }) {
   const stuck = (windowOf(robot.i)?.sensors ?? []).filter((sensor) => sensor.stuck);
   const some = faults && (faults.processing_s !== null || KNOBS.some(([key]) => /** @type {any} */ (faults)[key]) || stuck.length);
   return html`<section class=${some ? 'panel faults some' : 'panel faults'} aria-label="Faults">
-    <h2>Faults <span class="count">${some ? 'something is made to go wrong' : 'none'}</span></h2>
+    <h2>Faults <span class="count">${some ? 'active' : 'none'}</span></h2>
     <${Processing} robot=${robot} />
     ${KNOBS.map(([key, name, hint]) => html`<${Knob} key=${key} name=${name} hint=${hint}
       on=${Boolean(/** @type {any} */ (faults)?.[key])} ask=${{ robot: robot.i, what: key }} />`)}
     ${(robot.sensors ?? []).map((sensor) => html`<${Knob} key=${sensor} name=${`Stuck: ${plain(sensor)}`}
-      hint="It gives its last value for ever." on=${stuck.some((one) => one.name === sensor)}
+      hint="The sensor keeps repeating its last value." on=${stuck.some((one) => one.name === sensor)}
       ask=${{ robot: robot.i, what: 'sensor', sensor }} />`)}
   </section>`;
 }
@@ -68,7 +68,7 @@ function Processing({ robot }) {
     if (told !== null) ask(true, seconds);
   };
   return html`<div class="processing">
-    <label class="tick" title="Each message takes its computer so long."><input type="checkbox" checked=${isSlow}
+    <label class="tick" title="Its computer needs this long for each message."><input type="checkbox" checked=${isSlow}
       disabled=${!maySteer.value} onInput=${(/** @type {any} */ event) => slow(event.currentTarget.checked)} /> Slow computer</label>
     <${Slider} name="Processing time" min=${0} max=${MOST_PROCESSING_S} step=${0.1} value=${told ?? own}
       disabled=${!maySteer.value} text=${(/** @type {number} */ s) => `${s.toFixed(1)} s`} onInput=${change} />

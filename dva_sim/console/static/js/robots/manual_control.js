@@ -57,13 +57,13 @@ function steering() {
 /** @param {Thing} robot */
 function hint(robot) {
   const shown = windowOf(robot.i);
-  if (connection.value !== 'open') return 'There is no connection to the world: nothing can be driven.';
+  if (connection.value !== 'open') return 'Not connected to the simulation. You cannot drive.';
   if (!mayDrive.value) return 'This address may only look.';
   if (!shown) return '';
-  if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped: take hold again.` : 'It is in your hand. Hold to drive; whoever else asks for it is told that it is busy.';
-  if (shown.station.state !== 'listening') return 'It has to be registered and listening first.';
-  if (shown.hand !== null) return 'It is in the hand of another page.';
-  if (shown.mode !== 'Idle' && shown.mode !== 'Emergency') return `Only an idle robot can be taken: it is in mode ${shown.mode}.`;
+  if (isInHand(robot.i)) return interrupted.value ? `${interrupted.value} The robot was stopped. Hold again to drive.` : 'You control it manually. Hold to drive; everyone else gets the reply Busy.';
+  if (shown.station.state !== 'listening') return 'The robot must be registered and listening first.';
+  if (shown.hand !== null) return 'Another page controls it manually.';
+  if (shown.mode !== 'Idle' && shown.mode !== 'Emergency') return `You can only take an idle robot. This one is in mode ${shown.mode}.`;
   if (shown.holder) return `${shown.holder} holds it.`;
   return 'It is free.';
 }

@@ -30,9 +30,9 @@ export function RobotLog({ robot }) {
     <div class="scrolls log" ref=${box} onScroll=${onScroll} tabindex="0" role="group" aria-label="Messages, scrolls">
       <table aria-label="Messages"><thead><tr>${['Time', 'Message', 'From', 'Reply'].map((head) => html`<th scope="col">${head}</th>`)}</tr></thead>
       <tbody>${shown.map((row) => (row.gap ? gap(row) : html`<${Row} key=${row.n} row=${row} />`))}</tbody></table>
-      ${!shown.length && html`<p class="soft empty">It has heard no teleoperation message yet.</p>`}
+      ${!shown.length && html`<p class="soft empty">No teleoperation message has arrived yet.</p>`}
     </div>
-    <${Tick} name="Other messages, too" value=${all} onInput=${showAll} />
+    <${Tick} name="Show other messages as well" value=${all} onInput=${showAll} />
   </section>`;
 }
 

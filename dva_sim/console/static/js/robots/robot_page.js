@@ -56,11 +56,11 @@ function Head({ robot }) {
 /** Why it stands; an emergency and a lost link stand out. @param {{robot: Thing}} props */
 function Reasons({ robot }) {
   const shown = windowOf(robot.i);
-  if (!shown) return html`<p class="reason" role="status" aria-label="Reason">Waiting for word of it …</p>`;
+  if (!shown) return html`<p class="reason" role="status" aria-label="Reason">Waiting for its status …</p>`;
   const { emergency, mode, stands, notice, link_lost: lost } = shown;
   const stop = mode === 'Emergency' && emergency;
   const text = stop
-    ? `Emergency stop by ${emergency.by} at ${clockText(emergency.at_ms)}: it stands until it is ordered anew.`
+    ? `Emergency stop by ${emergency.by} at ${clockText(emergency.at_ms)}: the robot waits for a new order.`
     : lost
       ? `Link lost: ${stands}`
       : stands && `Stands: ${stands}`;

@@ -17,7 +17,7 @@ export function Station({ robot }) {
   return html`<ol class="steps" aria-label="State">${[...STEPS, last].map(
     (step, n) => html`<li class=${n <= Math.max(at, now) ? 'past' : ''} aria-current=${n === now ? 'step' : null}>${step}</li>`,
   )}</ol>
-    ${station.by_hand ? html`<${Steps} robot=${robot} station=${station} />` : html`<p class="soft">It registers and listens by itself, at ${station.address}.</p>`}`;
+    ${station.by_hand ? html`<${Steps} robot=${robot} station=${station} />` : html`<p class="soft">It registers by itself and listens on ${station.address}.</p>`}`;
 }
 
 /** @param {{robot: import('../lines.js').Thing, station: import('../lines.js').Station}} props */
@@ -27,7 +27,7 @@ function Steps({ robot, station }) {
   const off = station.state === 'off';
   const ask = (/** @type {import('../net/actions.js').Action} */ what, more = {}) => act(what, { robot: robot.i, ...more });
   return html`<div class="station">
-    <${Field} name="DVA" value=${dva} disabled=${!off || station.asking} hint="HOST:PORT of a DVA, or of a simulator of one" onInput=${setDva} />
+    <${Field} name="DVA" value=${dva} disabled=${!off || station.asking} hint="HOST:PORT of a DVA or a DVA simulator" onInput=${setDva} />
     <div class="buttons">
       <button type="button" disabled=${!may || !off || station.asking} onClick=${() => ask('robot_register', { dva })}>Register</button>
       <button type="button" disabled=${!may || station.state !== 'registered'} onClick=${() => ask('robot_listen')}>Open port</button>
@@ -40,7 +40,7 @@ function Steps({ robot, station }) {
 /** @param {import('../lines.js').Station} station */
 function stationText(station) {
   if (station.asking) return `Asking ${station.dva} …`;
-  if (station.state === 'off') return `It is off: nobody can reach it. It will listen on ${station.address}.`;
+  if (station.state === 'off') return `The robot is off and cannot be reached. It will listen on ${station.address}.`;
   if (station.state === 'registered') return `Registered at ${station.dva} as ${station.address}; its port is closed.`;
   return `Registered at ${station.dva}; listening on ${station.address}.`;
 }

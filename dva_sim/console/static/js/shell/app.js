@@ -108,8 +108,8 @@ function Rail() {
 function Waiting() {
   const text =
     connection.value === 'lost'
-      ? 'The world cannot be reached. Trying again …'
-      : 'Waiting for the world …';
+      ? 'The simulation cannot be reached. Retrying …'
+      : 'Waiting for the simulation …';
   return html`<main class="page waiting" id="main" tabindex="-1"><h1>dva-sim</h1><p>${text}</p></main>`;
 }
 
@@ -121,16 +121,16 @@ function Warnings() {
   return html`<div class="warnings" role="alert">
     <${UnconfirmedStop} />
     ${held &&
-    html`<p class="warning">Robots were stopped: the world fell more than ${limit} ms behind real
-      time, so what you saw was no longer what you steered. ${lag > limit / 1000
+    html`<p class="warning">Robots were stopped: the simulation fell more than ${limit} ms behind real time, so you no
+      longer saw what you were steering. ${lag > limit / 1000
         ? `It is ${Math.round(1000 * lag)} ms behind now.`
-        : 'It has caught up.'} Driving is possible again once it has kept up for a moment.</p>`}
+        : 'It has caught up now.'} You can drive again once it has kept up for a moment.</p>`}
     ${connection.value === 'lost' &&
-    html`<p class="warning">The connection to the world is lost; what you see is old. Robots that
-      you drove have been stopped. Trying again …</p>`}
+    html`<p class="warning">The connection to the simulation is lost. What you see is out of date. Robots you were driving
+      have been stopped. Retrying …</p>`}
     ${rows.value?.server?.own === false && !rows.value.server.listens &&
-    html`<p class="warning">The DVA at ${rows.value.server.address} does not answer: what you see is old. Asking again …</p>`}
-    ${ended && html`<p class="warning">The world has ended: ${connection.value}</p>`}
+    html`<p class="warning">The DVA at ${rows.value.server.address} does not answer. What you see is out of date. Retrying …</p>`}
+    ${ended && html`<p class="warning">The simulation has ended: ${connection.value}</p>`}
     ${notice.value &&
     html`<p class="warning">${notice.value} <button type="button" class="plain"
       aria-label="Dismiss" onClick=${() => (notice.value = '')}><${Icon} name="x" /></button></p>`}

@@ -35,11 +35,11 @@ function Time() {
   useEvery(200);
   const { factor, paused } = clock.value;
   const name = paused ? 'Go on' : 'Pause';
-  return html`<span class="item time" title="Time of the world, and how fast it runs">
+  return html`<span class="item time" title="Simulation time and speed">
     <span class="figure">${clockText(worldNow())}</span>
     <span class="soft">${paused ? 'paused' : `×${Number(factor.toFixed(1))}`}</span>
     ${!isPast.value && html`<button type="button" class="plain" disabled=${!maySteer.value || !isModelled.value}
-      aria-label=${name} title=${isModelled.value ? name : 'Over real links time goes by as outside'}
+      aria-label=${name} title=${isModelled.value ? name : 'With real sockets the simulation runs in real time'}
       onClick=${() => act('pace', { paused: !paused })}>
       <${Icon} name=${paused ? 'play' : 'pause'} /></button>`}
   </span>`;
@@ -50,23 +50,23 @@ function Link() {
   if (isPast.value) {
     const text = replay.value ? `recording ${replay.value.name}` : 'no recording yet';
     return html`<span class="item link" role="status" aria-label="Link"
-      title="What is shown is over: a recording is played">${text}</span>`;
+      title="You are watching a recording">${text}</span>`;
   }
   const delay = setting?.delay_s === undefined ? '–' : `${Math.round(1000 * setting.delay_s)} ms`;
   const loss = setting?.loss ? `, ${Number((100 * setting.loss).toFixed(1))} % lost` : '';
   if (!isModelled.value && setting?.delay_s !== undefined) {
     return html`<span class="item link" role="status" aria-label="Link"
-      title="Sockets over an emulated link lie between the console and the robots; its delay is one way">
+      title="The console reaches the robots through real sockets over an emulated link. The delay is one-way.">
       emulated ${delay}${loss}</span>`;
   }
   if (!isModelled.value) {
     return html`<span class="item link" role="status" aria-label="Link"
-      title=${isAttached.value ? 'What is shown runs elsewhere; here is known what messages tell' : 'Sockets lie between the console and the robots, not a model'}>
+      title=${isAttached.value ? 'This console shows a remote system and only knows what its messages say.' : 'The console reaches the robots through real sockets, not through a simulated link.'}>
       ${isAttached.value ? `attached to ${scene.value?.dva_address}` : 'real'}</span>`;
   }
   const trace = setting?.trace ? `, ${setting.trace}` : '';
   return html`<span class="item link modelled" role="status"
-    aria-label="Link" title="The link that lies between the console and the robots, one way">
+    aria-label="Link" title="The simulated link between the console and the robots. The delay is one-way.">
     modelled ${delay}${loss}${trace}</span>`;
 }
 
@@ -77,7 +77,7 @@ function Age() {
   const known = Number.isFinite(age);
   const error = roundTrip.value.error;
   const more = Number.isNaN(error) ? '' : `; to the server and back ${roundTrip.value.ms.toFixed(1)} ms, clocks ±${error.toFixed(1)} ms`;
-  return html`<span class=${old ? 'item age old' : 'item age'} title=${`How old the newest word from the world is${more}`}>
+  return html`<span class=${old ? 'item age old' : 'item age'} title=${`Age of the latest update from the simulation${more}`}>
     <span class="word">data </span>${known ? secondsText(age) : '–'}<span class="word">${known ? ' old' : ''}</span></span>`;
 }
 
@@ -93,6 +93,6 @@ function Alarms() {
 function Who() {
   const me = you.value;
   if (!me) return null;
-  return html`<span class="item who" title=${`What your address allows; the world knows this page as ${me.client}`}>
+  return html`<span class="item who" title=${`What your address allows. The simulation calls this page ${me.client}.`}>
     you may ${me.role === 'phone' ? 'drive' : me.role}</span>`;
 }

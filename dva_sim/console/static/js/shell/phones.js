@@ -40,8 +40,8 @@ export function PhoneCode() {
     <button type="button" class="close" aria-label="Close" onClick=${() => (open.value = false)}>
       <${Icon} name="x" /></button>
     <h2 id="phone-title">Drive by phone</h2>
-    ${open.value && html`<img src="/api/phones.svg" width="264" height="264" alt="Code of the address for phones" />`}
+    ${open.value && html`<img src="/api/phones.svg" width="264" height="264" alt="QR code of the address for phones" />`}
     <p>Scan the code, or open <code>${address.value}</code> on the phone.</p>
-    <p>A phone has to trust this machine once: <a href="/trust" target="_blank">how to trust it</a>.</p>
+    <p>Each phone must trust this computer once: <a href="/trust" target="_blank">how to trust it</a>.</p>
   </dialog>`;
 }

@@ -55,14 +55,14 @@ function Leg({ leg }) {
     <ol class="todo">
       <li class=${holds(robot.i) ? 'past' : ''}>Take control of ${robot.label}.</li>
       <li class=${drives(robot.i) || took !== null ? 'past' : ''}>Start.</li>
-      <li class=${took === null ? '' : 'past'}>${turnText(now.plan.side_rad, goal)} hold <kbd>↑</kbd> and come to
-        a stand in it. The picture is half a second old, and your commands take as long.</li>
+      <li class=${took === null ? '' : 'past'}>${turnText(now.plan.side_rad, goal)} hold <kbd>↑</kbd> and stop inside it. The picture is half a second old, and your commands take another half
+        second.</li>
     </ol>
     <p class="big">${(time / 1000).toFixed(1)} s <span class="soft">${hint(leg)}</span></p>
     ${took === null
       ? html`<button type="button" class="wide" onClick=${takeTour}>Begin again</button>`
       : html`<button type="button" class="go wide" onClick=${() => go(leg + 2)}>
-          ${leg ? 'Show my numbers' : 'Next: the same under the other pattern'}</button>`}</div>`;
+          ${leg ? 'Show my numbers' : 'Next: the same with the other pattern'}</button>`}</div>`;
 }
 
 /**
@@ -71,19 +71,19 @@ function Leg({ leg }) {
  * @param {string} goal
  */
 function turnText(side, goal) {
-  if (Math.abs(side) < AHEAD) return html`The ring ${goal} on the map lies straight ahead:`;
+  if (Math.abs(side) < AHEAD) return html`The ring ${goal} on the map is straight ahead:`;
   const [key, where] = side > 0 ? ['←', 'to the left'] : ['→', 'to the right'];
   const far = Math.abs(side) > HALF_ROUND ? 'around' : where;
-  return html`Hold <kbd>${key}</kbd> to turn ${far} until the ring ${goal} on the map lies ahead, then`;
+  return html`Hold <kbd>${key}</kbd> to turn ${far} until the ring ${goal} on the map is ahead, then`;
 }
 
 /** @param {number} leg */
 function hint(leg) {
   const now = progress.value;
   if (now?.took[leg] !== null) return '';
-  if (!isAtItsStart(leg)) return 'the robot has been moved since: begin again';
-  if (now.began[leg] === null) return 'counts from the first move';
-  return drives(robotOf(leg)?.i) ? '' : 'the drive has ended, the clock goes on: Start, or begin again';
+  if (!isAtItsStart(leg)) return 'the robot has been moved: begin again';
+  if (now.began[leg] === null) return 'the clock starts with the first move';
+  return drives(robotOf(leg)?.i) ? '' : 'the drive has ended but the clock is running: press Start, or begin again';
 }
 
 function Numbers() {
@@ -97,7 +97,7 @@ function Numbers() {
         <span class="track"><span class=${`fill pattern-${rowOf(robotOf(leg)?.i ?? -1)?.pattern}`} style=${{ width: `${(100 * took[leg]) / longest}%` }}></span></span>
         <b>${(took[leg] / 1000).toFixed(1)} s</b></div>`,
     )}
-    <p>Under ${titleOf(1)} you took ${Math.abs(first - second).toFixed(1)} s ${less}. One drive each says
-      little: practice counts, too. A study repeats it with many persons and shares the chances.</p>
-    <button type="button" class="wide" onClick=${takeTour}>Once more</button>`;
+    <p>Under ${titleOf(1)} you took ${Math.abs(first - second).toFixed(1)} s ${less}. One drive each proves little, and practice counts too. A study repeats this with many people
+      in random order.</p>
+    <button type="button" class="wide" onClick=${takeTour}>Do it again</button>`;
 }

@@ -60,5 +60,5 @@ const idOf = (name) => `field-${name.toLowerCase().replace(/\W+/g, '-')}`;
 export function wrongNumber(text, low, high, unit) {
   const value = Number(text.replace(',', '.'));
   if (text.trim() && value >= low && value <= high) return '';
-  return `A number from ${low} to ${high} ${unit} is needed.`;
+  return `Enter a number from ${low} to ${high} ${unit}.`;
 }
