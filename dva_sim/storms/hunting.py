@@ -52,11 +52,16 @@ def hunt(mutant: str, seeds: Iterable[int], profile: str) -> Hunt:
     """Play storms with a planted bug until a rule breaks.
 
     A rule that breaks before the bug has acted does not count.
+
+    Raises:
+        RuntimeError: the program does not run with the bug, which so is none.
     """
     acts, first, count = 0, "", 0
     for count, seed in enumerate(seeds, 1):
         with planted(mutant) as bug:
             outcome = play(draw(seed, profile), enough=lambda bug=bug: bug.acts > 0)  # type: ignore[misc]
+        if outcome.error and not bug.acts:
+            raise RuntimeError(f"{mutant}: {outcome.error}")
         acts, first = acts + bug.acts, first or bug.first
         if bug.acts and not outcome.is_clean:
             return Hunt(mutant, count, tuple(sorted(outcome.signature)), acts, first)

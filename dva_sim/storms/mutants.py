@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Final
 
@@ -21,47 +20,19 @@ from dva_sim.kernel.suggestions import unknown
 from dva_sim.protocol import messages as m
 from dva_sim.protocol.codec import decode
 from dva_sim.protocol.errors import ProtocolError
+from dva_sim.storms.blind_mutants import WRITTEN_BLIND
+from dva_sim.storms.planting import (
+    RIGHT,
+    Bug,
+    Make,
+    Mutant,
+    Original,
+    afterwards,
+    instead,
+    skipped,
+    with_arguments,
+)
 from dva_sim.worlds.bodies import TickTarget
-
-Original = Callable[..., Any]
-Make = Callable[[Original, "Bug"], Original]
-
-
-@dataclass
-class Bug:
-    """A planted bug while it is there.
-
-    Attributes:
-        name: Its name.
-        acts: How often it has done the wrong thing.
-        first: Description of the first time.
-    """
-
-    name: str
-    acts: int = 0
-    first: str = ""
-
-    def act(self, what: str) -> None:
-        """Note that the program has done the wrong thing."""
-        self.acts += 1
-        self.first = self.first or what
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """A bug that can be planted.
-
-    Attributes:
-        rule: The rule that it breaks first.
-        words: Description of the bug.
-        place: Module and function, such as `dva_sim.core.orders:Orders.found`.
-        make: Makes the wrong function from the right one.
-    """
-
-    rule: str
-    words: str
-    place: str
-    make: Make
 
 
 @contextmanager
@@ -100,79 +71,6 @@ def named(name: str) -> list[str]:
     if name not in MUTANTS:
         raise ConfigError(unknown("mutant", name, MUTANTS))
     return [name]
-
-
-RIGHT: Final = object()
-"""Stands for what the right function does."""
-
-# --- how they are made -----------------------------------------------------------------------
-
-
-def _instead(decide: Callable[..., Any]) -> Make:
-    """A function that returns something else where `decide` does not return `RIGHT`."""
-
-    def make(original: Original, bug: Bug) -> Original:
-        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
-            other = decide(self, *args, **named_args)
-            if other is RIGHT:
-                return original(self, *args, **named_args)
-            bug.act(f"{type(self).__name__} at {getattr(self, 'id_tag', '')}: {args}")
-            return other
-
-        return wrong
-
-    return make
-
-
-def _afterwards(change: Callable[..., Any | None]) -> Make:
-    """A function whose result is changed where `change` returns something."""
-
-    def make(original: Original, bug: Bug) -> Original:
-        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
-            result = original(self, *args, **named_args)
-            other = change(self, result, *args, **named_args)
-            if other is None:
-                return result
-            bug.act(f"{type(self).__name__}: {other}")
-            return other
-
-        return wrong
-
-    return make
-
-
-def _skipped(when: Callable[..., bool] = lambda *_, **__: True) -> Make:
-    """A function that does nothing where `when` holds."""
-
-    def make(original: Original, bug: Bug) -> Original:
-        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
-            if not when(self, *args, **named_args):
-                return original(self, *args, **named_args)
-            bug.act(f"{type(self).__name__} does nothing: {args}")
-            return None
-
-        return wrong
-
-    return make
-
-
-def _with(**changed: Any) -> Make:
-    """A pure function that is called with other arguments than it was given, by name."""
-
-    def make(original: Original, bug: Bug) -> Original:
-        code = getattr(original, "__code__")  # noqa: B009 - a name that types do not know
-        names = code.co_varnames[1 : code.co_argcount]
-
-        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
-            given = dict(zip(names, args, strict=False)) | named_args
-            right, other = original(self, **given), original(self, **(given | changed))
-            if other != right:
-                bug.act(f"{getattr(self, 'id_tag', '')}: {other} instead of {right}")
-            return other
-
-        return wrong
-
-    return make
 
 
 _ROBOT = "dva_sim.agents.robot.controller:RobotController"
@@ -322,9 +220,9 @@ def _resumes(original: Original, bug: Bug) -> Original:
 
 
 def _keeps_grant_over_restart(original: Original, bug: Bug) -> Original:
-    def wrong(self: Any, clock_offset: float) -> Any:
+    def wrong(self: Any, clock_offset: float, now: float) -> Any:
         kept = self.grant, self.last_order_id, self.last_set_id, self._numbered
-        original(self, clock_offset)
+        original(self, clock_offset, now)
         if kept[0] is not None:
             bug.act(f"{self.id_tag} restarts and is still held by {kept[0].holder}")
         self.grant, self.last_order_id, self.last_set_id, self._numbered = kept
@@ -400,31 +298,40 @@ def _resets_timer(original: Original, bug: Bug) -> Original:
 
 
 def _says_before_keeping(original: Original, bug: Bug) -> Original:
-    """The DVA writes its promises down five seconds late, if it is still alive."""
+    """The DVA writes its promises down within five seconds, if it is still alive."""
 
     def wrong(self: Any) -> Any:
-        clock = self.device.clock
-        if self._memory is None or getattr(self, "_late", False):
+        if self._memory is None:
             return original(self)
-        memory, self._memory = self._memory, None
+        now, memory, unkept = (
+            self.device.clock.now,
+            self._memory,
+            vars(self).setdefault("unkept", {}),
+        )
+        if now - vars(self).setdefault("kept_at", now) >= 5.0:
+            for event in unkept.values():
+                self.desk.book.touch(event)
+            unkept.clear()
+            self.kept_at = now
+            return original(self)
         changed = self.desk.book.changes()
         for event in changed:
             self.desk.book.touch(event)
+            unkept[event.number] = event
+        self._memory = None
         original(self)
-        for event in changed:
-            self.desk.book.touch(event)
         self._memory = memory
-        self._late = True
-
-        def later() -> None:
-            if not self.is_gone:
-                original(self)
-            elif changed:
-                bug.act(f"the DVA was killed before it had kept event {changed[0].number}")
-            self._late = False
-
-        clock.call_after(5.0, later)
+        if unkept and not vars(self).get("looks_out"):
+            look(self, unkept)
         return None
+
+    def look(self: Any, unkept: dict[int, Any]) -> None:
+        """Look whether it has been killed with something unkept."""
+        self.looks_out = bool(unkept) and not self.is_gone
+        if self.looks_out:
+            self.device.clock.call_after(0.2, look, self, unkept)
+        elif unkept:
+            bug.act(f"the DVA was killed before it had kept event {next(iter(unkept))}")
 
     return wrong
 
@@ -635,7 +542,7 @@ def _silent_when_busy(original: Original, bug: Bug) -> Original:
 
 MUTANTS: Final[dict[str, Mutant]] = {
     "watchdog-too-long": Mutant(
-        "S1", "a command is in force two seconds too long", f"{_ROBOT}._set", _afterwards(_longer)
+        "S1", "a command is in force two seconds too long", f"{_ROBOT}._set", afterwards(_longer)
     ),
     "watchdog-fed-by-requests": Mutant(
         "S1",
@@ -661,19 +568,19 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S1",
         "StopTeleOp is answered, and changes nothing",
         f"{_ROBOT}._stop",
-        _instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.TELEOPERATION else RIGHT),
+        instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.TELEOPERATION else RIGHT),
     ),
     "cancel-ignored": Mutant(
         "S1",
         "CancelMission is answered, and changes nothing",
         f"{_ROBOT}._cancel",
-        _instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.MISSION else RIGHT),
+        instead(lambda self, *_: Decision(m.OK) if self.mode is Mode.MISSION else RIGHT),
     ),
     "revocation-ignored": Mutant(
         "S2",
         "a revocation is answered, and changes nothing",
         f"{_ROBOT}._revoked",
-        _instead(
+        instead(
             lambda self, message, body: (
                 Decision(m.OK) if self.grant and self.grant.session == body.session else RIGHT
             )
@@ -683,12 +590,12 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S2",
         "a silent driver keeps the robot",
         f"{_ROBOT}.expire",
-        _instead(
+        instead(
             lambda self, now: False if _is_driven(self) and now - self.last_valid > 30.0 else RIGHT
         ),
     ),
     "changes-hands-moving": Mutant(
-        "S2", "a robot that moves is handed over", f"{_ROBOT}._begin", _with(moving=False)
+        "S2", "a robot that moves is handed over", f"{_ROBOT}._begin", with_arguments(moving=False)
     ),
     "driven-on-by-the-former": Mutant(
         "S2", "the former driver drives on", f"{_ROBOT}._is_held", _keeps_driver
@@ -697,7 +604,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S2",
         "a robot that somebody holds is taken by hand",
         f"{_ROBOT}.take_by_hand",
-        _instead(
+        instead(
             lambda self, who, now, moving: (
                 _taken(self, who, now) if self.grant is not None and not moving else RIGHT
             )
@@ -713,7 +620,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S2",
         "who is silent keeps its permissions",
         "dva_sim.core.sessions:Sessions.take_back_all",
-        _skipped(
+        skipped(
             lambda self, holder: any(
                 grant.holder == holder for grant in self.permissions.grants.values()
             )
@@ -723,7 +630,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S3",
         "an emergency is answered, and changes nothing",
         f"{_ROBOT}._emergency",
-        _instead(
+        instead(
             lambda self, now: Decision(m.OK, "stopped") if self.mode is not Mode.IDLE else RIGHT
         ),
     ),
@@ -740,7 +647,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S3",
         "an order from before an emergency is obeyed",
         f"{_ROBOT}._begin",
-        _with(arrived=float("inf")),
+        with_arguments(arrived=float("inf")),
     ),
     "speed-not-clamped": Mutant(
         "S4",
@@ -770,7 +677,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S5",
         "anybody may read sensors",
         f"{_ROBOT}._subscription",
-        _afterwards(lambda self, decision, *_: None if decision.code == m.OK else Decision(m.OK)),
+        afterwards(lambda self, decision, *_: None if decision.code == m.OK else Decision(m.OK)),
     ),
     "grant-kept-over-restart": Mutant(
         "S1",
@@ -794,7 +701,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S6",
         "who has an order has it for ever",
         "dva_sim.core.orders:Orders.take_back",
-        _instead(
+        instead(
             lambda self, now: (
                 []
                 if any(self._order_ends(*pair) <= now for pair in self.engaged.pairs())
@@ -806,7 +713,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S6",
         "no event is escalated",
         "dva_sim.core.orders:Orders.escalate",
-        _instead(lambda self, event, now: []),
+        instead(lambda self, event, now: []),
     ),
     "anybody-confirms": Mutant(
         "S6",
@@ -860,7 +767,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S8",
         "a question that was not answered is never asked again",
         "dva_sim.agents.robot.inquiry:Inquiry.unanswered",
-        _skipped(lambda self: self.asked is not None),
+        skipped(lambda self: self.asked is not None),
     ),
     "replies-without-bound": Mutant(
         "S10",
@@ -890,7 +797,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S11",
         "a message for which there is no room is dropped without a word",
         "dva_sim.agents.robot.robot:RobotAgent._turn_away",
-        _skipped(),
+        skipped(),
     ),
     "counts-from-reading": Mutant(
         "S1", "a command that waited is in force too long", f"{_ROBOT}._set", _counts_from_now
@@ -899,7 +806,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "S2",
         "no robot hears that a session is over",
         "dva_sim.core.sessions:Sessions.tell_robot",
-        _skipped(),
+        skipped(),
     ),
     "mission-survives-emergency": Mutant(
         "S3", "a mission goes on after an emergency", f"{_ROBOT}._emergency", _mission_goes_on
@@ -937,7 +844,7 @@ MUTANTS: Final[dict[str, Mutant]] = {
         "dva_sim.agents.device:AgentDevice.conclude",
         _silent_when_busy,
     ),
-}
+} | WRITTEN_BLIND
 
 
 def _taken(controller: Any, who: str, now: float) -> Decision:

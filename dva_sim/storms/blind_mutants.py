@@ -1,0 +1,224 @@
+"""Planted bugs that were written blind: before anybody knew whether a checker sees them."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from dva_sim.agents.operator.operator import BY_DVA
+from dva_sim.agents.robot.controller import Decision, Mode
+from dva_sim.core.events import State
+from dva_sim.core.handovers import Step
+from dva_sim.protocol import messages as m
+from dva_sim.storms.planting import RIGHT, Bug, Mutant, Original, afterwards, instead, skipped
+from dva_sim.worlds.bodies import TickTarget
+
+_CONTROLLER = "dva_sim.agents.robot.controller:RobotController"
+LEAKED = 200  # things that are kept for ever until that shows in the number of acts
+
+
+def _obeys_future_ticks(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, message: m.Message, body: m.SetTeleOp, arrived: float, now: float) -> Any:
+        tick = self.tick(now)
+        if body.seen_tick is None or body.seen_tick <= tick:
+            return original(self, message, body, arrived, now)
+        decision = original(self, message, body._replace(seen_tick=tick), arrived, now)
+        if decision.code == m.OK:
+            bug.act(f"{self.id_tag} obeys behind a picture of {body.seen_tick - tick} ms ahead")
+        return decision
+
+    return wrong
+
+
+def _keeps_mission(original: Original, bug: Bug) -> Original:
+    """Who has lost the robot has its mission carried out to the end."""
+
+    def wrong(self: Any, grant: m.PermissionGrant | None) -> Any:
+        if self.mode is not Mode.MISSION:
+            return original(self, grant)
+        bug.act(f"{self.id_tag} goes on with the mission of {self.owner}")
+        self.grant = grant
+        return Decision(m.OK)
+
+    return wrong
+
+
+def _ready_at_once(original: Original, bug: Bug) -> Original:
+    """A robot is handed over before it stands and has heard that it is."""
+
+    def wrong(self: Any, robot: str, status: m.RobotStatus, now: float) -> None:
+        original(self, robot, status, now)
+        known = self.under_way.get(robot)
+        if known is not None and known.step is Step.STOPPING:
+            bug.act(f"{robot} is handed over at {status.speed:.2f} m/s in mode {status.mode}")
+            known.step, known.until = Step.READY, now + 30.0
+
+    return wrong
+
+
+def _refuses_misdirected(original: Original, bug: Bug) -> Original:
+    """An emergency that names another robot is refused."""
+
+    def wrong(self: Any, message: m.Message) -> Any:
+        if isinstance(message.body, m.Emergency) and message.destination != self.id_tag:
+            bug.act(f"{self.label} refuses an emergency to {message.destination}")
+            return m.Reply(message.message_id, m.UNKNOWN_DEVICE, f"this is {self.id_tag}")
+        return original(self, message)
+
+    return wrong
+
+
+def _as_fast_as_wanted(original: Original, bug: Bug) -> Original:
+    def wrong(self: Any, speed: float, turn_rate: float, until: float) -> Any:
+        original(self, speed, turn_rate, until)
+        if speed > 1.05 * self.spec.max_speed:
+            bug.act(f"motors are asked for {speed:.2f} m/s, as somebody wants it")
+            target = TickTarget(speed, turn_rate, self._world.tick_at(until))
+            self._asked.put(self._world.next_tick(), target)
+
+    return wrong
+
+
+def _miscounts_given_up(original: Original, bug: Bug) -> Original:
+    """What is escalated counts as expired."""
+
+    def wrong(self: Any, event: Any, state: State, now: float) -> Any:
+        original(self, event, state, now)
+        if state is State.ESCALATED:
+            bug.act(f"event {event.number} is escalated, and counted as expired")
+            self.counts[State.ESCALATED] -= 1
+            self.counts[State.EXPIRED] += 1
+
+    return wrong
+
+
+def _confirmed_on_arrival(original: Original, bug: Bug) -> Original:
+    """The time of a confirmation is that of the arrival: in order, and not true."""
+
+    def wrong(self: Any, event: Any, device: str, finding: str, now: float) -> Any:
+        sends = original(self, event, device, finding, now)
+        times = event.times
+        early = times.get("arrived", times.get("detected", now))
+        if times.get("confirmed") == now and early < now - 1.0:
+            bug.act(f"event {event.number} was confirmed {now - early:.0f} s later than noted")
+            times["confirmed"] = early
+        return sends
+
+    return wrong
+
+
+def _remembers_wishes(original: Original, bug: Bug) -> Original:
+    """The DVA keeps each wish for a robot for ever."""
+
+    def wrong(self: Any, *args: Any) -> Any:
+        wishes = vars(self).setdefault("wishes", [])
+        wishes.append(args)
+        if len(wishes) > LEAKED:
+            bug.act(f"the DVA keeps {len(wishes)} wishes")
+        return original(self, *args)
+
+    return wrong
+
+
+def _quiet_to_the_unknown(original: Original, bug: Bug) -> Original:
+    """Who is not registered gets no answer, and nobody counts that."""
+
+    def wrong(self: Any, request: Any, message: m.Message, handler: Any, **named: Any) -> Any:
+        def quiet(asked: m.Message) -> Any:
+            reply = handler(asked)
+            if reply is not None and reply.code == m.NOT_REGISTERED:
+                bug.act(f"{self.label} says nothing to {message.source}")
+                return None
+            return reply
+
+        return original(self, request, message, quiet, **named)
+
+    return wrong
+
+
+WRITTEN_BLIND: Final[dict[str, Mutant]] = {
+    "future-tick-obeyed": Mutant(
+        "S1",
+        "a command behind a picture that was not taken yet is obeyed",
+        f"{_CONTROLLER}._set",
+        _obeys_future_ticks,
+    ),
+    "mission-outlives-session": Mutant(
+        "S2",
+        "a mission goes on when its session is over",
+        f"{_CONTROLLER}._is_held",
+        _keeps_mission,
+    ),
+    "handed-over-moving": Mutant(
+        "S2",
+        "a robot is handed over before it stands",
+        "dva_sim.core.handovers:Handovers.seen",
+        _ready_at_once,
+    ),
+    "button-ignored": Mutant(
+        "S3",
+        "the button at a robot stops nothing",
+        f"{_CONTROLLER}.press_emergency",
+        instead(lambda self, now: Decision(m.OK) if self.mode is not Mode.IDLE else RIGHT),
+    ),
+    "emergency-by-name-only": Mutant(
+        "S3",
+        "an emergency that names another robot is refused",
+        "dva_sim.agents.device:AgentDevice._misdirection",
+        _refuses_misdirected,
+    ),
+    "as-fast-as-wanted": Mutant(
+        "S4",
+        "motors are asked for what somebody wants",
+        "dva_sim.worlds.bodies:RobotBody.drive",
+        _as_fast_as_wanted,
+    ),
+    "reads-on": Mutant(
+        "S5",
+        "who may read a sensor no longer gets its values",
+        "dva_sim.agents.robot.sensors:SensorSubscriptions.end",
+        skipped(lambda self, subscriber: any(k[1] == subscriber for k in self._subscribed)),
+    ),
+    "promises-forgotten": Mutant(
+        "S6",
+        "who says OK to an order need never set out",
+        "dva_sim.core.orders:Orders._overdue",
+        afterwards(lambda self, late, now: [] if late else None),
+    ),
+    "given-up-miscounted": Mutant(
+        "S6",
+        "an escalated event counts as expired",
+        "dva_sim.core.events:EventBook.move",
+        _miscounts_given_up,
+    ),
+    "confirmed-on-arrival": Mutant(
+        "S7",
+        "the time of a confirmation is that of the arrival",
+        "dva_sim.core.orders:Orders.found",
+        _confirmed_on_arrival,
+    ),
+    "reserved-for-ever": Mutant(
+        "S8",
+        "a robot that is kept for somebody is kept for ever",
+        "dva_sim.core.handovers:Handovers.lapse",
+        skipped(lambda self, now: any(known.until <= now for known in self.under_way.values())),
+    ),
+    "operator-stuck": Mutant(
+        "S8",
+        "an operator whose order was taken back takes up no other",
+        "dva_sim.agents.operator.operator:Operator._be_free",
+        skipped(lambda self, drive: drive.log.outcome in BY_DVA),
+    ),
+    "wishes-kept": Mutant(
+        "S10",
+        "the DVA keeps each wish for a robot",
+        "dva_sim.core.sessions:Sessions.grant",
+        _remembers_wishes,
+    ),
+    "unknown-unanswered": Mutant(
+        "S11",
+        "who is not registered gets no answer",
+        "dva_sim.agents.device:AgentDevice.conclude",
+        _quiet_to_the_unknown,
+    ),
+}
+"""Those of the second time, hunted four storms each before any checker was changed."""

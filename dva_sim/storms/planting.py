@@ -1,0 +1,120 @@
+"""What planted bugs are made of: a function to replace, and a word when the wrong one acts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+Original = Callable[..., Any]
+Make = Callable[[Original, "Bug"], Original]
+
+
+@dataclass
+class Bug:
+    """A planted bug while it is there.
+
+    Attributes:
+        name: Its name.
+        acts: How often it has done the wrong thing.
+        first: Description of the first time.
+    """
+
+    name: str
+    acts: int = 0
+    first: str = ""
+
+    def act(self, what: str) -> None:
+        """Note that the program has done the wrong thing."""
+        self.acts += 1
+        self.first = self.first or what
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A bug that can be planted.
+
+    Attributes:
+        rule: The rule that it breaks first.
+        words: Description of the bug.
+        place: Module and function, such as `dva_sim.core.orders:Orders.found`.
+        make: Makes the wrong function from the right one.
+    """
+
+    rule: str
+    words: str
+    place: str
+    make: Make
+
+
+RIGHT: Final = object()
+"""Stands for what the right function does."""
+
+# --- how they are made -----------------------------------------------------------------------
+
+
+def instead(decide: Callable[..., Any]) -> Make:
+    """A function that returns something else where `decide` does not return `RIGHT`."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            other = decide(self, *args, **named_args)
+            if other is RIGHT:
+                return original(self, *args, **named_args)
+            bug.act(f"{type(self).__name__} at {getattr(self, 'id_tag', '')}: {args}")
+            return other
+
+        return wrong
+
+    return make
+
+
+def afterwards(change: Callable[..., Any | None]) -> Make:
+    """A function whose result is changed where `change` returns something."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            result = original(self, *args, **named_args)
+            other = change(self, result, *args, **named_args)
+            if other is None:
+                return result
+            bug.act(f"{type(self).__name__}: {other}")
+            return other
+
+        return wrong
+
+    return make
+
+
+def skipped(when: Callable[..., bool] = lambda *_, **__: True) -> Make:
+    """A function that does nothing where `when` holds."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            if not when(self, *args, **named_args):
+                return original(self, *args, **named_args)
+            bug.act(f"{type(self).__name__} does nothing: {args}")
+            return None
+
+        return wrong
+
+    return make
+
+
+def with_arguments(**changed: Any) -> Make:
+    """A pure function that is called with other arguments than it was given, by name."""
+
+    def make(original: Original, bug: Bug) -> Original:
+        code = getattr(original, "__code__")  # noqa: B009 - a name that types do not know
+        names = code.co_varnames[1 : code.co_argcount]
+
+        def wrong(self: Any, *args: Any, **named_args: Any) -> Any:
+            given = dict(zip(names, args, strict=False)) | named_args
+            right, other = original(self, **given), original(self, **(given | changed))
+            if other != right:
+                bug.act(f"{getattr(self, 'id_tag', '')}: {other} instead of {right}")
+            return other
+
+        return wrong
+
+    return make
