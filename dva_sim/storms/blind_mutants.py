@@ -205,7 +205,7 @@ WRITTEN_BLIND: Final[dict[str, Mutant]] = {
     "operator-stuck": Mutant(
         "S8",
         "an operator whose order was taken back takes up no other",
-        "dva_sim.agents.operator.operator:Operator._be_free",
+        "dva_sim.agents.operator.operator:OperatorAgent._be_free",
         skipped(lambda self, drive: drive.log.outcome in BY_DVA),
     ),
     "wishes-kept": Mutant(
