@@ -33,6 +33,7 @@ EVENT = "event|"
 AUDIT = "audit|"
 HEARTBEAT_PERIOD = 2.0  # design: [s]
 REGISTER_AGAIN = 2.0  # design: pause after a registration that was not answered, or refused [s]
+REPORT_AGAIN = 5.0  # design: pause after a finding that the DVA could not keep [s]
 LONGEST_BID = 1e6  # design: no offer to go somewhere is longer [s]
 RENEW_PERIOD = 10.0  # design: from one registration to the next [s]
 
@@ -407,6 +408,28 @@ class AgentDevice:
             self.recorder.counters["refused: of another source"] += 1
             return None
         return message
+
+    def report_finding(
+        self,
+        body: m.EventReport,
+        on_reply: Callable[[m.Reply], object] = do_nothing,
+        on_failure: Callable[[], object] = do_nothing,
+    ) -> None:
+        """Report a finding to the DVA; again while it is busy, since it has not kept that yet.
+
+        Args:
+            body: The finding.
+            on_reply: Takes the first reply.
+            on_failure: Called if there is none.
+        """
+        life = self._life
+
+        def answered(reply: m.Reply) -> None:
+            on_reply(reply)
+            if reply.code == m.BUSY and life == self._life:
+                self.clock.call_after(REPORT_AGAIN, self.report_finding, body)
+
+        self.ask(self.dva, body, answered, on_failure)
 
     def progress(self, event_id: int, state: str) -> None:
         """Tell the DVA how an order stands."""

@@ -50,6 +50,7 @@ CREATE TABLE IF NOT EXISTS untold (session TEXT PRIMARY KEY, data TEXT NOT NULL)
 INSERT OR REPLACE INTO about VALUES ('format', {FORMAT});
 COMMIT;
 """
+_ALONE = "BEGIN IMMEDIATE; COMMIT;"  # fails while somebody else writes to the file
 _PLAIN: tuple[str, ...] = (
     *("number", "kind", "severity", "needs_containment", "reports", "sources"),
     *("responder", "operator", "actor", "taken_up", "act_taken_up", "attempts", "preemptions"),
@@ -93,14 +94,18 @@ class Store:
             raise
 
     def _open(self) -> None:
-        """See that it is a memory; a file that is something else stays as it is."""
+        """See that it is a memory; a file that is something else stays as it is.
+
+        Nothing is written to one of this format: the disk may be full when a DVA restarts.
+        """
         try:
             (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            is_ours = not tables or self._about("format") in (OLDER, FORMAT)
+            found = self._about("format") if tables else None
+            is_ours = found in (None, OLDER, FORMAT)
         except (sqlite3.OperationalError, ValueError) as error:
             if "no such" not in str(error):
                 raise self._useless(error) from None
-            is_ours = False
+            found, is_ours = None, False
         except sqlite3.Error as error:
             raise self._useless(error) from None
         if not is_ours:
@@ -108,7 +113,7 @@ class Store:
         try:
             self._file.execute("PRAGMA journal_mode=WAL")
             self._file.execute("PRAGMA synchronous=NORMAL")
-            self._file.executescript(_TABLES)
+            self._file.executescript(_ALONE if found == FORMAT else _TABLES)
             self._file.execute(f"PRAGMA busy_timeout={WRITE_WITHIN_MS}")
         except sqlite3.Error as error:
             raise self._useless(error) from None
@@ -234,9 +239,12 @@ class Store:
 
     def _recall(self, dva: Dva, now: float) -> bool:
         self.past = self._time() - now
-        self._file.execute("DELETE FROM devices WHERE json_extract(data, '$.silent')")
-        for (data,) in self._file.execute("SELECT data FROM devices ORDER BY rowid"):
-            dva.registry.add(_entry(json.loads(data), now))
+        silent = set[str]()
+        for id_tag, data, is_silent in self._file.execute(_DEVICES):
+            if is_silent:
+                silent.add(id_tag)
+            else:
+                dva.registry.add(_entry(json.loads(data), now))
         found = bool(dva.registry.entries)
         for state, count in self._counts().items():
             dva.book.counts[state] += count
@@ -253,6 +261,7 @@ class Store:
             self._asks = dva.dispatcher.questions.asks = bool(self._about("ask_first"))
         dva.registry.changes()
         dva.book.changes()
+        self._devices = dict.fromkeys(silent)  # is gone from the file with the next write
         return found
 
     def _time(self) -> float:
@@ -296,6 +305,7 @@ class Store:
 _PUT_DEVICE = """
 INSERT INTO devices VALUES (?, ?) ON CONFLICT (id) DO UPDATE SET data = excluded.data
 """
+_DEVICES = "SELECT id, data, json_extract(data, '$.silent') FROM devices ORDER BY rowid"
 _PUT_ABOUT = "INSERT OR REPLACE INTO about VALUES (?, ?)"
 _RECENT = """
 SELECT data FROM (

@@ -11,6 +11,7 @@ import pytest
 from helpers.wording import unnamed
 from storms.test_storms import SMALL, small
 
+from dva_sim.core.store import Store
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.stage import DVA
 from dva_sim.storms.plan import Fault, StormPlan
@@ -160,6 +161,36 @@ def test_a_permission_that_replaces_one_and_cannot_be_kept_leaves_that_in_force(
         assert asks.ask(DVA, m.PermissionRequest(robot, "both")).code == m.BUSY
         assert asks.ask(DVA, m.PermissionRequest(robot, "teleoperation")).content == held
         assert sessions.permissions.grants[robot].session == held.session
+
+
+@pytest.mark.invariant("S6", "S8")
+def test_a_dva_that_was_killed_restarts_on_a_full_disk(storm, disk, monkeypatch):
+    asks, killed = Answers(storm), storm.dva.memory
+    assert asks.ask(DVA, FIRE).code == m.OK
+    monkeypatch.setattr(Store, "close", lambda self: None)  # nobody closes what a killed one had
+    with disk.full(storm):
+        storm.dva.kill(1.0)
+        storm.dva.survive(storm.now + 5.0)
+        assert storm.dva.memory is not killed
+        assert "fire" in {event.kind for event in storm.run.dva.desk.book.open.values()}
+        assert asks.ask(DVA, FIRE).code == m.BUSY
+    assert asks.ask(DVA, FIRE).code == m.OK
+    assert storm.recorder.broken == {}
+
+
+@pytest.mark.invariant("S6")
+def test_a_finding_that_cannot_be_kept_is_reported_until_it_can(storm, disk):
+    device, replies = Answers(storm).hand.device, list[m.Reply]()
+    storm.dva.survive(storm.now + 3.0)
+    with disk.full(storm):
+        device.report_finding(FIRE, replies.append)
+        storm.dva.survive(storm.now + 12.0)
+        book = storm.run.dva.desk.book
+        (fire,) = (event for event in book.open.values() if event.kind == "fire")
+        assert [reply.code for reply in replies] == [m.BUSY]
+        assert fire.reports == 3
+    storm.dva.survive(storm.now + 20.0)
+    assert fire.reports == 4
 
 
 @pytest.mark.system

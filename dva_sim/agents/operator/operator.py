@@ -235,7 +235,7 @@ class OperatorAgent:
         found, by_dva = outcome in ("confirmed", "refuted"), outcome in BY_DVA
         if found:
             body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.95, outcome)
-            device.ask(device.dva, body)
+            device.report_finding(body)
 
         def give_back(_: object = None) -> None:
             if by_dva:

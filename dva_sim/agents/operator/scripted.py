@@ -140,7 +140,9 @@ def drill(operator: ScriptedOperator, commands: int = 200) -> Script:
     except GeneratorExit:
         operator.device.ask(robot, m.StopTeleOp(), session=session)
         raise
-    yield Ask(dva, m.PermissionRevocation(robot, operator.device.id_tag, session))
+    given_back = Ask(dva, m.PermissionRevocation(robot, operator.device.id_tag, session))
+    while (reply := (yield given_back)) is not None and reply.code == m.BUSY:
+        yield Pause(GIVE_BACK_AGAIN)
 
 
 def _drive(
@@ -173,6 +175,7 @@ def _answer(reply: m.Reply | None) -> str:
 
 
 COMMANDS_AGAIN = 10  # design: of the second drive
+GIVE_BACK_AGAIN = 2.0  # design: while the DVA cannot keep that [s]
 STANDSTILL = 2.0  # design: after it a robot certainly stands [s]
 TRIES = 20  # design: to start
 AGAIN = 0.5  # design: before asking once more for what is not there yet [s]

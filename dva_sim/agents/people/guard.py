@@ -221,7 +221,7 @@ class GuardAgent(OnFoot):
 
     def _report(self, order: m.Order, finding: str) -> None:
         body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.99, finding)
-        self.device.ask(self.device.dva, body)
+        self.device.report_finding(body)
         self.device.tell(f"{finding} event {order.event_id}", "event")
         self._finish("done", at_event=True)
 

@@ -188,7 +188,7 @@ class PersonGuard(OnFoot):
         if finding == CONTAINED:
             self._contain(order.kind, *place)
         body = m.EventReport(order.event_id, order.kind, order.position, 0.5, 0.99, finding)
-        self._ask(body, f"event {order.event_id} is {finding}", said)
+        self._tell(body, f"event {order.event_id} is {finding}", said)
         self.device.tell(f"{finding} event {order.event_id}", "event")
         if finding == CONFIRMED and order.task == "contain":
             return  # it is still there to be contained
@@ -206,6 +206,18 @@ class PersonGuard(OnFoot):
         if stage == "arrived" and self._stage == "departed":
             self._stage = "arrived"
             self.device.progress(order.event_id, "arrived")
+
+    def _tell(self, body: m.EventReport, done: str, said: Said) -> None:
+        """Report a finding; one that the DVA cannot keep yet is reported again by itself."""
+
+        def answered(reply: m.Reply) -> None:
+            later = "; the DVA cannot keep that yet, and is told again"
+            is_heard = reply.code in (m.OK, m.BUSY)
+            text = done + (later if reply.code == m.BUSY else "")
+            said(is_heard, text if is_heard else reply.text or m.CODE_NAMES[reply.code])
+
+        unreachable = lambda: said(False, "the DVA does not answer")  # noqa: E731
+        self.device.report_finding(body, answered, unreachable)
 
     def _ask(self, body: m.Body, done: str, said: Said) -> None:
         def answered(reply: m.Reply) -> None:
