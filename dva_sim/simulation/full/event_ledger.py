@@ -8,8 +8,11 @@ sessions are over: of each one the robot has to be told.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 from dva_sim.core.assignments import Rules
@@ -17,22 +20,44 @@ from dva_sim.core.events import ACT_STEPS, SAME_SPOT, STEPS, Event, EventBook, S
 from dva_sim.protocol import messages as m
 from dva_sim.simulation.full.observations import Page, Right
 
+STEP_SLACK = 0.5  # of the time of a step of an event [s]
 PENDING_SLACK = 2.0  # the desk looks at deadlines once a second, the audit twice [s]
 SILENT_AFTER = 10.0  # a device of which nothing was heard for so long holds nothing any longer [s]
 LOST_BY_RESTART = 1.0  # a DVA that was killed goes on from the time that it wrote last [s]
 TOLD_WITHIN = (
     90.0  # a robot that is heard is told of the end of a session, whatever waits before [s]
 )
+HEARD_LATE = 25.0  # of a place that a device has told, over a bad link [s]
+STIRRED = 0.5  # who has moved less has not moved [m]
 MOVED = 25.0  # an event that a robot has felt is moved to where it is seen, but no farther [m]
 FELT_LATELY = 10.0  # a value of a robot's sensor may have confirmed an event [s]
 MOST_KEPT = 1000  # reports and orders that wait for an answer, and events
 UNSETTLED: Final = State.PENDING, State.ASSIGNED, State.ON_SCENE
 IN_HAND: Final = State.ASSIGNED, State.ON_SCENE
 FOUND: Final = frozenset({"confirmed", "contained", "refuted"})
-_ORDERED = b"<Order>", b"<TaskAward>", b"<OrderProgress>", b"<PermissionRevocation>"
+_ORDERED: Final = (
+    *(b"<Order>", b"<TaskAward>", b"<OrderProgress>"),
+    *(b"<PermissionRevocation>", b"<Permission>"),
+)
 """What of the DVA's messages is looked at, beside answers that are waited for."""
 OF_NO_EVENT: Final = m.Heartbeat, m.RobotStatus  # the most of what reaches the DVA
 Broken = tuple[str, str]
+
+
+class Debt(NamedTuple):
+    """What who has taken an order up owes: to set out, or to move.
+
+    Attributes:
+        who: Who has the order; None: nobody owes anything.
+        step: Whether it has set out, and so has to move.
+        since: From when on [s].
+        place: Where it was then.
+    """
+
+    who: str | None
+    step: bool
+    since: float
+    place: m.Position | None = None
 
 
 class Seen(NamedTuple):
@@ -43,12 +68,16 @@ class Seen(NamedTuple):
         hands: Who has it in hand, and for what; empty: nobody.
         since: From when on those do.
         waits: Since when it has waited for somebody who takes it up.
+        times: Time of each step, as the book has it.
+        debt: What who has it in hand owes.
     """
 
     found: frozenset[str]
     hands: tuple[str | None, ...]
     since: float
     waits: float
+    times: Mapping[str, float] = MappingProxyType({})
+    debt: Debt = Debt(None, False, 0.0)
 
 
 @dataclass
@@ -58,6 +87,7 @@ class Word:
     Attributes:
         ordered: Who was sent there, and what goes there for them: a robot, or they themselves.
         taken: Who has taken that up.
+        ended: Who has done with it, by its own word or the DVA's.
         loose: Who has it no longer, by its own word or the DVA's, or has started anew.
         busy: Whether somebody has taken it up since it was last looked at.
         anew: Whether somebody loose was sent there since then.
@@ -66,6 +96,7 @@ class Word:
 
     ordered: dict[str, str] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
+    ended: set[str] = field(default_factory=set)
     loose: set[str] = field(default_factory=set)
     busy: bool = False
     anew: bool = False
@@ -141,6 +172,7 @@ class EventLedger:
                     self._takes_up(number, source)
                 if state not in ("departed", "arrived"):
                     self._word(number).loose.add(source)
+                    self._word(number).ended.add(source)
             case m.Registration():
                 for word in self._words.values():
                     word.loose.add(source)
@@ -169,12 +201,21 @@ class EventLedger:
                 self._sends(message, number, message.destination)
             case m.OrderProgress(event_id=number):
                 self._word(number).loose.add(message.destination)
+                self._word(number).ended.add(message.destination)
             case m.PermissionRevocation(device=robot, session=session):
                 if message.destination == robot:
                     self._told[session] = None
                     _keep_newest(self._told)
             case m.Reply() as reply:
                 self._answers(message.destination, reply)
+                if isinstance(reply.content, m.Permission):
+                    self._tells_holder(message.destination, reply.content)
+
+    def _tells_holder(self, robot: str, told: m.Permission) -> None:
+        """A robot that is told who holds it now knows by that whose session is over."""
+        for right in [right for right in self._untold if right.robot == robot]:
+            if right.session != told.session and told.level != "sensors":
+                del self._untold[right]
 
     def _word(self, number: int) -> Word:
         word = self._words.setdefault(number, Word())
@@ -183,8 +224,12 @@ class EventLedger:
 
     def _sends(self, message: m.Message, number: int, goes: str) -> None:
         word, to = self._word(number), message.destination
+        if goes == to:  # a person has one order, the newest
+            for other in self._words.values():
+                other.ended.add(to)
         word.ordered[to], word.anew = goes, word.anew or to in word.loose
         word.taken.discard(to)
+        word.ended.discard(to)
         word.loose.discard(to)
         self._orders[to, message.message_id] = number
         _keep_newest(self._orders)
@@ -225,7 +270,7 @@ class EventLedger:
         """What is wrong with the book now."""
         if now < self._now:
             yield "S7", f"time runs back, from {self._now:g} to {now:g} s"
-        passed, self._now = now - self._now, now
+        passed, last, self._now = now - self._now, self._now, now
         yield from self._unheard(page.rights, now, page.works)
         if not page.works:  # what it has not kept, nobody knows when it is back
             self._let_no_time_pass(passed)
@@ -234,12 +279,14 @@ class EventLedger:
         if self._was_down:
             self._was_down = False
             self._let_no_time_pass(LOST_BY_RESTART + self._not_kept)
-            self._not_kept = 0.0
+            self._not_kept, last = 0.0, -math.inf
+            self._seen = {n: e._replace(debt=Debt(None, False, now)) for n, e in self._seen.items()}
             self._forget_unpromised(page.book)
         book = self._book = page.book
         if self._is_new:
             self._is_new = False
             self._adopt(now)
+            last = -math.inf
         for report in self._taken:
             booked = [*self._fitting(report)]
             self._promised |= dict.fromkeys(booked)
@@ -255,6 +302,12 @@ class EventLedger:
             count = states.count(state)
             if count != book.counts[state]:
                 yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
+        if len(book.open) + len(book.closed) == book.total:  # none is forgotten yet
+            closed = Counter(event.state for event in book.closed.values())
+            for state in book.counts.keys() - UNSETTLED:
+                count = closed[state] + states.count(state)
+                if count != book.counts[state]:
+                    yield "S6", f"{count} events are {state}, but {book.counts[state]} counted"
         for number in book.open.keys() & book.closed.keys():
             yield "S6", f"event {number} is open and closed"
         for number in self._open.keys() - book.open.keys() - book.closed.keys():
@@ -268,7 +321,7 @@ class EventLedger:
         every = (*book.open.values(), *book.closed.values())
         seen, self._seen = self._seen, {}
         for event in every:
-            yield from self._of_event(event, seen.get(event.number), now)
+            yield from self._of_event(event, seen.get(event.number), now, last)
 
     def _forget_unpromised(self, book: EventBook) -> None:
         """Forget events of which nobody was told that they are known, if a restart has lost them.
@@ -329,7 +382,8 @@ class EventLedger:
         """Yield sessions that are over in the book, and whose end the robot is not told of.
 
         Time in which the robot is not heard does not count, nor does that of a silenced DVA. Who
-        is given the same robot again, in another session, is told so by that.
+        is given the same robot again, in another session, is told so by that; so is a robot that is
+        told who holds it now.
         """
         held = {(right.robot, right.holder) for right in rights}
         for right in before:
@@ -346,14 +400,22 @@ class EventLedger:
                 robot, holder = self._name(right.robot), self._name(right.holder)
                 yield "S2", f"has not told {robot} that it is {holder}'s no longer"
 
-    def _of_event(self, event: Event, old: Seen | None, now: float) -> Iterator[Broken]:
+    def _of_event(
+        self, event: Event, old: Seen | None, now: float, last: float
+    ) -> Iterator[Broken]:
+        """Yield what is wrong with an event; `last` is when the book was last looked at [s]."""
         new, rules = self._look(event, old, now), self._rules
+        for step, when in event.times.items():
+            known = last == -math.inf or (old is not None and old.times.get(step) == when)
+            if not known and not last - STEP_SLACK <= when <= now + STEP_SLACK:
+                yield "S7", f"event {event.number}: {step} is noted {now - when:.1f} s too late"
         self._seen[event.number] = new
         if event.waits_for is not None and now - new.waits > rules.escalate_after + PENDING_SLACK:
             yield "S6", f"event {event.number} is {event.state} after {now - new.waits:.0f} s"
         if new.hands and now - new.since > rules.order_limit + PENDING_SLACK:
             held = now - new.since
             yield "S6", f"event {event.number} is in one pair of hands for {held:.0f} s"
+        yield from self._of_debt(event, new.debt, now)
         for finding in new.found - (old.found if old else frozenset()):
             if not self._is_found(event, finding, now):
                 yield "S6", f"event {event.number} is {finding}, and nobody there has said so"
@@ -361,6 +423,14 @@ class EventLedger:
             times = [time for time in map(event.times.get, steps) if time is not None]
             if times != sorted(times):
                 yield "S7", f"times of event {event.number} are out of order"
+
+    def _of_debt(self, event: Event, debt: Debt, now: float) -> Iterator[Broken]:
+        """Yield somebody who has not set out, or does not move, and still has the order."""
+        rules, owed = self._rules, now - debt.since
+        within = rules.still_within + HEARD_LATE if debt.step else rules.depart_within
+        if debt.who is not None and owed > within + PENDING_SLACK:
+            what = "has not moved" if debt.step else "has not set out"
+            yield "S6", f"event {event.number}: {self._name(debt.who)} {what} for {owed:.0f} s"
 
     def _look(self, event: Event, old: Seen | None, now: float) -> Seen:
         """Waiting ends when somebody takes it up, and begins anew when it is confirmed."""
@@ -372,7 +442,26 @@ class EventLedger:
         waits = now if taken or word.busy or confirmed else old.waits
         since = old.since if hands == old.hands and not word.anew else now
         word.busy = word.anew = False
-        return Seen(found, hands, since, waits)
+        debt = self._debt(event, hands, old.debt, now)
+        return Seen(found, hands, since, waits, dict(event.times), debt)
+
+    def _debt(self, event: Event, hands: tuple[str | None, ...], old: Debt, now: float) -> Debt:
+        """What who has an event in hand owes; who has several orders may begin with any."""
+        word, who = self._word(event.number), hands[1] if hands else None
+        if who is None or who not in word.taken or self._has_others(who, event.number):
+            return Debt(None, False, now)
+        if ("act_arrived" if hands[0] == "act" else "arrived") in event.times:
+            return Debt(None, False, now)
+        goes = hands[-1] or who
+        step = ("act_departed" if hands[0] == "act" else "departed") in event.times
+        place = self._place_of(goes)
+        known = (old.who, old.step) == (who, step) and not word.anew
+        moved = step and (None in (place, old.place) or _far(place, old.place))
+        return old if known and not moved else Debt(who, step, now, place)
+
+    def _has_others(self, who: str, number: int) -> bool:
+        others = (n for n, word in self._words.items() if who in word.ordered.keys() - word.ended)
+        return any(other != number for other in others)
 
     def _is_found(self, event: Event, finding: str, now: float) -> bool:
         """Whether who was sent there has said so; or a robot nearby may just have felt it."""
@@ -380,6 +469,10 @@ class EventLedger:
             return True
         lately = [robot for robot, when in self._felt.items() if now - when < FELT_LATELY]
         return finding == "confirmed" and any(self._is_near(r, event) for r in lately)
+
+
+def _far(place: m.Position | None, other: m.Position | None) -> bool:
+    return place is not None and other is not None and apart(place, other) >= STIRRED
 
 
 def _keep_newest(kept: dict[Any, Any]) -> None:

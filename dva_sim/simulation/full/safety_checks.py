@@ -25,6 +25,7 @@ from dva_sim.protocol.errors import ProtocolError
 from dva_sim.simulation.full.event_ledger import PENDING_SLACK, SILENT_AFTER, EventLedger
 from dva_sim.simulation.full.observations import MotorLimits, Page, RobotMotion, SafetyTerms
 from dva_sim.simulation.full.physical_world import PHYSICS_TICK
+from dva_sim.simulation.full.takeovers import Takeovers
 from dva_sim.worlds.bodies import G
 
 MOVING = 0.05  # above this a robot is going somewhere [m/s]
@@ -234,6 +235,7 @@ class SafetyAudit:
         self._motion_of, self._deaf = motion_of, set[str]()
         self._ledger = EventLedger(terms.rules, terms.dva, place_of, terms.at_event, self._name_of)
         self._witnesses: dict[str, Witness] = {}
+        self._takeovers = Takeovers()
 
     def _name_of(self, device: str) -> str:
         return self._labels.get(device, device)
@@ -266,7 +268,10 @@ class SafetyAudit:
             if to not in self._deaf:
                 self._reaches_robot(now, source, to, payload)
         elif to == self._dva and isinstance(payload, bytes):
-            self._ledger.hears(source, _read(payload), now)
+            message = _read(payload)
+            self._ledger.hears(source, message, now)
+            if message is not None and message.source == source:
+                self._takeovers.hears(source, message)
 
     def knows_places(self, known: bool) -> None:
         """Note whether places are known; without them, any finding is taken as made there."""
@@ -286,6 +291,8 @@ class SafetyAudit:
             return
         if isinstance(message.body, m.Reply):
             if source == self._dva and message.body.answers == witness.question:
+                found = [*_confirms_as_given(witness, message.body.content)]
+                self._report(found, now, source)
                 self._confirms(witness, message.body.content, now)
             return
         key = message.source, message.message_id
@@ -305,6 +312,8 @@ class SafetyAudit:
         if source == self._dva:
             if isinstance(payload, bytes) and self._ledger.waits_for(payload):
                 self._ledger.says(_read(payload))
+            if self._takeovers.waits and isinstance(payload, bytes) and b"<reply>" in payload:
+                self._answers_wish(_read(payload), now)
             return
         if source not in self._motors:
             return
@@ -316,6 +325,8 @@ class SafetyAudit:
             _note_question(witness, _read(payload), now)
         if b"<RobotStatus>" in payload:
             _learn_offset(witness, _read(payload), now)
+        if b"<SensorValue>" in payload and (value := _read(payload)) is not None:
+            self._report([*_shown_to(witness, to, value.body, now)], now, source)
         if not witness.unanswered:
             return
         reply = _read(payload) if b"<reply>" in payload else None
@@ -362,12 +373,18 @@ class SafetyAudit:
                 witness.stands(now)
             case m.PermissionRevocation() if asked.source == self._dva:
                 _end(witness, body.session, now)
-        if code != m.OK or witness.obeyed_before(message):
+        if code != m.OK:
             return
-        if isinstance(body, m.StopTeleOp):
-            witness.ends("teleoperation", now)
-        elif isinstance(body, m.CancelMission):
-            witness.ends("missions", now)
+        if witness.obeyed_before(message):
+            if isinstance(body, _ORDERS) and witness.does is None and motion.mode == _mode_of(body):
+                yield "S1", f"does once more what {message.source} has asked for once"
+            return
+        if isinstance(body, m.StopTeleOp | m.CancelMission):
+            level = "teleoperation" if isinstance(body, m.StopTeleOp) else "missions"
+            broken = witness.permits(message.source, message.session, level, now)
+            if broken is not None:
+                yield broken
+            witness.ends(level, now)
         elif isinstance(body, m.DevSub):
             held = witness.sessions.get(message.session or 0)
             mine = (
@@ -480,7 +497,23 @@ class SafetyAudit:
 
     def shows(self, now: float, page: Page) -> None:
         """See `Observer`."""
-        self._report(self._ledger.check(now, page), now, self._dva)
+        self._report([*self._ledger.check(now, page)], now, self._dva)
+        self._report([*self._hands_over(page, now)], now, self._dva)
+
+    def _answers_wish(self, answer: m.Message | None, now: float) -> None:
+        if answer is not None and isinstance(answer.body, m.Reply):
+            self._takeovers.says(answer.destination, answer.body, now)
+
+    def _hands_over(self, page: Page, now: float) -> Iterator[Broken]:
+        """Yield robots that are handed over before they stand and know that they are."""
+        for right, session in self._takeovers.given(page.rights, now, page.works):
+            witness, motion = self.witness(right.robot), self._motion_of(right.robot)
+            to = f"hands {right.robot} over to {right.holder}"
+            pushed = _pushed(motion, self._motors[right.robot], now)
+            if session in witness.sessions and session not in witness.over:
+                yield "S2", f"{to}, and it has not said that the last session is over"
+            elif _goes(motion) and not pushed and not witness.in_hand(now):
+                yield "S2", f"{to} while it moves at {_pace(motion)}"
 
     def _overstays(self, witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:
         """Yield a drive that goes on without a valid command for longer than the lease."""
@@ -536,6 +569,32 @@ def _learn_offset(witness: Witness, status: m.Message | None, now: float) -> Non
     offset = now - status.body.tick / 1000
     if witness.offset is None or abs(offset - witness.offset) > STARTED_ANEW:
         witness.offset = offset
+
+
+def _confirms_as_given(witness: Witness, content: m.Content | None) -> Iterator[Broken]:
+    """Yield a permission that the DVA confirms to a robot otherwise than it gave it."""
+    if not isinstance(content, m.Permission):
+        return
+    told = Held(content.device, content.level, content.sensors)
+    given = witness.sessions.get(content.session, told)
+    if given != told:
+        yield "S5", f"gives {given.level} to {given.holder}, and confirms {told.level}"
+
+
+def _shown_to(witness: Witness, reader: str, value: m.Body, now: float) -> Iterator[Broken]:
+    """Yield a rule that is broken where somebody gets a value of a sensor it may not read."""
+    if not isinstance(value, m.SensorValue):
+        return
+    for session in witness.confirmed:
+        held, over = witness.sessions.get(session), witness.over.get(session, now)
+        may = held is not None and held.holder == reader and value.sensor in held.sensors
+        if may and now <= over + witness.obeys_within:
+            return
+    yield "S5", f"shows {value.sensor} to {reader}, who may not read it"
+
+
+def _mode_of(order: m.Body) -> Mode:
+    return Mode.TELEOPERATION if isinstance(order, m.StartTeleOp) else Mode.MISSION
 
 
 def broken_by_wish(witness: Witness, motion: RobotMotion, now: float) -> Iterator[Broken]:

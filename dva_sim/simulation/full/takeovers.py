@@ -1,0 +1,71 @@
+"""Robots that a supervisor takes from their holders, by what is said on the network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from dva_sim.core.handovers import STOP_WITHIN
+from dva_sim.protocol import messages as m
+from dva_sim.simulation.full.observations import Right
+
+MOST_KEPT = 1000  # wishes that wait for an answer
+
+
+class Stopping(NamedTuple):
+    """A robot that is stopped for somebody.
+
+    Attributes:
+        asker: For whom.
+        session: Of its last holder.
+        until: Whoever has it later than this has got it otherwise [s].
+    """
+
+    asker: str
+    session: int
+    until: float
+
+
+class Takeovers:
+    """Notes which robots are stopped for whom, and when they are given to them."""
+
+    def __init__(self) -> None:
+        self._asked: dict[tuple[str, int], str] = {}
+        self._stopping: dict[str, Stopping] = {}
+        self._held: dict[str, Right] = {}
+
+    def hears(self, source: str, message: m.Message) -> None:
+        """Note a request that has reached the DVA."""
+        body = message.body
+        if isinstance(body, m.PermissionRequest) and body.takeover == "force":
+            self._asked[source, message.message_id] = body.device
+            if len(self._asked) > MOST_KEPT:
+                del self._asked[next(iter(self._asked))]
+
+    @property
+    def waits(self) -> bool:
+        """True while somebody waits for an answer of the DVA."""
+        return bool(self._asked)
+
+    def says(self, to: str, reply: m.Reply, now: float) -> None:
+        """Note an answer of the DVA: a robot that is not free is stopped for who may take it."""
+        robot = self._asked.pop((to, reply.answers), None)
+        held = self._held.get(robot or "")
+        if robot is None or held is None or held.holder == to or reply.code != m.BUSY:
+            return
+        self._stopping[robot] = Stopping(to, held.session, now + STOP_WITHIN)
+
+    def given(
+        self, rights: Sequence[Right], now: float, works: bool
+    ) -> Iterator[tuple[Right, int]]:
+        """Yield rights of those for whom a robot was stopped, with the last holder's session."""
+        before, self._held = self._held, {right.robot: right for right in rights}
+        if not works:  # another DVA knows of no hand-over
+            self._stopping.clear()
+        for robot, right in self._held.items():
+            stopping = self._stopping.get(robot)
+            if stopping is None or right.session == stopping.session or right == before.get(robot):
+                continue
+            del self._stopping[robot]
+            if right.holder == stopping.asker and now < stopping.until:
+                yield right, stopping.session
